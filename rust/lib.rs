@@ -1,0 +1,16 @@
+//! The core of `udd`, the laboratory of the upward-driven disk.
+//!
+//! Data flows one way; nothing below knows what stands above it:
+//! [`scalar`] (what a number is) → [`model`] (what is integrated) → [`integrate`] (how a step is
+//! taken) → [`observe`] (what is seen on the way) → [`run`] (who drives it) → [`estimate`] (what
+//! measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
+
+pub mod estimate;
+pub mod integrate;
+pub mod model;
+pub mod observe;
+pub mod run;
+pub mod scalar;
+
+#[cfg(feature = "python")]
+mod python;

@@ -1,0 +1,196 @@
+//! The upward-driven disk with friction and effects.
+
+use super::effects::{At, Effect, Slots, Term};
+use super::{Family, Momentum, Parameter, Sides, System, parameter};
+use crate::scalar::{Dual, Scalar};
+
+/// The disk, per unit mass, for the state `[Omega, Y, Z, beta]`:
+///
+/// ```text
+/// dY/dT = Z Omega + u        dZ/dT = -Y Omega + W_c        dbeta/dT = Omega
+/// I dOmega/dT = g Y - k Omega + torque - (Y u + Z W_c) Omega + Y dW_c/dT - Z du/dT
+/// I = R^2/2 + Y^2 + Z^2      k = max(k1 - k2 |Omega|, k0) + friction
+/// ```
+///
+/// The contact moves the disk's material at `(u, W_c)`; without effects `u = 0`, `W_c = W` and this
+/// is the paper's model. Effects add to `torque`, `friction`, `u` and `W_c`. Those with
+/// [`Momentum::Constraint`] enter the first two equations only, the third keeps its form without them.
+#[derive(Clone, Debug)]
+pub struct Disk<S> {
+    /// Drive speed, m/s.
+    pub w: S,
+    /// Disk radius, m.
+    pub radius: S,
+    /// Gravity, m/s^2.
+    pub g: S,
+    /// The friction law's constants.
+    pub friction: Friction<S>,
+    /// The effects, with their parameter values.
+    pub effects: Vec<Term<S>>,
+    /// Whether the run ends where the contact reaches the disk's edge, `Y^2 + Z^2 = R^2`.
+    pub edge: bool,
+}
+
+/// The paper's friction law `k = max(k1 - k2 |Omega|, k0)`, in m^2/s.
+#[derive(Clone, Copy, Debug)]
+pub struct Friction<S> {
+    /// Floor at high speed, m^2/s.
+    pub k0: S,
+    /// Value at rest, m^2/s.
+    pub k1: S,
+    /// Fall with the speed, m^2.
+    pub k2: S,
+}
+
+impl<S: Scalar> Friction<S> {
+    /// Positive on the slow branch `k1 - k2 |Omega|`, negative where the floor `k0` holds.
+    #[inline(always)]
+    fn kink(&self, speed: S) -> S {
+        self.k1 - self.k2 * speed - self.k0
+    }
+}
+
+/// Surface 0 is `Omega = 0`, where `|Omega|` has its kink; surface 1 is the friction law's kink.
+const REVERSAL: usize = 0;
+const KINK: usize = 1;
+
+#[inline(always)]
+fn speed_of<S: Scalar>(omega: S, sides: &Sides<S>) -> S {
+    S::select(sides[REVERSAL], omega, -omega)
+}
+
+impl<S: Scalar> Disk<S> {
+    /// What an effect may look at, over the disk's own scalar or over duals of it.
+    #[inline(always)]
+    fn at<A: Scalar<Mask = S::Mask>>(
+        &self,
+        lift: impl Fn(S) -> A,
+        t: A,
+        [omega, y, z, beta]: [A; 4],
+        sides: &Sides<S>,
+    ) -> At<A> {
+        let speed = A::select(sides[REVERSAL], omega, -omega);
+        let f = &self.friction;
+        let k = A::select(sides[KINK], lift(f.k1) - lift(f.k2) * speed, lift(f.k0));
+        let radius = lift(self.radius);
+        let inertia = radius.square().scale(0.5) + y.square() + z.square();
+        At { t, omega, speed, y, z, beta, k, inertia, w: lift(self.w), g: lift(self.g), radius }
+    }
+
+    /// `(u, W_c - W)` of the effects that `wanted` selects.
+    #[inline(always)]
+    fn slip<A: Scalar>(&self, lift: impl Fn(S) -> A, at: &At<A>, wanted: Momentum) -> Slots<A> {
+        let mut slots = Slots::default();
+        for term in self.effects.iter().filter(|term| term.momentum == Some(wanted)) {
+            term.enter(&lift, at, &mut slots);
+        }
+        slots
+    }
+}
+
+impl<S: Scalar> System<S, 4> for Disk<S> {
+    #[inline]
+    fn rates(&self, t: S, x: &[S; 4], sides: &Sides<S>) -> [S; 4] {
+        let &[omega, y, z, _] = x;
+        let at = self.at(|s| s, t, *x, sides);
+        let mut torque = self.g * y;
+        let mut k = at.k;
+        let (mut dy, mut dz) = (z * omega, self.w - y * omega);
+        if self.effects.is_empty() {
+            return [(torque - k * omega - z * self.w * omega) / at.inertia, dy, dz, omega];
+        }
+
+        let mut forces = Slots::default();
+        for term in self.effects.iter().filter(|term| term.momentum.is_none()) {
+            term.enter(&|s| s, &at, &mut forces);
+        }
+        torque += forces.torque;
+        k += forces.friction;
+        let constraint = self.slip(|s| s, &at, Momentum::Constraint);
+        let consistent = self.slip(|s| s, &at, Momentum::Consistent);
+        dy += consistent.lateral + constraint.lateral;
+        dz += consistent.vertical + constraint.vertical;
+        let (u, w_c) = (consistent.lateral, self.w + consistent.vertical);
+
+        // dW_c/dT and du/dT follow from the effect's own formula: direction 0 goes along the flow with
+        // Omega held, direction 1 along Omega, whose rate is what we solve for.
+        let mut inertia = at.inertia;
+        if self.effects.iter().any(|term| term.momentum == Some(Momentum::Consistent)) {
+            let along = |value: S, rate: S| Dual { re: value, d: [rate, S::zero()] };
+            let flow = self.at(
+                Dual::<S, 2>::fixed,
+                along(t, S::one()),
+                [Dual::variable(omega, 1), along(y, dy), along(z, dz), along(x[3], omega)],
+                sides,
+            );
+            let slip = self.slip(Dual::<S, 2>::fixed, &flow, Momentum::Consistent);
+            torque += y * slip.vertical.d[0] - z * slip.lateral.d[0];
+            inertia += z * slip.lateral.d[1] - y * slip.vertical.d[1];
+        }
+        [(torque - k * omega - (y * u + z * w_c) * omega) / inertia, dy, dz, omega]
+    }
+
+    fn surfaces(&self) -> usize {
+        2
+    }
+
+    #[inline(always)]
+    fn surface(&self, j: usize, _t: S, x: &[S; 4], sides: &Sides<S>) -> S {
+        match j {
+            REVERSAL => x[0],
+            _ => self.friction.kink(speed_of(x[0], sides)),
+        }
+    }
+
+    fn surface_name(&self, j: usize) -> &'static str {
+        ["reversal", "friction kink"][j]
+    }
+
+    #[inline(always)]
+    fn wall(&self, x: &[S; 4]) -> Option<S> {
+        self.edge.then(|| self.radius.square() - x[1].square() - x[2].square())
+    }
+}
+
+/// Builds [`Disk`]: which effects it has and what it does at its edge.
+#[derive(Clone, Debug)]
+pub struct DiskFamily {
+    /// The effects and how each enters.
+    pub effects: Vec<Effect>,
+    /// See [`Disk::edge`].
+    pub edge: bool,
+}
+
+impl DiskFamily {
+    /// Parameters before those of the effects: `W, R, g, k0, k1, k2`.
+    pub const PLAIN: usize = 6;
+}
+
+impl Family<4> for DiskFamily {
+    type Built<S: Scalar> = Disk<S>;
+
+    fn parameters(&self) -> Vec<Parameter> {
+        let mut list = vec![
+            parameter("W", "m/s"),
+            parameter("R", "m"),
+            parameter("g", "m/s^2"),
+            parameter("k0", "m^2/s"),
+            parameter("k1", "m^2/s"),
+            parameter("k2", "m^2"),
+        ];
+        list.extend(self.effects.iter().flat_map(Effect::parameters));
+        list
+    }
+
+    fn build<S: Scalar>(&self, values: &[S]) -> Disk<S> {
+        let (plain, rest) = values.split_at(Self::PLAIN);
+        Disk {
+            w: plain[0],
+            radius: plain[1],
+            g: plain[2],
+            friction: Friction { k0: plain[3], k1: plain[4], k2: plain[5] },
+            effects: Term::list(&self.effects, rest),
+            edge: self.edge,
+        }
+    }
+}

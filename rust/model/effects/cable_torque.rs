@@ -1,0 +1,23 @@
+//! A cable or thread that winds up with the disk's orientation.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// A cable or thread that winds up with the disk's orientation.
+pub struct CableTorque;
+
+impl Law for CableTorque {
+    const SPEC: Spec = Spec {
+        name: "cable_torque",
+        title: "cable torque",
+        equation: "torque = -kappa beta + c",
+        meaning: "something elastic winds up as the disk turns and pulls it back",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[EffectParameter { name: "kappa", unit: "m^2/s^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }, EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.torque += p[1] - p[0] * at.beta;
+    }
+}

@@ -1,0 +1,23 @@
+//! A torque that never changes.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// A torque that never changes.
+pub struct ConstantTorque;
+
+impl Law for ConstantTorque {
+    const SPEC: Spec = Spec {
+        name: "constant_torque",
+        title: "constant torque",
+        equation: "torque = c",
+        meaning: "something turns the disk always the same way",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], _at: &At<S>, slots: &mut Slots<S>) {
+        slots.torque += p[0];
+    }
+}

@@ -1,0 +1,23 @@
+//! Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
+pub struct Coulomb;
+
+impl Law for Coulomb {
+    const SPEC: Spec = Spec {
+        name: "coulomb",
+        title: "Coulomb friction",
+        equation: "torque = -c tanh(Omega/eps)",
+        meaning: "dry friction whose size does not depend on the speed",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }, EffectParameter { name: "eps", unit: "rad/s", default: 0.05, range: (1e-4, 1.0), role: Role::Shape(&[0.05]) }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.torque -= p[0] * (at.omega / p[1]).tanh();
+    }
+}

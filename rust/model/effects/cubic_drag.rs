@@ -1,0 +1,23 @@
+//! Drag that grows with the cube of the speed.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// Drag that grows with the cube of the speed.
+pub struct CubicDrag;
+
+impl Law for CubicDrag {
+    const SPEC: Spec = Spec {
+        name: "cubic_drag",
+        title: "cubic drag",
+        equation: "torque = -c Omega^3",
+        meaning: "a resistance that grows with the cube of the speed",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[EffectParameter { name: "c", unit: "m^2 s", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.torque -= p[0] * at.omega.square() * at.omega;
+    }
+}

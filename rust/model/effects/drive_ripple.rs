@@ -1,0 +1,24 @@
+//! A drive speed that varies periodically at a frequency of its own.
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// A drive speed that varies periodically at a frequency of its own.
+pub struct DriveRipple;
+
+impl Law for DriveRipple {
+    const SPEC: Spec = Spec {
+        name: "drive_ripple",
+        title: "drive ripple",
+        equation: "W_c = W (1 + a cos(phi) + b sin(phi)), phi = 2 pi f T",
+        meaning: "the motor or its gears make the drive speed vary at a steady frequency",
+        slots: &[Slot::Vertical],
+        momenta: &[Momentum::Consistent],
+        parameters: &[EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "f", unit: "Hz", default: 1.0, range: (0.01, 12.0), role: Role::Frequency }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        let phase = (p[2] * at.t).scale(std::f64::consts::TAU);
+        slots.vertical += at.w * (p[0] * phase.cos() + p[1] * phase.sin());
+    }
+}

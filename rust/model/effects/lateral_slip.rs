@@ -1,0 +1,23 @@
+//! Sideways slip of the disk in proportion to the lateral offset of its centre.
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// Sideways slip of the disk in proportion to the lateral offset of its centre.
+pub struct LateralSlip;
+
+impl Law for LateralSlip {
+    const SPEC: Spec = Spec {
+        name: "lateral_slip",
+        title: "lateral slip",
+        equation: "u = -c Y",
+        meaning: "the disk slips sideways in the contact, towards its centre line",
+        slots: &[Slot::Lateral],
+        momenta: &[Momentum::Constraint, Momentum::Consistent],
+        parameters: &[EffectParameter { name: "c", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.lateral -= p[0] * at.y;
+    }
+}

@@ -1,0 +1,25 @@
+//! A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
+pub struct LoadDrive;
+
+impl Law for LoadDrive {
+    const SPEC: Spec = Spec {
+        name: "load_drive",
+        title: "load-dependent drive",
+        equation: "W_c = W (1 - a (F/g - 1)), F = g - Z Omega^2 - Y dOmega/dT",
+        meaning: "the motor slows when the disk pulls harder on the wheels",
+        slots: &[Slot::Vertical],
+        momenta: &[Momentum::Consistent],
+        parameters: &[EffectParameter { name: "a", unit: "", default: 0.0, range: (0.0, 10.0), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        let acceleration = (at.g * at.y - at.k * at.omega - at.w * at.z * at.omega) / at.inertia;
+        let excess = -(at.z * at.omega.square() + at.y * acceleration) / at.g;
+        slots.vertical -= p[0] * at.w * excess;
+    }
+}

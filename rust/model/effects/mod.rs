@@ -1,0 +1,239 @@
+//! Physical effects that the plain models lack.
+//!
+//! **To add one**: write a file like [`quadratic_drag`](QuadraticDrag) that states the formula, its
+//! parameters with units and ranges, and the slots it enters; then name it in the list at the end of
+//! this file. The constructor, the fit, the list of candidates, its documentation and the generic
+//! tests follow from that.
+
+use super::{Parameter, parameter};
+use crate::scalar::Scalar;
+
+/// What an effect may look at: the state and the plain model's quantities.
+#[derive(Clone, Copy, Debug)]
+pub struct At<S> {
+    /// Time, s.
+    pub t: S,
+    /// Angular velocity, rad/s.
+    pub omega: S,
+    /// `|Omega|`, rad/s.
+    pub speed: S,
+    /// Centre of mass, horizontal, m.
+    pub y: S,
+    /// Centre of mass, vertical, m.
+    pub z: S,
+    /// Orientation of the body, rad.
+    pub beta: S,
+    /// The plain friction coefficient, m^2/s.
+    pub k: S,
+    /// Moment of inertia about the pivot, per unit mass, m^2.
+    pub inertia: S,
+    /// Drive speed, m/s; zero for a pendulum.
+    pub w: S,
+    /// Gravity, m/s^2.
+    pub g: S,
+    /// Disk radius (a pendulum's length), m.
+    pub radius: S,
+}
+
+/// Where effects enter the equations, summed over the effects.
+#[derive(Clone, Copy, Debug)]
+pub struct Slots<S> {
+    /// Torque per unit mass, m^2/s^2.
+    pub torque: S,
+    /// Adds to the friction coefficient `k`, m^2/s.
+    pub friction: S,
+    /// The contact's lateral velocity `u`, m/s.
+    pub lateral: S,
+    /// Adds to the contact's vertical velocity `W_c`, m/s.
+    pub vertical: S,
+}
+
+impl<S: Scalar> Default for Slots<S> {
+    fn default() -> Self {
+        Self { torque: S::zero(), friction: S::zero(), lateral: S::zero(), vertical: S::zero() }
+    }
+}
+
+/// The name of a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slot {
+    Torque,
+    Friction,
+    Lateral,
+    Vertical,
+}
+
+impl Slot {
+    /// Its name in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Slot::Torque => "torque",
+            Slot::Friction => "friction",
+            Slot::Lateral => "lateral",
+            Slot::Vertical => "vertical",
+        }
+    }
+}
+
+/// How a change of the contact's velocity enters the angular momentum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Momentum {
+    /// The exact equation: the velocity and its rate of change exert a torque.
+    Consistent,
+    /// Only the rolling constraint changes; this is how the paper adds `-B w z`.
+    Constraint,
+}
+
+impl Momentum {
+    /// Its name in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Momentum::Consistent => "consistent",
+            Momentum::Constraint => "constraint",
+        }
+    }
+}
+
+/// What a parameter does in its formula, and so how a fit treats it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Role {
+    /// The effect is proportional to it and absent where all amplitudes are zero.
+    Amplitude,
+    /// It shapes the formula; a scan of candidates tries these values.
+    Shape(&'static [f64]),
+    /// A frequency in Hz that a scan of candidates searches.
+    Frequency,
+}
+
+/// One parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffectParameter {
+    pub name: &'static str,
+    /// SI unit; empty where dimensionless.
+    pub unit: &'static str,
+    /// The value taken where none is given.
+    pub default: f64,
+    /// The physically sensible range, outside which a candidate is refused.
+    pub range: (f64, f64),
+    pub role: Role,
+}
+
+/// What is said of an effect beside its formula.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spec {
+    /// The name used in code: `udd.effects.<name>`.
+    pub name: &'static str,
+    /// The name used in prose.
+    pub title: &'static str,
+    /// The formula as a reader writes it.
+    pub equation: &'static str,
+    /// What it would mean physically, in a sentence.
+    pub meaning: &'static str,
+    /// The slots that it enters.
+    pub slots: &'static [Slot],
+    /// How it may enter the angular momentum, the default first; empty for torque and friction.
+    pub momenta: &'static [Momentum],
+    pub parameters: &'static [EffectParameter],
+}
+
+/// A physical effect: its description and its law.
+pub trait Law {
+    const SPEC: Spec;
+
+    /// Adds the effect, with parameters `p` in the order of the spec, to its slots.
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>);
+}
+
+/// An effect that a model has, its numbers left open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Effect {
+    pub kind: Kind,
+    /// `None` for an effect that enters through torque or friction.
+    pub momentum: Option<Momentum>,
+}
+
+impl Effect {
+    /// Its parameters, called `effect.name`.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let spec = self.kind.spec();
+        spec.parameters.iter().map(|p| parameter(&format!("{}.{}", spec.name, p.name), p.unit)).collect()
+    }
+}
+
+/// The most parameters an effect can have.
+const MAX_PARAMETERS: usize = 4;
+
+/// An effect with its numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct Term<S> {
+    pub kind: Kind,
+    pub momentum: Option<Momentum>,
+    pub values: [S; MAX_PARAMETERS],
+}
+
+impl<S: Scalar> Term<S> {
+    /// The effects with their values taken one after the other from `values`.
+    pub fn list(effects: &[Effect], mut values: &[S]) -> Vec<Self> {
+        let mut terms = Vec::with_capacity(effects.len());
+        for effect in effects {
+            let (own, rest) = values.split_at(effect.kind.spec().parameters.len());
+            let mut padded = [S::zero(); MAX_PARAMETERS];
+            padded[..own.len()].copy_from_slice(own);
+            terms.push(Term { kind: effect.kind, momentum: effect.momentum, values: padded });
+            values = rest;
+        }
+        terms
+    }
+
+    /// Adds the effect to its slots, over the model's scalar or over duals of it.
+    #[inline]
+    pub fn enter<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
+        self.kind.enter(&self.values.map(lift), at, slots);
+    }
+}
+
+macro_rules! library {
+    ($($module:ident :: $Name:ident),+ $(,)?) => {
+        $(mod $module; pub use $module::$Name;)+
+
+        /// The effects in the library.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Kind { $($Name),+ }
+
+        impl Kind {
+            /// Every effect in the library.
+            pub const ALL: &[Kind] = &[$(Kind::$Name),+];
+
+            /// What is said of it beside its formula.
+            pub fn spec(self) -> &'static Spec {
+                match self { $(Kind::$Name => &$Name::SPEC),+ }
+            }
+
+            #[inline]
+            fn enter<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+                match self { $(Kind::$Name => $Name::enter(p, at, slots)),+ }
+            }
+        }
+    };
+}
+
+library! {
+    quadratic_drag::QuadraticDrag,
+    cubic_drag::CubicDrag,
+    coulomb::Coulomb,
+    stribeck::Stribeck,
+    relaxation::Relaxation,
+    slip::Slip,
+    radial_slip::RadialSlip,
+    load_drive::LoadDrive,
+    lateral_slip::LateralSlip,
+    wheel_ripple::WheelRipple,
+    drive_ripple::DriveRipple,
+    drive_drift::DriveDrift,
+    gravity_tilt::GravityTilt,
+    drive_tilt::DriveTilt,
+    eccentric_mass::EccentricMass,
+    cable_torque::CableTorque,
+    constant_torque::ConstantTorque,
+    radial_friction::RadialFriction,
+}

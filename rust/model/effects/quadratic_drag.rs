@@ -1,0 +1,23 @@
+//! Air drag that grows with the square of the speed.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// Air drag that grows with the square of the speed.
+pub struct QuadraticDrag;
+
+impl Law for QuadraticDrag {
+    const SPEC: Spec = Spec {
+        name: "quadratic_drag",
+        title: "quadratic drag",
+        equation: "torque = -c |Omega| Omega",
+        meaning: "the air resists with the square of the speed",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[EffectParameter { name: "c", unit: "m^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.torque -= p[0] * at.speed * at.omega;
+    }
+}

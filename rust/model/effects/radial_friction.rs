@@ -1,0 +1,23 @@
+//! Friction that grows with the distance of the disk's centre from the contact.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// Friction that grows with the distance of the disk's centre from the contact.
+pub struct RadialFriction;
+
+impl Law for RadialFriction {
+    const SPEC: Spec = Spec {
+        name: "radial_friction",
+        title: "friction growing with the distance",
+        equation: "k = k_plain + c (Y^2 + Z^2)",
+        meaning: "the contact rubs more the farther the disk's centre is from it",
+        slots: &[Slot::Friction],
+        momenta: &[],
+        parameters: &[EffectParameter { name: "c", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.friction += p[0] * (at.y.square() + at.z.square());
+    }
+}

@@ -1,0 +1,25 @@
+//! Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
+pub struct RadialSlip;
+
+impl Law for RadialSlip {
+    const SPEC: Spec = Spec {
+        name: "radial_slip",
+        title: "slip along gravity's radial component",
+        equation: "(u, W_c - W) = -c Z (Y, Z)/(Y^2 + Z^2)",
+        meaning: "the disk slips along the line from contact to centre, pulled by gravity's component along it",
+        slots: &[Slot::Lateral, Slot::Vertical],
+        momenta: &[Momentum::Constraint, Momentum::Consistent],
+        parameters: &[EffectParameter { name: "c", unit: "m/s", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        let pull = p[0] * at.z / (at.y.square() + at.z.square() + S::constant(1e-6));
+        slots.lateral -= pull * at.y;
+        slots.vertical -= pull * at.z;
+    }
+}

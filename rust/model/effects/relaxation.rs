@@ -1,0 +1,23 @@
+//! Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
+pub struct Relaxation;
+
+impl Law for Relaxation {
+    const SPEC: Spec = Spec {
+        name: "relaxation",
+        title: "relaxation of the rolling constraint",
+        equation: "W_c = W - b W Z",
+        meaning: "the wheels lift the disk less when its centre is above them, in proportion to the drive",
+        slots: &[Slot::Vertical],
+        momenta: &[Momentum::Constraint, Momentum::Consistent],
+        parameters: &[EffectParameter { name: "b", unit: "1/m", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.vertical -= p[0] * at.w * at.z;
+    }
+}

@@ -1,0 +1,23 @@
+//! Slip of the disk between the wheels in proportion to the height of its centre.
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// Slip of the disk between the wheels in proportion to the height of its centre.
+pub struct Slip;
+
+impl Law for Slip {
+    const SPEC: Spec = Spec {
+        name: "slip",
+        title: "slip c Z",
+        equation: "W_c = W - c Z",
+        meaning: "the disk slips between the wheels, down when its centre is above them",
+        slots: &[Slot::Vertical],
+        momenta: &[Momentum::Constraint, Momentum::Consistent],
+        parameters: &[EffectParameter { name: "c", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.vertical -= p[0] * at.z;
+    }
+}

@@ -1,0 +1,24 @@
+//! A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
+
+use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+
+/// A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
+pub struct WheelRipple;
+
+impl Law for WheelRipple {
+    const SPEC: Spec = Spec {
+        name: "wheel_ripple",
+        title: "drive ripple at the wheel's frequency",
+        equation: "W_c = W (1 + a cos(phi) + b sin(phi)), phi = W T/r",
+        meaning: "the drive wheel is out of round, so that its speed varies once per turn",
+        slots: &[Slot::Vertical],
+        momenta: &[Momentum::Consistent],
+        parameters: &[EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "r", unit: "m", default: 0.03, range: (1e-3, 0.3), role: Role::Shape(&[0.03]) }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        let phase = at.w * at.t / p[2];
+        slots.vertical += at.w * (p[0] * phase.cos() + p[1] * phase.sin());
+    }
+}

@@ -1,0 +1,87 @@
+//! What is integrated.
+//!
+//! A model is a right-hand side written once, generic over the [`Scalar`]: [`Dle`], [`Disk`],
+//! [`Pendulum`]. Where its law has a kink it names a surface, a smooth function of the state that is
+//! zero there; the integrator freezes the side of each surface within a step, so that every step sees
+//! a smooth law, and lands on the surface before it changes the side.
+
+mod disk;
+mod dle;
+pub mod effects;
+mod pendulum;
+
+pub use disk::{Disk, DiskFamily};
+pub use dle::{Dle, DleFamily};
+pub use effects::{Effect, Momentum};
+pub use pendulum::{Pendulum, PendulumFamily};
+
+use crate::scalar::Scalar;
+
+/// The most switching surfaces a model can have.
+pub const MAX_SURFACES: usize = 4;
+
+/// On which side of each switching surface the law is taken: true where its function is positive.
+pub type Sides<S> = [<S as Scalar>::Mask; MAX_SURFACES];
+
+/// A system of `D` ordinary differential equations.
+pub trait System<S: Scalar, const D: usize>: Sync {
+    /// The right-hand side at time `t` and state `x`, each piecewise law continued smoothly from
+    /// the given side of its surface.
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];
+
+    /// How many switching surfaces there are.
+    fn surfaces(&self) -> usize {
+        0
+    }
+
+    /// The function whose zero is surface `j`. It may use the sides of the surfaces before `j`.
+    fn surface(&self, _j: usize, _t: S, _x: &[S; D], _sides: &Sides<S>) -> S {
+        S::one()
+    }
+
+    /// The name of surface `j`, for the record of events.
+    fn surface_name(&self, _j: usize) -> &'static str {
+        ""
+    }
+
+    /// The boundary of the model's domain: positive inside, and the run ends where it becomes zero.
+    fn wall(&self, _x: &[S; D]) -> Option<S> {
+        None
+    }
+}
+
+/// The sides on which a state lies, by the sign of each surface's function.
+pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: &[S; D]) -> Sides<S> {
+    let mut sides = [S::mask(true); MAX_SURFACES];
+    for j in 0..system.surfaces() {
+        let value = system.surface(j, t, x, &sides);
+        sides[j] = S::zero().less(value);
+    }
+    sides
+}
+
+/// A parameter of a model or an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name; an effect's parameter is called `effect.name`.
+    pub name: String,
+    /// SI unit; empty where dimensionless.
+    pub unit: &'static str,
+}
+
+/// A model with its numbers left open, so that the same structure can be built over plain numbers
+/// and over duals that differentiate with respect to any of its parameters.
+pub trait Family<const D: usize>: Clone + Send + Sync {
+    /// The system it builds.
+    type Built<S: Scalar>: System<S, D>;
+
+    /// The parameters, in the order in which [`Family::build`] takes their values.
+    fn parameters(&self) -> Vec<Parameter>;
+
+    /// The system with these parameter values.
+    fn build<S: Scalar>(&self, values: &[S]) -> Self::Built<S>;
+}
+
+pub(crate) fn parameter(name: &str, unit: &'static str) -> Parameter {
+    Parameter { name: name.to_owned(), unit }
+}

@@ -1,0 +1,166 @@
+//! Forward-mode derivatives: a value and its derivatives in `N` directions.
+
+use std::array::from_fn;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::Scalar;
+
+/// `re + Σ_i d[i] ε_i` with `ε_i ε_j = 0`. The inner scalar may itself be a dual (nested
+/// derivatives) or a packet.
+///
+/// ```
+/// use udd::scalar::{Dual, Scalar};
+/// let x = Dual::<f64, 1>::variable(2.0, 0);
+/// let y = x * x.sin();
+/// assert!((y.d[0] - (2f64.sin() + 2.0 * 2f64.cos())).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dual<S, const N: usize> {
+    /// The value.
+    pub re: S,
+    /// The derivatives, one per direction.
+    pub d: [S; N],
+}
+
+impl<S: Scalar, const N: usize> Dual<S, N> {
+    /// The variable that direction `i` differentiates with respect to.
+    #[inline(always)]
+    pub fn variable(re: S, i: usize) -> Self {
+        let mut d = [S::zero(); N];
+        d[i] = S::one();
+        Self { re, d }
+    }
+
+    /// A value whose derivatives are zero.
+    #[inline(always)]
+    pub fn fixed(re: S) -> Self {
+        Self { re, d: [S::zero(); N] }
+    }
+
+    /// The chain rule: a function's value and its slope at `self`.
+    #[inline(always)]
+    fn chain(self, value: S, slope: S) -> Self {
+        Self { re: value, d: from_fn(|i| self.d[i] * slope) }
+    }
+}
+
+impl<S: Scalar, const N: usize> Add for Dual<S, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { re: self.re + o.re, d: from_fn(|i| self.d[i] + o.d[i]) }
+    }
+}
+
+impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self { re: self.re - o.re, d: from_fn(|i| self.d[i] - o.d[i]) }
+    }
+}
+
+impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self { re: self.re * o.re, d: from_fn(|i| self.d[i] * o.re + o.d[i] * self.re) }
+    }
+}
+
+impl<S: Scalar, const N: usize> Div for Dual<S, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        let inverse = S::one() / o.re;
+        let re = self.re * inverse;
+        Self { re, d: from_fn(|i| (self.d[i] - o.d[i] * re) * inverse) }
+    }
+}
+
+impl<S: Scalar, const N: usize> Neg for Dual<S, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { re: -self.re, d: from_fn(|i| -self.d[i]) }
+    }
+}
+
+impl<S: Scalar, const N: usize> AddAssign for Dual<S, N> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+
+impl<S: Scalar, const N: usize> SubAssign for Dual<S, N> {
+    #[inline(always)]
+    fn sub_assign(&mut self, o: Self) {
+        *self = *self - o;
+    }
+}
+
+impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
+    type Real = S::Real;
+    type Mask = S::Mask;
+
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        Self::fixed(S::constant(value))
+    }
+    #[inline(always)]
+    fn lift(value: S::Real) -> Self {
+        Self::fixed(S::lift(value))
+    }
+    #[inline(always)]
+    fn real(self) -> S::Real {
+        self.re.real()
+    }
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        Self { re: self.re.scale(factor), d: from_fn(|i| self.d[i].scale(factor)) }
+    }
+    #[inline(always)]
+    fn times(self, factor: S::Real) -> Self {
+        Self { re: self.re.times(factor), d: from_fn(|i| self.d[i].times(factor)) }
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> S::Mask {
+        self.re.less(other.re)
+    }
+    #[inline(always)]
+    fn select(mask: S::Mask, yes: Self, no: Self) -> Self {
+        Self { re: S::select(mask, yes.re, no.re), d: from_fn(|i| S::select(mask, yes.d[i], no.d[i])) }
+    }
+    #[inline(always)]
+    fn mask(value: bool) -> S::Mask {
+        S::mask(value)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let root = self.re.sqrt();
+        self.chain(root, S::constant(0.5) / root)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        let value = self.re.exp();
+        self.chain(value, value)
+    }
+    #[inline(always)]
+    fn ln(self) -> Self {
+        self.chain(self.re.ln(), S::one() / self.re)
+    }
+    #[inline(always)]
+    fn sin(self) -> Self {
+        self.chain(self.re.sin(), self.re.cos())
+    }
+    #[inline(always)]
+    fn cos(self) -> Self {
+        self.chain(self.re.cos(), -self.re.sin())
+    }
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        let value = self.re.tanh();
+        self.chain(value, S::one() - value * value)
+    }
+}
