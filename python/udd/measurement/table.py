@@ -1,0 +1,265 @@
+"""The measured motion as an immutable table."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd.errors import UddError
+
+DISK = ("Y", "Z", "beta")
+PENDULUM = ("theta",)
+ANGLES = ("beta", "theta")
+SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
+
+
+class MeasurementError(UddError):
+    """A measurement, or the file it comes from, cannot be used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """The motion of a disk or a pendulum as a camera saw it.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Times [s], strictly increasing.
+    values : array_like, shape (n, m), or mapping of name to shape (n,)
+        One column per name. A disk has ``Y, Z`` [m] and ``beta`` [rad, unwrapped]; a pendulum has
+        ``theta`` [rad, 0 hanging]. NaN where a frame did not show it.
+    sigma : array_like or mapping, optional
+        Standard errors in the layout and units of `values`.
+    rho : array_like, shape (n, m (m - 1) / 2), optional
+        Correlations of the errors, in the order of `pairs`.
+    flag : sequence of str, optional
+        Why a frame is not usable; the empty string is a good frame.
+    meta : mapping, optional
+        What else is known: ``R`` [m], ``W`` [m/s], ``source``, ``fps``, ...
+    names : tuple of str, optional
+        Column names; found from the number of columns if not given.
+
+    Raises
+    ------
+    MeasurementError
+        Times not increasing or duplicate, infinite values, sigma not positive, shapes that differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(20) / 25
+    >>> m = Measurement(t, {"theta": 0.1 * np.cos(4 * t)}, meta={"source": "clock"})
+    >>> m.kind, m.names, len(m), round(m.duration, 2)
+    ('pendulum', ('theta',), 20, 0.76)
+    """
+
+    t: NDArray[np.float64]
+    values: NDArray[np.float64]
+    sigma: NDArray[np.float64] | None = None
+    rho: NDArray[np.float64] | None = None
+    flag: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, dtype=np.str_))
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        t: ArrayLike,
+        values: ArrayLike | Mapping[str, ArrayLike],
+        sigma: ArrayLike | Mapping[str, ArrayLike] | None = None,
+        rho: ArrayLike | None = None,
+        flag: ArrayLike | None = None,
+        meta: Mapping[str, Any] | None = None,
+        names: tuple[str, ...] = (),
+    ) -> None:
+        times = np.array(t, dtype=np.float64)
+        if isinstance(values, Mapping):
+            names = names or tuple(values)
+        table = _columns(values, names)
+        if not names:
+            names = {3: DISK, 1: PENDULUM}.get(table.shape[1], ())
+        if names not in (DISK, PENDULUM):
+            raise MeasurementError(f"columns must be {DISK} or {PENDULUM}, not {names}")
+        n, m = table.shape
+        flags = np.full(n, "") if flag is None else np.array(flag, dtype=np.str_)
+        put = object.__setattr__
+        put(self, "t", times)
+        put(self, "values", table)
+        put(self, "sigma", None if sigma is None else _columns(sigma, names))
+        put(
+            self,
+            "rho",
+            None if rho is None else np.array(rho, dtype=np.float64).reshape(n, -1),
+        )
+        put(self, "flag", flags)
+        put(self, "meta", dict(meta or {}))
+        put(self, "names", names)
+        if times.shape != (n,) or flags.shape != (n,) or m != len(names):
+            raise MeasurementError(
+                f"t, values and flag have different lengths: {times.shape}, {table.shape}"
+            )
+        if self.sigma is not None and self.sigma.shape != (n, m):
+            raise MeasurementError(
+                f"sigma has shape {self.sigma.shape}, values have {(n, m)}"
+            )
+        if self.rho is not None and self.rho.shape != (n, len(self.pairs)):
+            raise MeasurementError(
+                f"rho has shape {self.rho.shape}, expected {(n, len(self.pairs))}"
+            )
+        check(self, lambda i: f"row {i}")
+        for array in (times, table, self.sigma, self.rho, flags):
+            if array is not None:
+                array.setflags(write=False)
+
+    @property
+    def kind(self) -> str:
+        """``"disk"`` or ``"pendulum"``."""
+        return "disk" if self.names == DISK else "pendulum"
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of names in the order of the columns of `rho`."""
+        return tuple(combinations(self.names, 2))
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Usable rows, shape (n,): every coordinate is there and the flag is empty."""
+        return np.asarray(np.isfinite(self.values).all(axis=1) & (self.flag == ""))
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last row [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """A column by name, or a standard error as ``sigma_<name>``."""
+        table, column = self.values, name
+        if name.startswith("sigma_") and self.sigma is not None:
+            table, column = self.sigma, name.removeprefix("sigma_")
+        if column not in self.names:
+            raise KeyError(name)
+        return table[:, self.names.index(column)]
+
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of each row, shape (n, m, m), in the units of `values` squared.
+
+        Raises
+        ------
+        MeasurementError
+            No standard errors are known.
+        """
+        if self.sigma is None:
+            raise MeasurementError(
+                "this measurement has no standard errors (no sigma columns)"
+            )
+        m = len(self.names)
+        correlation = np.broadcast_to(np.eye(m), (len(self), m, m)).copy()
+        if self.rho is not None:
+            for k, (a, b) in enumerate(combinations(range(m), 2)):
+                correlation[:, a, b] = correlation[:, b, a] = self.rho[:, k]
+        return np.asarray(self.sigma[:, :, None] * correlation * self.sigma[:, None, :])
+
+    def slice(self, t0: float, t1: float) -> Measurement:
+        """Rows with ``t0 <= t < t1`` [s]; the times keep their origin."""
+        return self.rows((self.t >= t0) & (self.t < t1))
+
+    def rows(self, mask: ArrayLike) -> Measurement:
+        """Rows that a boolean mask or an index array picks."""
+        pick = np.asarray(mask)
+        return Measurement(
+            self.t[pick],
+            self.values[pick],
+            None if self.sigma is None else self.sigma[pick],
+            None if self.rho is None else self.rho[pick],
+            self.flag[pick],
+            self.meta,
+            self.names,
+        )
+
+    def with_meta(self, **changes: Any) -> Measurement:
+        """The same rows with entries of `meta` replaced or added."""
+        return replace(self, meta={**self.meta, **changes})
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the file format of the package; a reader gets the same bits back.
+
+        The file appears complete or not at all.
+        """
+        from .write import to_csv
+
+        to_csv(self, path)
+
+    def to_parquet(self, path: str | os.PathLike[str]) -> None:
+        """Write the same table as Parquet (needs pyarrow)."""
+        from .write import to_parquet
+
+        to_parquet(self, path)
+
+
+def _columns(
+    values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]
+) -> NDArray[np.float64]:
+    if isinstance(values, Mapping):
+        lost = [name for name in names if name not in values]
+        if lost:
+            raise MeasurementError(f"no column {lost[0]}: found {', '.join(values)}")
+        return np.column_stack(
+            [np.asarray(values[name], dtype=np.float64) for name in names]
+        )
+    table = np.array(values, dtype=np.float64)
+    return table[:, None] if table.ndim == 1 else table
+
+
+def check(m: Measurement, where: Any) -> None:
+    """Refuse what no fit could use; `where` names a row in the user's terms."""
+
+    def first(bad: Any) -> int | None:
+        return int(np.argmax(bad)) if np.any(bad) else None
+
+    if (i := first(~np.isfinite(m.t))) is not None:
+        raise MeasurementError(f"{where(i)}: the time is missing or infinite")
+    step = np.diff(m.t)
+    if (i := first(step <= 0)) is not None:
+        what = "repeats the time" if step[i] == 0 else "goes back in time from"
+        raise MeasurementError(
+            f"{where(i + 1)} {what} {float(m.t[i])!r} s: times must increase"
+        )
+    for k, name in enumerate(m.names):
+        if (i := first(np.isinf(m.values[:, k]))) is not None:
+            raise MeasurementError(f"{where(i)}: {name} is infinite")
+        if m.sigma is not None:
+            sigma = m.sigma[:, k]
+            if (i := first(np.isinf(sigma) | (sigma <= 0))) is not None:
+                raise MeasurementError(
+                    f"{where(i)}: sigma_{name} is {sigma[i]!s}, it must be positive and finite"
+                )
+            if (i := first(m.seen & np.isnan(sigma))) is not None:
+                raise MeasurementError(
+                    f"{where(i)}: {name} has a value but sigma_{name} is missing"
+                )
+    if m.rho is not None:
+        if (i := first((np.abs(m.rho) >= 1).any(axis=1))) is not None:
+            raise MeasurementError(f"{where(i)}: a correlation lies outside -1 ... 1")
+        if (i := first(m.seen & np.isnan(m.rho).any(axis=1))) is not None:
+            raise MeasurementError(f"{where(i)}: a correlation is missing")
+
+
+def check_length(m: Measurement) -> None:
+    """Refuse a record with fewer usable rows than a fit has unknowns."""
+    usable = int(m.seen.sum())
+    if usable == 0:
+        raise MeasurementError(
+            f"no usable row: {', '.join(m.names)} are empty, NaN or flagged throughout"
+        )
+    if usable < SHORTEST:
+        raise MeasurementError(
+            f"too short: {usable} usable rows, at least {SHORTEST} are needed"
+        )

@@ -1,0 +1,112 @@
+"""Writing a measurement to a file, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .table import Measurement, MeasurementError
+
+
+def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:
+    """Write `m` as CSV: ``# key = value`` lines, a header, one row per frame."""
+    table = numbers(m)
+    flagged = bool((m.flag != "").any())
+
+    def write(file: IO[bytes]) -> None:
+        lines = [f"# {key} = {_text(key, value)}" for key, value in m.meta.items()]
+        lines.append(",".join([*table, *(["flag"] if flagged else [])]))
+        file.write(("\n".join(lines) + "\n").encode())
+        for i, row in enumerate(
+            zip(*(column.tolist() for column in table.values()), strict=True)
+        ):
+            cells = [
+                "" if math.isnan(x) else repr(x) for x in row
+            ]  # repr: the shortest text that reads back exactly
+            if flagged:
+                cells.append(_cell(str(m.flag[i])))
+            file.write((",".join(cells) + "\n").encode())
+
+    _whole(path, write)
+
+
+def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
+    """Write `m` as Parquet; the header lines become the schema's metadata."""
+    try:
+        pa, pq = import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ImportError:
+        raise MeasurementError(
+            "Parquet files need the package pyarrow (pip install pyarrow)"
+        ) from None
+    columns: dict[str, Any] = dict(numbers(m))
+    columns["flag"] = [str(x) for x in m.flag]
+    schema = {key: _text(key, value) for key, value in m.meta.items()}
+    _whole(path, lambda file: pq.write_table(pa.table(columns, metadata=schema), file))
+
+
+def numbers(m: Measurement) -> dict[str, NDArray[np.float64]]:
+    """The numeric columns of the file, by name and in order."""
+    table = {"t": m.t} | {name: m.values[:, k] for k, name in enumerate(m.names)}
+    if m.sigma is not None:
+        table |= {f"sigma_{name}": m.sigma[:, k] for k, name in enumerate(m.names)}
+    if m.rho is not None:
+        table |= {f"rho_{a}{b}": m.rho[:, k] for k, (a, b) in enumerate(m.pairs)}
+    return table
+
+
+def _text(key: str, value: Any) -> str:
+    """A value of `meta` on one line, such that reading gives it back."""
+    if any(c in key for c in "=\n\r#"):
+        raise MeasurementError(
+            f"the header key {key!r} holds a character that the file format does not allow"
+        )
+    value = value.item() if isinstance(value, np.generic) else value
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    if isinstance(value, str):
+        try:
+            json.loads(value)
+        except ValueError:
+            if value == value.strip() and value.isprintable() and value:
+                return value
+    try:
+        return json.dumps(value)
+    except TypeError:
+        raise MeasurementError(
+            f"the header value of {key} cannot be written: {type(value).__name__}"
+        ) from None
+
+
+def _cell(text: str) -> str:
+    if any(c in text for c in ',"\n\r'):
+        return '"' + text.replace('"', '""').replace("\n", " ").replace("\r", " ") + '"'
+    return text
+
+
+def _whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None]) -> None:
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise MeasurementError(f"{target}: there is no folder {target.parent}")
+    if target.is_dir():
+        raise MeasurementError(f"{target} is a folder, not a file to write to")
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except BaseException:
+        os.unlink(name)
+        raise
