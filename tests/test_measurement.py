@@ -39,9 +39,7 @@ def disk(n: int = N) -> Measurement:
 
 def same(a: Measurement, b: Measurement) -> None:
     assert a.names == b.names and dict(a.meta) == dict(b.meta)
-    assert np.array_equal(a.t, b.t) and np.array_equal(
-        a.values, b.values, equal_nan=True
-    )
+    assert np.array_equal(a.t, b.t) and np.array_equal(a.values, b.values, equal_nan=True)
     for x, y in ((a.sigma, b.sigma), (a.rho, b.rho)):
         assert (x is None) == (y is None)
         assert x is None or y is None or np.array_equal(x, y, equal_nan=True)
@@ -64,9 +62,7 @@ def test_parquet_round_trip_keeps_every_bit(tmp_path: Path) -> None:
 
 def test_fast_rotation_across_a_gap_is_not_rewrapped(tmp_path: Path) -> None:
     t = np.arange(30.0)
-    m = Measurement(
-        t, np.column_stack([t * 0, t * 0, 5.0 * t])
-    )  # 5 rad per row, more than half a turn
+    m = Measurement(t, np.column_stack([t * 0, t * 0, 5.0 * t]))  # 5 rad per row, more than half a turn
     m.to_csv(tmp_path / "m.csv")
     assert np.array_equal(read_measurement(tmp_path / "m.csv")["beta"], m["beta"])
 
@@ -75,14 +71,10 @@ def test_wrapped_angles_are_unwrapped(tmp_path: Path) -> None:
     t = np.arange(100) / 25
     beta = 9.0 * t
     wrapped = np.angle(np.exp(1j * beta))
-    rows = "\n".join(
-        f"{a!r},0,0,{b!r}" for a, b in zip(t.tolist(), wrapped.tolist(), strict=True)
-    )
+    rows = "\n".join(f"{a!r},0,0,{b!r}" for a, b in zip(t.tolist(), wrapped.tolist(), strict=True))
     (tmp_path / "m.csv").write_text("t,Y,Z,beta\n" + rows + "\n")
     # adding whole turns rounds in the last bits of numbers up to 36
-    assert np.allclose(
-        read_measurement(tmp_path / "m.csv")["beta"], beta, rtol=0, atol=1e-13
-    )
+    assert np.allclose(read_measurement(tmp_path / "m.csv")["beta"], beta, rtol=0, atol=1e-13)
 
 
 def test_covariance_has_the_given_sigmas_and_correlations() -> None:
@@ -90,9 +82,7 @@ def test_covariance_has_the_given_sigmas_and_correlations() -> None:
     assert m.sigma is not None and m.rho is not None
     c = m.covariance()
     assert np.allclose(np.sqrt(np.einsum("nii->ni", c)), m.sigma, rtol=1e-15)
-    assert np.allclose(
-        c[:, 0, 2], m.rho[:, 1] * m.sigma[:, 0] * m.sigma[:, 2], rtol=1e-15
-    )
+    assert np.allclose(c[:, 0, 2], m.rho[:, 1] * m.sigma[:, 0] * m.sigma[:, 2], rtol=1e-15)
 
 
 def test_slice_and_seen() -> None:
@@ -168,9 +158,7 @@ def table(*, head: str = "t,Y,Z,beta", rows: list[str] = ROWS, **lines: str) -> 
         ("\n".join(f"{i} 0.1" for i in range(20)), "no header names the columns"),
     ],
 )
-def test_bad_files_are_named_in_one_sentence(
-    tmp_path: Path, text: str, says: str
-) -> None:
+def test_bad_files_are_named_in_one_sentence(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(MeasurementError) as error:
         read_measurement(write(tmp_path, text))
     assert says in str(error.value) and "\n" not in str(error.value)
@@ -203,9 +191,7 @@ def test_what_the_caller_says_wins_over_the_header(tmp_path: Path) -> None:
 
 def test_semicolons_with_decimal_commas(tmp_path: Path) -> None:
     rows = [f"{i / 25};{0.01 * i};0.02;{0.1 * i}".replace(".", ",") for i in range(20)]
-    m = read_measurement(
-        write(tmp_path, table(head="Time [s];Y [m];Z [m];beta (rad)", rows=[*rows]))
-    )
+    m = read_measurement(write(tmp_path, table(head="Time [s];Y [m];Z [m];beta (rad)", rows=[*rows])))
     assert m.t[3] == 0.12 and m["beta"][3] == 0.1 * 3
 
 
@@ -241,9 +227,7 @@ def test_semicolons_with_decimal_commas(tmp_path: Path) -> None:
         ("lab_pendulum.txt", "_,t,theta,_", 556, 1.1383885512243586),
     ],
 )
-def test_real_files(
-    name: str, columns: str | None, rows: int, first: float, tmp_path: Path
-) -> None:
+def test_real_files(name: str, columns: str | None, rows: int, first: float, tmp_path: Path) -> None:
     m = read_measurement(REAL / name, columns=columns)
     assert m.kind == "pendulum" and len(m) == rows and m.seen.all()
     assert m["theta"][0] == first

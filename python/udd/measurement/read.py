@@ -112,10 +112,7 @@ def _load(path: Path, columns: str | Sequence[str] | None) -> Table:
         raise MeasurementError(f"{path}: the file is empty")
     given = None
     if columns is not None:
-        given = [
-            c.strip()
-            for c in (columns.split(",") if isinstance(columns, str) else columns)
-        ]
+        given = [c.strip() for c in (columns.split(",") if isinstance(columns, str) else columns)]
     try:
         if raw[:4] == b"PAR1":
             return _parquet(path)
@@ -153,11 +150,7 @@ def _text(raw: bytes, given: list[str] | None) -> Table:
             head + 1
             if head is not None
             else next(
-                (
-                    i
-                    for i, row in enumerate(cells)
-                    if len(row) > 1 and all(_numeric(c, comma) for c in row)
-                ),
+                (i for i, row in enumerate(cells) if len(row) > 1 and all(_numeric(c, comma) for c in row)),
                 len(cells),
             )
         )
@@ -173,9 +166,7 @@ def _text(raw: bytes, given: list[str] | None) -> Table:
         raise MeasurementError(
             'no header names the columns: say what they are, for example columns="t,theta,_"'
         )
-    return Table(
-        names, cells[start:], [number for number, _ in body[start:]], meta, comma
-    )
+    return Table(names, cells[start:], [number for number, _ in body[start:]], meta, comma)
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -188,16 +179,12 @@ def _delimiter(lines: list[str]) -> str:
 def _split(line: str, mark: str) -> list[str]:
     if mark == " ":
         return line.split()
-    return [
-        cell.strip() for cell in next(csv.reader([line.strip("\r\n")], delimiter=mark))
-    ]
+    return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")], delimiter=mark))]
 
 
 def _named(cells: list[str]) -> list[str]:
     """Names without units and TeX: ``t_{1}`` and ``T [s]`` are both t."""
-    bare = [
-        re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells
-    ]
+    bare = [re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells]
     return [ALIASES.get(name, name) for name in bare]
 
 
@@ -228,22 +215,17 @@ def _parquet(path: Path) -> Table:
     try:
         pq = import_module("pyarrow.parquet")
     except ImportError:
-        raise MeasurementError(
-            "Parquet files need the package pyarrow (pip install pyarrow)"
-        ) from None
+        raise MeasurementError("Parquet files need the package pyarrow (pip install pyarrow)") from None
     try:
         table = pq.read_table(path)
     except (OSError, ValueError) as error:  # ArrowInvalid is a ValueError
         raise MeasurementError(f"the Parquet file cannot be read ({error})") from None
     stored = table.schema.metadata or {}
     meta = {
-        k.decode(): _value(v.decode())
-        for k, v in stored.items()
-        if k not in (b"pandas", b"ARROW:schema")
+        k.decode(): _value(v.decode()) for k, v in stored.items() if k not in (b"pandas", b"ARROW:schema")
     }
     columns = [
-        ["" if x is None else str(x) for x in table.column(name).to_pylist()]
-        for name in table.column_names
+        ["" if x is None else str(x) for x in table.column(name).to_pylist()] for name in table.column_names
     ]
     rows = [list(row) for row in zip(*columns, strict=True)]
     return Table(_named(table.column_names), rows, list(range(1, len(rows) + 1)), meta)
@@ -252,11 +234,7 @@ def _parquet(path: Path) -> Table:
 def _measurement(table: Table, path: Path, meta: dict[str, Any]) -> Measurement:
     have = set(table.names)
     twice = next(
-        (
-            n
-            for n in table.names
-            if n != "_" and table.names.count(n) > 1 and n in _WANTED
-        ),
+        (n for n in table.names if n != "_" and table.names.count(n) > 1 and n in _WANTED),
         None,
     )
     if twice is not None:
@@ -264,9 +242,7 @@ def _measurement(table: Table, path: Path, meta: dict[str, Any]) -> Measurement:
 
     def need(name: str) -> NDArray[np.float64]:
         if name not in have:
-            raise MeasurementError(
-                f"no column {name}: found {', '.join(n for n in table.names if n != '_')}"
-            )
+            raise MeasurementError(f"no column {name}: found {', '.join(n for n in table.names if n != '_')}")
         return _column(table, name)
 
     names = DISK if have & {"Y", "Z", "beta"} else PENDULUM
@@ -277,19 +253,13 @@ def _measurement(table: Table, path: Path, meta: dict[str, Any]) -> Measurement:
     if names == PENDULUM and "theta" not in have and {"x", "y"} & have:
         x, y = need("x"), need("y")
         values = np.arctan2(x, -y)[:, None]
-        extra["length"] = (
-            float(np.nanmedian(np.hypot(x, y)))
-            if np.isfinite(x + y).any()
-            else float("nan")
-        )
+        extra["length"] = float(np.nanmedian(np.hypot(x, y))) if np.isfinite(x + y).any() else float("nan")
     else:
         values = np.column_stack([need(name) for name in names])
     flag = None
     if "flag" in have:
         k = table.names.index("flag")
-        flag = np.array(
-            [row[k] if k < len(row) else "" for row in table.rows], dtype=np.str_
-        )
+        flag = np.array([row[k] if k < len(row) else "" for row in table.rows], dtype=np.str_)
     angle = next(k for k, name in enumerate(names) if name in ANGLES)
     values[:, angle] = unwrap(values[:, angle])
     sigma = rho = None
@@ -344,11 +314,7 @@ def unwrap(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     seen = np.isfinite(angle)
     good = angle[seen]
-    if (
-        len(good) < 2
-        or np.ptp(good) > 2 * np.pi + 1e-9
-        or np.abs(np.diff(good)).max() <= np.pi
-    ):
+    if len(good) < 2 or np.ptp(good) > 2 * np.pi + 1e-9 or np.abs(np.diff(good)).max() <= np.pi:
         return angle
     out = angle.copy()
     out[seen] = np.unwrap(good)

@@ -100,17 +100,11 @@ class Measurement:
         put(self, "meta", dict(meta or {}))
         put(self, "names", names)
         if times.shape != (n,) or flags.shape != (n,) or m != len(names):
-            raise MeasurementError(
-                f"t, values and flag have different lengths: {times.shape}, {table.shape}"
-            )
+            raise MeasurementError(f"t, values and flag have different lengths: {times.shape}, {table.shape}")
         if self.sigma is not None and self.sigma.shape != (n, m):
-            raise MeasurementError(
-                f"sigma has shape {self.sigma.shape}, values have {(n, m)}"
-            )
+            raise MeasurementError(f"sigma has shape {self.sigma.shape}, values have {(n, m)}")
         if self.rho is not None and self.rho.shape != (n, len(self.pairs)):
-            raise MeasurementError(
-                f"rho has shape {self.rho.shape}, expected {(n, len(self.pairs))}"
-            )
+            raise MeasurementError(f"rho has shape {self.rho.shape}, expected {(n, len(self.pairs))}")
         check(self, lambda i: f"row {i}")
         for array in (times, table, self.sigma, self.rho, flags):
             if array is not None:
@@ -157,9 +151,7 @@ class Measurement:
             No standard errors are known.
         """
         if self.sigma is None:
-            raise MeasurementError(
-                "this measurement has no standard errors (no sigma columns)"
-            )
+            raise MeasurementError("this measurement has no standard errors (no sigma columns)")
         m = len(self.names)
         correlation = np.broadcast_to(np.eye(m), (len(self), m, m)).copy()
         if self.rho is not None:
@@ -204,16 +196,12 @@ class Measurement:
         to_parquet(self, path)
 
 
-def _columns(
-    values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]
-) -> NDArray[np.float64]:
+def _columns(values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]) -> NDArray[np.float64]:
     if isinstance(values, Mapping):
         lost = [name for name in names if name not in values]
         if lost:
             raise MeasurementError(f"no column {lost[0]}: found {', '.join(values)}")
-        return np.column_stack(
-            [np.asarray(values[name], dtype=np.float64) for name in names]
-        )
+        return np.column_stack([np.asarray(values[name], dtype=np.float64) for name in names])
     table = np.array(values, dtype=np.float64)
     return table[:, None] if table.ndim == 1 else table
 
@@ -229,9 +217,7 @@ def check(m: Measurement, where: Any) -> None:
     step = np.diff(m.t)
     if (i := first(step <= 0)) is not None:
         what = "repeats the time" if step[i] == 0 else "goes back in time from"
-        raise MeasurementError(
-            f"{where(i + 1)} {what} {float(m.t[i])!r} s: times must increase"
-        )
+        raise MeasurementError(f"{where(i + 1)} {what} {float(m.t[i])!r} s: times must increase")
     for k, name in enumerate(m.names):
         if (i := first(np.isinf(m.values[:, k]))) is not None:
             raise MeasurementError(f"{where(i)}: {name} is infinite")
@@ -242,9 +228,7 @@ def check(m: Measurement, where: Any) -> None:
                     f"{where(i)}: sigma_{name} is {sigma[i]!s}, it must be positive and finite"
                 )
             if (i := first(m.seen & np.isnan(sigma))) is not None:
-                raise MeasurementError(
-                    f"{where(i)}: {name} has a value but sigma_{name} is missing"
-                )
+                raise MeasurementError(f"{where(i)}: {name} has a value but sigma_{name} is missing")
     if m.rho is not None:
         if (i := first((np.abs(m.rho) >= 1).any(axis=1))) is not None:
             raise MeasurementError(f"{where(i)}: a correlation lies outside -1 ... 1")
@@ -256,10 +240,6 @@ def check_length(m: Measurement) -> None:
     """Refuse a record with fewer usable rows than a fit has unknowns."""
     usable = int(m.seen.sum())
     if usable == 0:
-        raise MeasurementError(
-            f"no usable row: {', '.join(m.names)} are empty, NaN or flagged throughout"
-        )
+        raise MeasurementError(f"no usable row: {', '.join(m.names)} are empty, NaN or flagged throughout")
     if usable < SHORTEST:
-        raise MeasurementError(
-            f"too short: {usable} usable rows, at least {SHORTEST} are needed"
-        )
+        raise MeasurementError(f"too short: {usable} usable rows, at least {SHORTEST} are needed")

@@ -26,9 +26,7 @@ def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:
         lines = [f"# {key} = {_text(key, value)}" for key, value in m.meta.items()]
         lines.append(",".join([*table, *(["flag"] if flagged else [])]))
         file.write(("\n".join(lines) + "\n").encode())
-        for i, row in enumerate(
-            zip(*(column.tolist() for column in table.values()), strict=True)
-        ):
+        for i, row in enumerate(zip(*(column.tolist() for column in table.values()), strict=True)):
             cells = [
                 "" if math.isnan(x) else repr(x) for x in row
             ]  # repr: the shortest text that reads back exactly
@@ -44,9 +42,7 @@ def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
     try:
         pa, pq = import_module("pyarrow"), import_module("pyarrow.parquet")
     except ImportError:
-        raise MeasurementError(
-            "Parquet files need the package pyarrow (pip install pyarrow)"
-        ) from None
+        raise MeasurementError("Parquet files need the package pyarrow (pip install pyarrow)") from None
     columns: dict[str, Any] = dict(numbers(m))
     columns["flag"] = [str(x) for x in m.flag]
     schema = {key: _text(key, value) for key, value in m.meta.items()}
