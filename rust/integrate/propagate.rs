@@ -1,0 +1,65 @@
+//! From one time to another, nothing kept on the way.
+
+use super::driver::Driver;
+use super::tolerance::{Failure, Tolerance};
+use crate::model::System;
+use crate::scalar::Scalar;
+
+/// More steps than this within one propagation mean that something is wrong.
+const MOST_STEPS: u64 = 1_000_000;
+
+/// The state at `t1` of the run that starts with `x0` at `t0`; `t1` may lie before `t0`.
+///
+/// The run lands on switching surfaces and ignores the wall. Over duals it gives the derivatives of
+/// the final state exactly as the same sequence of steps does; step sizes follow the error of the state
+/// alone (see [`Tolerance`]). The first trial step is the whole interval.
+///
+/// ```
+/// use udd::integrate::{Tolerance, propagate};
+/// use udd::model::Dle;
+/// use udd::scalar::Dual;
+/// // The state after a time of 1, and its derivative with respect to the drive w.
+/// let dle = Dle { w: Dual::<f64, 1>::variable(1.0, 0), b: Dual::fixed(0.0) };
+/// let x = propagate(&dle, 0.0, 1.0, [1.0, 1.0, 0.01].map(Dual::fixed), &Tolerance::default())?;
+/// assert!(x[2].d[0] > 0.0);
+/// # Ok::<(), udd::integrate::Failure>(())
+/// ```
+pub fn propagate<S, const D: usize>(
+    system: &impl System<S, D>,
+    t0: f64,
+    t1: f64,
+    x0: [S; D],
+    tolerance: &Tolerance,
+) -> Result<[S; D], Failure>
+where
+    S: Scalar<Real = f64, Mask = bool>,
+{
+    propagate_from(system, t0, t1, x0, t1 - t0, tolerance).map(|(x, _)| x)
+}
+
+/// As [`propagate`], with the size of the first trial step; returns the state and the size of the
+/// step that would be tried next, a good `h0` for the interval that follows.
+pub fn propagate_from<S, const D: usize>(
+    system: &impl System<S, D>,
+    t0: f64,
+    t1: f64,
+    x0: [S; D],
+    h0: f64,
+    tolerance: &Tolerance,
+) -> Result<([S; D], f64), Failure>
+where
+    S: Scalar<Real = f64, Mask = bool>,
+{
+    if t0 == t1 {
+        return Ok((x0, h0));
+    }
+    let h0 = if h0 == 0.0 { t1 - t0 } else { h0.copysign(t1 - t0) };
+    let mut driver = Driver::new(system, t0, x0, Some(h0), tolerance);
+    while driver.t() != t1 {
+        driver.advance(t1)?;
+        if driver.counts.accepted > MOST_STEPS {
+            return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
+        }
+    }
+    Ok((*driver.x(), driver.h()))
+}
