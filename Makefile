@@ -1,0 +1,92 @@
+# Everything happens in .venv, made from requirements.lock (pinned, with hashes); nothing else is set up
+# on the machine. Needed beforehand: a Rust toolchain, Python 3.11+ and make.
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules
+
+BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
+PY := $(BIN)/python
+# The interpreter that makes .venv: the first of these that is 3.11 or newer.
+PYTHONS := $(or $(PYTHON),python3 python3.14 python3.13 python3.12 python3.11 python)
+# pyo3 looks at this interpreter, whatever else is on the PATH.
+export PYO3_PYTHON := $(CURDIR)/$(PY)
+# Python's own settings must not leak into .venv.
+unexport PYTHONPATH PYTHONHOME
+
+# What the compiled module is made of; cargo itself decides what to compile again.
+SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
+
+.PHONY: help install demo test test-rust test-python lint format dist lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+install: .venv/.udd ## make .venv from the lock file and install the release build into it
+
+demo: .venv/.udd ## from the sample film to the report: run the main job and print where its report is
+	$(BIN)/udd demo
+
+test: test-rust test-python ## build everything and run all tests (cargo and pytest)
+
+test-rust: ## only the tests of the Rust core; needs no Python
+	cargo test --locked
+
+test-python: .venv/.udd ## only the tests of the Python package
+	$(PY) -m pytest
+
+lint: .venv/.udd ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
+	cargo fmt --check
+	cargo clippy --locked --all-targets -- -D warnings
+	cargo clippy --locked --all-targets --features python -- -D warnings
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy --strict python/udd
+	$(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
+
+format: .venv/.deps ## format the Rust and the Python code
+	cargo fmt
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+dist: .venv/.deps ## build the wheel and the source distribution into dist/
+	$(BIN)/maturin build --release --locked --sdist --out dist
+
+lock: .venv/.deps ## write requirements.lock anew, with today's versions
+	rm -rf .venv/lock
+	$(PY) -m venv .venv/lock
+	.venv/lock/$(notdir $(BIN))/python -m pip install --quiet uv
+	.venv/lock/$(notdir $(BIN))/uv pip compile pyproject.toml --all-extras --group dev --upgrade --quiet \
+	  --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --custom-compile-command "make lock" --output-file requirements.lock
+
+clean: ## remove .venv and everything that was built
+	rm -rf .venv dist demo target .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -f python/udd/_core*.so python/udd/_core*.pyd
+
+# --- the three steps behind `install`; a stamp file marks each, so that only what changed is done again
+
+.venv/.made:
+	@python=; for p in $(PYTHONS); do \
+	  if "$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then python=$$p; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then echo "make: no Python 3.11 or newer found among: $(PYTHONS)" >&2; exit 1; fi; \
+	if ! command -v cargo >/dev/null; then echo "make: no cargo found; a Rust toolchain is needed" >&2; exit 1; fi; \
+	rm -rf .venv; \
+	if ! "$$python" -m venv .venv; then \
+	  rm -rf .venv; \
+	  echo "make: $$python cannot make a virtual environment (on Debian and Ubuntu: install python3-venv)" >&2; \
+	  exit 1; \
+	fi
+	@touch $@
+
+.venv/.deps: requirements.lock .venv/.made
+	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --require-hashes --only-binary :all: -r requirements.lock
+	@touch $@
+
+.venv/.udd: .venv/.deps $(SOURCES)
+	MATURIN_PEP517_ARGS=--locked $(PY) -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable . --verbose
+	@touch $@
