@@ -1,1 +1,64 @@
-//! Under construction.
+//! What measured motion says about the model.
+//!
+//! Weak-constraint multiple shooting: unknown are the state at every frame, the model's parameters
+//! and the camera's. Minimised is
+//!
+//! ```text
+//! sum |y_i - h(x_i; camera)|^2_R + sum |x_{i+1} - Phi(x_i; theta)|^2_Q + priors
+//! ```
+//!
+//! by Gauss-Newton, with tangents from duals. The states' part of the normal equations is
+//! block-tridiagonal, bordered by the parameters ([`Bordered`]). The same equations, with one more
+//! column per candidate, give the [`score`](Estimator::score) of every effect the model may lack.
+
+mod bordered;
+mod forecast;
+mod gauss_newton;
+mod linearise;
+mod record;
+mod score;
+mod sensor;
+
+pub use bordered::{Bordered, Eliminated};
+pub use forecast::Filtered;
+pub use gauss_newton::{Cost, Options, Solution};
+pub use linearise::Linear;
+pub use record::{Free, Point, Record, Role};
+pub use score::Score;
+pub use sensor::{AngleSensor, DiskCamera, Sensor};
+
+use crate::integrate::{Failure, Tolerance};
+use crate::model::Family;
+
+/// An estimation problem: a family of models, a sensor and a record.
+#[derive(Clone, Debug)]
+pub struct Estimator<F, C, const D: usize, const M: usize>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    pub family: F,
+    pub sensor: C,
+    pub record: Record<M>,
+    /// Which parameters are free, with their priors; in the order of the borders.
+    pub free: Vec<Free>,
+    /// Standard deviation of the model's error per state and square root of a second: the error
+    /// over an interval `dt` has variance `q^2 dt`.
+    pub diffusion: [f64; D],
+    pub tolerance: Tolerance,
+}
+
+/// Why an estimate failed.
+#[derive(Debug, thiserror::Error)]
+pub enum EstimateError {
+    #[error("the model could not be integrated from the state at t = {t} s: {source}")]
+    Integration { t: f64, source: Failure },
+    #[error("the data do not determine the state at t = {t} s")]
+    Singular { t: f64 },
+    #[error("the data do not determine the free parameters: {0}")]
+    Undetermined(String),
+    #[error("{0}")]
+    Invalid(String),
+    #[error("interrupted")]
+    Cancelled,
+}

@@ -63,6 +63,7 @@ impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
 impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
+    #[allow(clippy::suspicious_arithmetic_impl, reason = "the product rule is a sum")]
     fn mul(self, o: Self) -> Self {
         Self { re: self.re * o.re, d: from_fn(|i| self.d[i] * o.re + o.d[i] * self.re) }
     }

@@ -1,0 +1,248 @@
+"""The fit of a model to a measurement: weak-constraint multiple shooting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.errors import FitError
+from udd.measurement import Measurement
+from udd.models import Model
+
+from .noise import Noise, estimated, stated
+from .parameters import Free, free_parameters
+from .record import Record, record_of
+
+Array = NDArray[np.float64]
+
+#: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]`` in
+#: rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data, which is
+#: where the noise is estimated; at the tight end small effects show.
+SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
+    "disk": ((0.1, 1e-4, 1e-4, 1e-3), (0.02, 3e-5, 3e-5, 3e-4), (3e-3, 1e-5, 1e-5, 1e-4)),
+    "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5)),
+}
+_FRAME = 0.04
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A measurement laid out for a model, with everything that one solve needs but the point it starts from."""
+
+    model: Model
+    record: Record
+    free: tuple[Free, ...]
+    noise: Noise
+    diffusion: tuple[float, ...]
+
+    def arguments(self, point: Point) -> tuple[Any, ...]:
+        """What the core takes to describe a problem at a point."""
+        r = self.record
+        information = self.noise.information(r, point.states[:, 0])
+        return (
+            self.model.with_parameters(point.model),
+            (r.t, r.seen, information, r.linked),
+            (point.states, point.camera, point.clock),
+            [f.core for f in self.free],
+            list(self.diffusion),
+        )
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all unknowns: the states, the model's parameters, the camera's, and the clock's error."""
+
+    states: Array
+    model: Mapping[str, float]
+    camera: Array
+    clock: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to a measurement.
+
+    Attributes
+    ----------
+    model : Disk or Pendulum
+        With the fitted parameters.
+    parameters : dict of str to float
+        The free parameters, the camera's included.
+    errors : dict of str to float
+        Their standard errors.
+    covariance : ndarray (p, p)
+        In the order of `parameters`.
+    chi2, dof : float
+        Sum of squares in units of the assumed noise and model error, and what it should be.
+    converged : bool
+    measurement : Measurement
+    record : Record
+        The frames as the estimator saw them.
+    states : ndarray (n, d)
+        The state at each frame of `record`.
+    state_covariance : ndarray (n, d, d)
+    misfit : ndarray (n, m)
+        What was seen less what was fitted; NaN where nothing was seen.
+    defect : ndarray (n - 1, d)
+        By how much each state misses what the model makes of the one before, per second: the residual of each
+        equation. NaN where frames are not linked.
+    noise : Noise
+        The measurement's noise as the record shows it.
+    """
+
+    model: Model
+    parameters: dict[str, float]
+    errors: dict[str, float]
+    covariance: Array
+    chi2: float
+    dof: float
+    converged: bool
+    iterations: int
+    measurement: Measurement
+    record: Record
+    states: Array
+    state_covariance: Array
+    misfit: Array
+    defect: Array
+    noise: Noise
+    problem: Problem
+    point: Point
+
+    @property
+    def residuals(self) -> Array:
+        """What was seen less what was fitted, for every row of the measurement, (rows, m); NaN where not seen."""
+        rows = np.full((len(self.measurement), self.misfit.shape[1]), np.nan)
+        there = self.record.row >= 0
+        rows[self.record.row[there]] = self.misfit[there]
+        return rows
+
+    @property
+    def scatter(self) -> float:
+        """chi2 per degree of freedom: 1 where model and noise explain the data."""
+        return self.chi2 / self.dof
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads: parameters with errors, noise, goodness."""
+        return {
+            "model": repr(self.model),
+            "parameters": {n: {"value": v, "se": self.errors[n]} for n, v in self.parameters.items()},
+            "chi2": self.chi2,
+            "dof": self.dof,
+            "converged": self.converged,
+            "noise": {
+                name: {"factor": float(f), "per_rad_per_s": float(b)}
+                for name, f, b in zip(self.measurement.names, self.noise.factor, self.noise.blur, strict=True)
+            },
+        }
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:.2g}" for name, value in self.parameters.items()
+        ]
+        verdict = "converged" if self.converged else "NOT converged"
+        head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
+        return "\n".join([head, *lines])
+
+
+def fit(
+    measurement: Measurement,
+    model: Model,
+    free: Iterable[str] | None = None,
+    *,
+    camera: bool | Iterable[str] = True,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+) -> Fit:
+    """Fit a model to measured motion.
+
+    Unknown are the state at every frame, the model's free parameters and the camera's; minimised is the sum of the
+    squared misfits in units of the noise and of the squared model errors in units of an assumed one, which is
+    lowered in steps (weak-constraint multiple shooting). No data are differentiated, and chaotic records of any
+    length can be fitted.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Of the disk (``Y, Z, beta``) or of a pendulum (``theta``).
+    model : Disk or Pendulum
+        Its parameters are the start and the priors' means.
+    free : iterable of str, optional
+        Names of the model's free parameters; by default ``k0, k1, k2, W`` (with a prior of 5 %) of a disk,
+        ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects.
+    camera : bool or iterable of str
+        Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the orientation,
+        ``row`` time of a rolling shutter, ``clock``), or which of them.
+    priors : mapping of str to (mean, standard deviation), optional
+        Replaces the default priors.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    FitError
+        The measurement does not suit the model, is too short, or does not determine the parameters.
+
+    Examples
+    --------
+    >>> import numpy as np, udd
+    >>> t = np.arange(0, 20, 0.05)
+    >>> truth = udd.Pendulum(1.0, k0=0.02)
+    >>> theta = udd.simulate(truth, t, [0.0, 0.5]).state[:, 1]
+    >>> rng = np.random.default_rng(1)
+    >>> measured = udd.Measurement(t, {"theta": theta + 1e-3 * rng.standard_normal(len(t))})
+    >>> result = udd.fit(measured, udd.Pendulum(1.0, k0=0.1), free=["k0"])
+    >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
+    True
+    """
+    problem, point = start(measurement, model, free, camera=camera, priors=priors)
+    return anneal(measurement, problem, point)
+
+
+def start(
+    measurement: Measurement,
+    model: Model,
+    free: Iterable[str] | None = None,
+    *,
+    camera: bool | Iterable[str] = True,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+) -> tuple[Problem, Point]:
+    """The problem that a fit solves, and where it starts."""
+    if measurement.kind != getattr(model, "kind", None):
+        raise FitError(
+            f"the measurement has columns {', '.join(measurement.names)}, which {type(model).__name__} does not explain"
+        )
+    record = record_of(measurement)
+    parameters = free_parameters(model, free, camera, priors)
+    cameras = _core.camera_parameters(measurement.kind)
+    problem = Problem(model, record, parameters, stated(record), levels(measurement.kind)[0])
+    return problem, Point(record.states, model.parameters, np.zeros(len(cameras)), 0.0)
+
+
+def levels(kind: str) -> tuple[tuple[float, ...], ...]:
+    """The model's assumed error, loose to tight, per square root of a second."""
+    return tuple(tuple(q / _FRAME**0.5 for q in level) for level in SCHEDULE[kind])
+
+
+def anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
+    """Solve from loose to tight; the noise is estimated at the loose end, where a wrong model does no harm."""
+    loose, *tighter = levels(measurement.kind)
+    problem = replace(problem, diffusion=loose)
+    for _ in range(3):
+        result = solve(measurement, problem, point)
+        point = result.point
+        variance = result.misfit_variance
+        problem = replace(
+            problem,
+            noise=estimated(problem.record, point.states[:, 0], result.misfit, variance, problem.noise),
+        )
+    for diffusion in tighter:
+        problem = replace(problem, diffusion=diffusion)
+        result = solve(measurement, problem, point)
+        point = result.point
+    return result

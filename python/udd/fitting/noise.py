@@ -1,0 +1,99 @@
+"""The noise of a record, estimated from the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.stats import chi2
+
+from .record import Record
+
+Array = NDArray[np.float64]
+
+#: A frame farther out than this share of honest frames counts less (Huber).
+_HONEST = 0.99
+
+
+@dataclass(frozen=True)
+class Noise:
+    """How far a measurement is from what it measures.
+
+    The variance of a channel is ``(factor sigma)^2 + (blur Omega)^2``, where ``sigma`` is what the measurement
+    states: noise often grows with the speed.
+
+    Attributes
+    ----------
+    factor : ndarray (m,)
+        By what the stated standard deviations are multiplied.
+    blur : ndarray (m,)
+        Growth with the angular speed, in the channel's unit per rad/s.
+    weight : ndarray (n,)
+        How much each frame counts: 1, or less for an outlier.
+    """
+
+    factor: Array
+    blur: Array
+    weight: Array
+
+    def sd(self, record: Record, omega: Array) -> Array:
+        """Standard deviation of every frame and channel, (n, m)."""
+        return np.hypot(self.factor * record.sigma, self.blur * np.abs(omega)[:, None])
+
+    def information(self, record: Record, omega: Array) -> Array:
+        """Inverse covariance of every frame, (n, m, m), outliers weighted down; zero where nothing was seen."""
+        sd = self.sd(record, omega)
+        seen = np.isfinite(sd)
+        scale = np.where(seen, 1.0 / np.where(seen, sd, 1.0), 0.0)
+        inverse = np.linalg.inv(record.rho)
+        result: Array = self.weight[:, None, None] * inverse * scale[:, :, None] * scale[:, None, :]
+        return result
+
+
+def stated(record: Record) -> Noise:
+    """The noise that the measurement itself states."""
+    channels = record.seen.shape[1]
+    return Noise(np.ones(channels), np.zeros(channels), np.ones(len(record.t)))
+
+
+def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array, before: Noise) -> Noise:
+    """The noise that a fit's misfits show.
+
+    Parameters
+    ----------
+    record : Record
+    omega : ndarray (n,)
+        Angular velocity, rad/s.
+    misfit : ndarray (n, m)
+        What was seen less what was fitted.
+    seen_variance : ndarray (n, m)
+        Variance of what was fitted; the misfits are smaller than the noise by it.
+    before : Noise
+        The noise that the fit assumed.
+    """
+    seen = record.observed
+    distance = _distance(record, misfit, before.sd(record, omega))
+    limit = np.sqrt(chi2.ppf(_HONEST, seen.sum(axis=1).clip(1)))
+    weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
+    factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
+    for m in range(misfit.shape[1]):
+        use = seen[:, m]
+        power = weight[use] * misfit[use, m] ** 2 + seen_variance[use, m]
+        terms = np.column_stack([record.sigma[use, m] ** 2, omega[use] ** 2])
+        variance = before.sd(record, omega)[use, m] ** 2
+        for _ in range(3):  # the scatter of a squared misfit grows with its own expectation
+            scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
+            share, _residual = nnls(terms / scale / variance[:, None], power / variance)
+            variance = np.maximum(terms / scale @ share, 1e-6 * power.mean() + 1e-300)
+        factor[m], blur[m] = np.sqrt(share / scale)
+        factor[m] = max(factor[m], 1e-3 * np.sqrt(power.mean() / (record.sigma[use, m] ** 2).mean()))
+    return Noise(factor, blur, weight)
+
+
+def _distance(record: Record, misfit: Array, sd: Array) -> Array:
+    """How many standard deviations each frame is off."""
+    normal = np.where(np.isfinite(sd), misfit / np.where(np.isfinite(sd), sd, 1.0), 0.0)
+    squared = np.einsum("ni,nij,nj->n", normal, np.linalg.inv(record.rho), normal)
+    return np.sqrt(np.maximum(squared, 0.0))

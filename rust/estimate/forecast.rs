@@ -1,0 +1,79 @@
+//! Forecasts: filter a window, then run free.
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::SMatrix;
+use rayon::prelude::*;
+
+use super::{EstimateError, Estimator, Options, Point, Record, Sensor};
+use crate::integrate::propagate;
+use crate::model::{Family, System, sides_of};
+
+/// The state at a window's end with its covariance.
+pub type Filtered<const D: usize> = ([f64; D], SMatrix<f64, D, D>);
+
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// The state at the last frame of each window `(first, last)`, from the frames in the window alone
+    /// and with all parameters held.
+    pub fn filter(
+        &self,
+        point: &Point<D>,
+        windows: &[(usize, usize)],
+        options: &Options,
+        cancel: &AtomicBool,
+    ) -> Result<Vec<Filtered<D>>, EstimateError> {
+        let one = |&(first, last): &(usize, usize)| {
+            let part = Self {
+                record: self.record.part(first, last),
+                free: Vec::new(),
+                family: self.family.clone(),
+                sensor: self.sensor.clone(),
+                ..*self
+            };
+            let start = Point { states: point.states[first..=last].to_vec(), ..point.clone() };
+            let solution = part.solve(start, options, cancel)?;
+            Ok((solution.point.states[last - first], solution.state_covariance[last - first]))
+        };
+        windows.par_iter().map(one).collect()
+    }
+
+    /// What would be seen at increasing times after each start `(time, state)`, by the model alone.
+    pub fn predict(
+        &self,
+        point: &Point<D>,
+        starts: &[(f64, [f64; D])],
+        times: &[Vec<f64>],
+    ) -> Result<Vec<Vec<[f64; M]>>, EstimateError> {
+        let system = self.family.build(&point.model);
+        let pace = 1.0 + point.clock;
+        let one = |(&(t, x), times): (&(f64, [f64; D]), &Vec<f64>)| {
+            let (mut t, mut x) = (t * pace, x);
+            let mut seen = Vec::with_capacity(times.len());
+            for &next in times {
+                x = propagate(&system, t, next * pace, x, &self.tolerance)
+                    .map_err(|source| EstimateError::Integration { t, source })?;
+                t = next * pace;
+                let rate = system.rates(t, &x, &sides_of(&system, t, &x));
+                seen.push(self.sensor.observe(&point.camera, &x, &rate));
+            }
+            Ok(seen)
+        };
+        starts.par_iter().zip(times).map(one).collect()
+    }
+}
+
+impl<const M: usize> Record<M> {
+    /// The frames from `first` to `last`, both included.
+    fn part(&self, first: usize, last: usize) -> Self {
+        Self {
+            t: self.t[first..=last].to_vec(),
+            seen: self.seen[first..=last].to_vec(),
+            information: self.information[first..=last].to_vec(),
+            linked: self.linked[first..last].to_vec(),
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The score of candidates: what each would do for the fit, without fitting it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::linearise::invert;
+use super::{EstimateError, Estimator, Point, Role, Sensor};
+use crate::model::Family;
+
+/// The candidates' amplitudes near zero, everything else optimal: the cost falls by
+/// `2 gradient . c - c . information c` when they take the values `c`.
+#[derive(Clone, Debug)]
+pub struct Score {
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// Scores candidates around a minimum. Each group is a family that holds this model's own
+    /// parameters first and then those of more effects, all amplitudes zero, with the values of all its
+    /// parameters and the amplitudes' roles. The states and all free parameters are eliminated.
+    pub fn score(
+        &self,
+        point: &Point<D>,
+        groups: &[(F, Vec<f64>, Vec<Role>)],
+    ) -> Result<Score, EstimateError> {
+        let own = self.free.len();
+        let mut linear = self.linearise(point, &self.roles())?;
+        for (family, values, roles) in groups {
+            let wider = Point { model: values.clone(), ..point.clone() };
+            linear = linear.beside(&self.linearise_as(family, &wider, roles)?);
+        }
+        let reduced = self.equations(point, &linear).eliminate(&self.record.t)?;
+        let all = reduced.schur.nrows();
+        let more = all - own;
+        let matrix = reduced.schur.view((0, 0), (own, own)).into_owned();
+        let cross = reduced.schur.view((0, own), (own, more)).into_owned();
+        let corner = reduced.schur.view((own, own), (more, more)).into_owned();
+        let gradient = reduced.gradient.rows(own, more).into_owned();
+        if own == 0 {
+            return Ok(Score { gradient, information: corner });
+        }
+        let covariance = invert(&matrix).ok_or_else(|| {
+            EstimateError::Undetermined("some of them can change together without changing the fit".into())
+        })?;
+        let solved = covariance * &cross;
+        Ok(Score {
+            gradient: gradient - solved.tr_mul(&reduced.gradient.rows(0, own)),
+            information: corner - cross.tr_mul(&solved),
+        })
+    }
+}

@@ -1,0 +1,58 @@
+//! How a state is seen.
+
+use crate::scalar::Scalar;
+
+/// How `M` channels see a state of `D` numbers.
+pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
+    /// The camera's parameters with their units.
+    const PARAMETERS: &'static [(&'static str, &'static str)];
+    /// The channels that are angles: what was seen of them counts modulo a turn.
+    const ANGLE: [bool; M];
+
+    /// What is seen of state `x`, which changes at the given rate.
+    fn observe<S: Scalar>(&self, camera: &[S], x: &[S; D], rate: &[S; D]) -> [S; M];
+}
+
+/// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
+///
+/// ```text
+/// (Y, Z)_seen = (1 + scale) Rot(tilt) (Y, Z) + (y0, z0),   beta_seen = beta + tilt - lag Omega
+/// ```
+///
+/// `y0, z0` is where the pivot really is in the measurement's coordinates, `tilt` turns the picture
+/// clockwise, `lag` is how much later than the position the orientation is seen, and with a rolling
+/// shutter a point at height `Z` is exposed at `t - row Z`.
+#[derive(Clone, Copy, Debug)]
+pub struct DiskCamera;
+
+impl Sensor<4, 3> for DiskCamera {
+    const PARAMETERS: &'static [(&'static str, &'static str)] =
+        &[("y0", "m"), ("z0", "m"), ("tilt", "rad"), ("scale", ""), ("lag", "s"), ("row", "s/m")];
+    const ANGLE: [bool; 3] = [false, false, true];
+
+    #[inline]
+    fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
+        let &[y0, z0, tilt, scale, lag, row] = camera.first_chunk().expect("six camera parameters");
+        let late = -(row * x[2]);
+        let y = x[1] + late * rate[1];
+        let z = x[2] + late * rate[2];
+        let beta = x[3] + (late - lag) * rate[3];
+        let (sin, cos) = (tilt.sin(), tilt.cos());
+        let size = S::one() + scale;
+        [size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0, beta + tilt]
+    }
+}
+
+/// A sensor that sees a pendulum's angle, with an unknown zero.
+#[derive(Clone, Copy, Debug)]
+pub struct AngleSensor;
+
+impl Sensor<2, 1> for AngleSensor {
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[("theta0", "rad")];
+    const ANGLE: [bool; 1] = [true];
+
+    #[inline]
+    fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 2], _rate: &[S; 2]) -> [S; 1] {
+        [x[1] + camera[0]]
+    }
+}

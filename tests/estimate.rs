@@ -1,0 +1,247 @@
+//! The estimator against dense linear algebra, finite differences and a simulated truth.
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use proptest::prelude::*;
+use udd::estimate::{Bordered, DiskCamera, Estimator, Free, Options, Point, Record, Role};
+use udd::integrate::{Tolerance, propagate};
+use udd::model::effects::{Effect, Kind, Momentum};
+use udd::model::{DiskFamily, Family};
+
+const PAPER: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
+
+/// Reproducible noise, normal to the precision needed here: twelve uniform numbers summed.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn family(effects: &[(Kind, Option<Momentum>)]) -> DiskFamily {
+    let effects = effects.iter().map(|&(kind, momentum)| Effect { kind, momentum }).collect();
+    DiskFamily { effects, edge: false }
+}
+
+type Problem = Estimator<DiskFamily, DiskCamera, 4, 3>;
+
+/// A camera's record of `n` frames of a run, with its true states.
+fn film(family: &DiskFamily, values: &[f64], n: usize, seed: u64) -> (Record<3>, Vec<[f64; 4]>) {
+    let tolerance = Tolerance { rtol: 1e-10, atol: 1e-12 };
+    let disk = family.build(values);
+    let mut noise = Noise(seed);
+    let mut x = [1.0, 0.01, -0.02, 0.3];
+    let (mut t, mut states, mut seen) = (0.0, Vec::new(), Vec::new());
+    for i in 0..n {
+        if i > 0 {
+            x = propagate(&disk, t, t + 0.04, x, &tolerance).unwrap();
+            t += 0.04;
+        }
+        states.push(x);
+        seen.push(SVector::from([
+            x[1] + 5e-4 * noise.normal(),
+            x[2] + 5e-4 * noise.normal(),
+            x[3] + 0.01 * noise.normal(),
+        ]));
+    }
+    let information = SMatrix::from_diagonal(&SVector::from([4e6, 4e6, 1e4]));
+    let times = (0..n).map(|i| 0.04 * i as f64).collect();
+    let record = Record { t: times, seen, information: vec![information; n], linked: vec![true; n - 1] };
+    (record, states)
+}
+
+fn problem(family: DiskFamily, record: Record<3>, free: Vec<Free>) -> Problem {
+    let diffusion = [3e-3, 1e-5, 1e-5, 1e-4].map(|q: f64| q / 0.04f64.sqrt());
+    let tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
+    Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance }
+}
+
+fn free(role: Role, mean: f64, sd: f64) -> Free {
+    Free { role, mean, sd }
+}
+
+#[test]
+fn elimination_equals_a_dense_solve() {
+    let mut noise = Noise(7);
+    let (n, p) = (6, 3);
+    let size = 2 * n + p;
+    // A random positive definite matrix with the right pattern: J^T J of a chain of residuals.
+    let mut j = DMatrix::<f64>::zeros(6 * n, size);
+    let mut rhs = DVector::<f64>::zeros(size);
+    for i in 0..n {
+        for row in 6 * i..6 * i + 6 {
+            let columns = (2 * i..(2 * i + 4).min(2 * n)).chain(2 * n..size);
+            columns.for_each(|c| j[(row, c)] = noise.normal());
+        }
+    }
+    rhs.iter_mut().for_each(|b| *b = noise.normal());
+    let full = j.transpose() * &j;
+    let system = Bordered::<2> {
+        diagonal: (0..n).map(|i| full.fixed_view::<2, 2>(2 * i, 2 * i).into_owned()).collect(),
+        below: (0..n - 1).map(|i| full.fixed_view::<2, 2>(2 * i + 2, 2 * i).into_owned()).collect(),
+        rhs: (0..n).map(|i| rhs.fixed_rows::<2>(2 * i).into_owned()).collect(),
+        border: (0..n)
+            .map(|i| full.fixed_view::<2, 3>(2 * i, 2 * n).into_owned())
+            .map(|b| {
+                let mut block = nalgebra::OMatrix::<f64, nalgebra::Const<2>, nalgebra::Dyn>::zeros(p);
+                block.copy_from(&b);
+                block
+            })
+            .collect(),
+        corner: full.view((2 * n, 2 * n), (p, p)).into_owned(),
+        corner_rhs: rhs.rows(2 * n, p).into_owned(),
+    };
+    let t: Vec<f64> = (0..n).map(|i| i as f64).collect();
+    let reduced = system.eliminate(&t).unwrap();
+    let parameters = reduced.schur.clone().lu().solve(&reduced.gradient).unwrap();
+    let states = reduced.states(&parameters);
+    let expected = full.clone().lu().solve(&rhs).unwrap();
+    for i in 0..n {
+        approx::assert_relative_eq!(
+            states[i],
+            expected.fixed_rows::<2>(2 * i).into_owned(),
+            max_relative = 1e-9
+        );
+    }
+    approx::assert_relative_eq!(parameters, expected.rows(2 * n, p).into_owned(), max_relative = 1e-9);
+
+    let inverse = full.try_inverse().unwrap();
+    let covariance = reduced.schur.clone().try_inverse().unwrap();
+    for (i, own) in reduced.state_covariance(&covariance).iter().enumerate() {
+        let expected = inverse.fixed_view::<2, 2>(2 * i, 2 * i).into_owned();
+        approx::assert_relative_eq!(*own, expected, max_relative = 1e-8);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// Every derivative that the equations use, against central differences.
+    #[test]
+    fn derivatives_equal_finite_differences(
+        omega in 2.0f64..8.0, y in -0.03f64..0.03, z in -0.05f64..0.05, beta in -3.0f64..3.0,
+        y0 in -2e-3f64..2e-3, tilt in -0.05f64..0.05, lag in -5e-3f64..5e-3, row in -0.03f64..0.03,
+    ) {
+        let family = family(&[(Kind::Relaxation, Some(Momentum::Consistent))]);
+        let values = [PAPER.as_slice(), &[4.0]].concat();
+        let (record, _) = film(&family, &values, 2, 3);
+        let mut roles: Vec<Role> = (0..7).map(Role::Model).collect();
+        roles.extend((0..6).map(Role::Camera));
+        roles.push(Role::Clock);
+        let mut estimator = problem(family, record, Vec::new());
+        // Tight, so that the differences see the flow and not the integrator.
+        estimator.tolerance = Tolerance { rtol: 1e-13, atol: 1e-14 };
+        let states = vec![[omega, y, z, beta], [omega, y, z, beta]];
+        let point = Point { states, model: values, camera: vec![y0, 1e-3, tilt, 5e-3, lag, row], clock: 1e-3 };
+        let linear = estimator.linearise(&point, &roles).unwrap();
+
+        let step = |scale: f64| 1e-5 * scale.abs().max(1e-2);
+        for (j, &role) in roles.iter().enumerate() {
+            let h = step(point.get(role));
+            let (mut up, mut down) = (point.clone(), point.clone());
+            *up.get_mut(role) += h;
+            *down.get_mut(role) -= h;
+            let (e_up, r_up) = estimator.residuals(&up).unwrap();
+            let (e_down, r_down) = estimator.residuals(&down).unwrap();
+            // The residuals fall where h and Phi rise. The Omega equation sees W in the camera's row time,
+            // a product of two small numbers that the camera's own columns leave out.
+            let g = (e_down[0] - e_up[0]) / (2.0 * h);
+            let b = (r_down[0] - r_up[0]) / (2.0 * h);
+            for k in 0..4 {
+                let scale = b.norm().max(1e-3);
+                prop_assert!((linear.b[0][(k, j)] - b[k]).abs() < 1e-5 * scale, "b {role:?} {k}");
+            }
+            for m in 0..3 {
+                prop_assert!((linear.g[0][(m, j)] - g[m]).abs() < 1e-5 * g.norm().max(1e-3), "g {role:?} {m}");
+            }
+        }
+        for k in 0..4 {
+            let h = step(point.states[0][k]);
+            let (mut up, mut down) = (point.clone(), point.clone());
+            up.states[0][k] += h;
+            down.states[0][k] -= h;
+            let (e_up, r_up) = estimator.residuals(&up).unwrap();
+            let (e_down, r_down) = estimator.residuals(&down).unwrap();
+            let a = (r_down[0] - r_up[0]) / (2.0 * h);
+            let column = linear.a[0].column(k);
+            prop_assert!((column - a).norm() < 1e-5 * a.norm().max(1.0), "a {k}");
+            let seen = (e_down[0] - e_up[0]) / (2.0 * h);
+            prop_assert!((linear.h[0].column(k) - seen).norm() < 1e-5, "h {k}");
+        }
+    }
+}
+
+/// Twenty seconds of a chaotic run, parameters a quarter off: the fit finds them within its errors.
+#[test]
+fn a_chaotic_record_gives_its_parameters_back() {
+    let truth = [PAPER.as_slice(), &[5.0]].concat();
+    let family = family(&[(Kind::Relaxation, Some(Momentum::Constraint))]);
+    let (record, _) = film(&family, &truth, 500, 11);
+    let roles = [0, 3, 4, 5, 6];
+    let free = roles.iter().map(|&j| free(Role::Model(j), truth[j], f64::INFINITY)).collect();
+    let mut estimator = problem(family, record, free);
+    let states = (0..500)
+        .map(|i| {
+            let seen = &estimator.record.seen;
+            let (a, b) = (i.max(1) - 1, (i + 1).min(499));
+            [(seen[b][2] - seen[a][2]) / (0.04 * (b - a) as f64), seen[i][0], seen[i][1], seen[i][2]]
+        })
+        .collect();
+    let mut model = truth.clone();
+    roles.iter().for_each(|&j| model[j] *= 0.75);
+    let mut point = Point { states, model, camera: vec![0.0; 6], clock: 0.0 };
+    let mut last = None;
+    for level in [[0.1, 1e-4, 1e-4, 1e-3], [0.02, 3e-5, 3e-5, 3e-4], [3e-3, 1e-5, 1e-5, 1e-4]] {
+        estimator.diffusion = level.map(|q: f64| q / 0.04f64.sqrt());
+        let solution = estimator.solve(point, &Options::default(), &AtomicBool::new(false)).unwrap();
+        assert!(solution.converged, "{level:?} took {} steps", solution.iterations);
+        point = solution.point.clone();
+        last = Some(solution);
+    }
+    let solution = last.unwrap();
+    for (k, &j) in roles.iter().enumerate() {
+        let se = solution.covariance[(k, k)].sqrt();
+        let z = (solution.point.model[j] - truth[j]) / se;
+        println!("{j}: {:.5} +- {se:.5}, truth {:.5}", solution.point.model[j], truth[j]);
+        assert!(z.abs() < 4.0, "parameter {j} is {z:.1} standard errors off");
+    }
+    // The assumed model error is larger than the true one (none), so the cost stays below its expectation of
+    // 1500 - 5 - 4 but is dominated by the 1500 misfits, whose sum scatters by sqrt(2 * 1500) = 55.
+    let cost = solution.cost.total();
+    assert!((1500.0 - 6.0 * 55.0..1500.0 + 4.0 * 55.0).contains(&cost), "{:?}", solution.cost);
+}
+
+/// The score's estimate of an absent effect agrees with a fit that has it.
+#[test]
+fn the_score_foretells_the_fit() {
+    let with = family(&[(Kind::Relaxation, Some(Momentum::Constraint))]);
+    let weak = [PAPER.as_slice(), &[0.3]].concat();
+    let (record, states) = film(&with, &weak, 250, 5);
+    let free: Vec<Free> = [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
+    let cancel = AtomicBool::new(false);
+    let plain = problem(family(&[]), record.clone(), free.clone());
+    let start = Point { states, model: PAPER.to_vec(), camera: vec![0.0; 6], clock: 0.0 };
+    let fitted = plain.solve(start, &Options::default(), &cancel).unwrap();
+    let mut values = fitted.point.model.clone();
+    values.push(0.0);
+    let score = plain.score(&fitted.point, &[(with.clone(), values.clone(), vec![Role::Model(6)])]).unwrap();
+    let estimate = score.gradient[0] / score.information[(0, 0)];
+    let drop = score.gradient[0].powi(2) / score.information[(0, 0)];
+
+    let mut more = free;
+    more.push(self::free(Role::Model(6), 0.0, f64::INFINITY));
+    let full = problem(with, record, more);
+    let start = Point { model: values, ..fitted.point.clone() };
+    let refitted = full.solve(start, &Options::default(), &cancel).unwrap();
+    // Equal up to the curvature of the model over so small an effect.
+    let b = refitted.point.model[6];
+    assert!((estimate - b).abs() < 0.1 * b.abs().max(score.information[(0, 0)].powf(-0.5)), "{estimate} {b}");
+    let gained = fitted.cost.total() - refitted.cost.total();
+    assert!((drop - gained).abs() < 0.1 * gained.max(1.0), "{drop} {gained}");
+}
