@@ -19,7 +19,7 @@ unexport PYTHONPATH PYTHONHOME
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo test test-rust test-python lint format dist lock clean
+.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -37,10 +37,14 @@ test-rust: ## only the tests of the Rust core; needs no Python
 test-python: .venv/.udd ## only the tests of the Python package
 	$(PY) -m pytest
 
-lint: .venv/.udd ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
+lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
+
+lint-rust: .venv/.made
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo clippy --locked --all-targets --features python -- -D warnings
+
+lint-python: .venv/.udd
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy --strict python/udd
