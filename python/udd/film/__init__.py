@@ -1,0 +1,7 @@
+"""Film a simulated run: what a camera in front of the device would see."""
+
+from __future__ import annotations
+
+from udd.film.rendering import Film, render
+
+__all__ = ["Film", "render"]

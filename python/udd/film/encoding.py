@@ -1,0 +1,100 @@
+"""Pictures to a film file, with one exact time stamp per frame."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import UddError
+
+SUFFIXES = (".mp4", ".mov")
+
+
+def require_video() -> Any:
+    """Return PyAV, or say in one sentence about how to get what films need."""
+    try:
+        import av
+        import cv2  # noqa: F401
+    except ImportError as error:
+        raise UddError(f"films need the extra 'track' ({error}): pip install 'udd[track]'") from None
+    return av
+
+
+def checked_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path, if a film can be written there."""
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise UddError(f"a film's name must end in {' or '.join(SUFFIXES)}, got '{target.name}'")
+    if not target.parent.is_dir():
+        raise UddError(f"cannot write the film {target}: there is no folder {target.parent}")
+    if target.is_dir():
+        raise UddError(f"cannot write the film {target}: it is a folder")
+    if not os.access(target.parent, os.W_OK):
+        raise UddError(f"cannot write the film {target}: the folder {target.parent} is not writable")
+    return target
+
+
+def write_film(
+    target: Path, frames: Iterable[NDArray[np.uint8]], size: tuple[int, int], rate: Fraction, quality: float
+) -> None:
+    """Encode RGB frames (height, width, 3) and put the film in place; a failed one leaves nothing."""
+    try:
+        handle, name = tempfile.mkstemp(
+            prefix=f".{target.stem}.", suffix=target.suffix.lower(), dir=target.parent
+        )
+    except OSError as error:
+        raise UddError(f"cannot write the film {target}: {error.strerror}") from None
+    os.close(handle)
+    try:
+        _encode(name, frames, size, rate, quality)
+        os.chmod(name, 0o666 & ~_umask())  # mkstemp's file is for the owner alone
+        os.replace(name, target)
+    except OSError as error:
+        raise UddError(f"cannot write the film {target}: {error.strerror or error}") from None
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _encode(
+    name: str, frames: Iterable[NDArray[np.uint8]], size: tuple[int, int], rate: Fraction, quality: float
+) -> None:
+    av = require_video()
+    with av.open(name, "w", options={"movflags": "+faststart"}) as container:
+        stream = _stream(container, rate, quality)
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"
+        stream.time_base = stream.codec_context.time_base = 1 / rate
+        # one thread: x264's choices depend on their number, and the same call must give the same film
+        stream.codec_context.thread_count = 1
+        for number, picture in enumerate(frames):
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            frame.pts, frame.time_base = number, 1 / rate
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+def _stream(container: Any, rate: Fraction, quality: float) -> Any:
+    """H.264 where the library has it, else MPEG-4; without B-frames, so that stored and shown order agree."""
+    from av.codec.codec import UnknownCodecError
+
+    try:
+        return container.add_stream(
+            "libx264", rate=rate, options={"crf": f"{quality:g}", "preset": "veryfast", "bf": "0"}
+        )
+    except UnknownCodecError:
+        # MPEG-4's quantiser runs from 1 to 31 where H.264's quality runs from 0 to 51
+        q = f"{min(max(quality / 5, 1), 31):g}"
+        return container.add_stream("mpeg4", rate=rate, options={"qmin": q, "qmax": q, "bf": "0"})
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,208 @@
+"""`udd.render`: a film of a simulated run."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd.errors import UddError
+from udd.film.camera import Camera, make_camera
+from udd.film.encoding import checked_path, require_video, write_film
+from udd.film.exposing import Scene
+from udd.film.light import Noise, Picture, to_light
+from udd.film.motion import Array, Motion, TrajectoryLike, checked, motion_of, spacing_error
+from udd.film.scene import room
+from udd.measurement import Measurement
+
+# Farther off than this between the samples, a mark would be seen in the wrong place.
+_COARSE = 0.25  # pixels
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film and what it shows.
+
+    Attributes
+    ----------
+    path : Path
+        The film file.
+    t : ndarray, shape (n,)
+        Time stamp of each frame in the file, s: frame k has k / fps. It is the middle of the exposure.
+    state : ndarray, shape (n, 4)
+        [Omega, Y, Z, beta] of the disk in the middle of each exposure, rad/s, m, m, rad.
+    size : (int, int)
+        Width and height, pixels.
+    scale : float
+        Pixels per metre.
+    pivot : (float, float)
+        Pixel (x, y) at which the wheels hold the disk; the centre of the top left pixel is (0, 0).
+    radius : float
+        Radius of the disk, m.
+    """
+
+    path: Path
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+    size: tuple[int, int]
+    scale: float
+    pivot: tuple[float, float]
+    radius: float
+
+    @property
+    def truth(self) -> Measurement:
+        """What a perfect tracker would measure: Y, Z, beta in the middle of each exposure."""
+        return Measurement(self.t, self.state[:, 1:], meta={"R": self.radius, "source": self.path.name})
+
+
+def render(
+    trajectory: TrajectoryLike,
+    path: str | os.PathLike[str],
+    *,
+    fps: float = 25.0,
+    exposure: float = 0.010,
+    size: Sequence[int] = (550, 700),
+    scale: float | None = None,
+    pivot: Sequence[float] | None = None,
+    tilt: float = 0.0,
+    support: float = 1.0,
+    background: ArrayLike | None = None,
+    noise: float = 2.0,
+    quality: float = 20.0,
+    seed: int = 0,
+    progress: bool = False,
+) -> Film:
+    """Film a simulated run: what a camera before the device would see.
+
+    A white disk with four square marks (side R/5, centres 65/80 R from the disk's centre; clockwise red,
+    orange, blue, green, with red at the angle beta) hangs between two wheels, before a wall. The support
+    stands in front: it hides the middle of the disk and now and then a mark. Each frame is the average, in
+    linear light, of as many sub-frames as the exposure needs for smooth streaks. Frame k is exposed
+    symmetrically about ``trajectory.t[0] + k / fps``; the last frame is the last whose exposure ends within
+    the run, so a disk that leaves the wheels is filmed until it leaves.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A run of the disk, from `udd.simulate`: times `t` (n,) in s and `state` (n, 4), [Omega, Y, Z, beta].
+        Between the samples the motion is a cubic (with the model's own rates where the trajectory has a
+        model); samples too far apart for it are refused.
+    path : path-like
+        File to write, ``.mp4`` or ``.mov``. An older film is replaced once the new one is complete.
+    fps : float
+        Frames per second.
+    exposure : float
+        Time in s for which the shutter is open, at most ``1 / fps``.
+    size : (int, int)
+        Width and height of the picture in pixels, both even.
+    scale : float, optional
+        Pixels per metre; by default 1750 for R = 0.08 m and the paper's 550 x 700 pixels, and in proportion.
+    pivot : (float, float), optional
+        Pixel (x, y) of the point where the wheels hold the disk, by default (275, 330) of 550 x 700. The
+        centre of the top left pixel is (0, 0).
+    tilt : float
+        Angle in rad by which the camera shows everything turned clockwise.
+    support : float
+        Width of the black support relative to the real one (26 mm for R = 0.08 m); 0 films the disk alone.
+    background : array_like, optional
+        What stands behind: a picture (height, width, 3) of codes 0 to 255 in red, green, blue, or one colour
+        (3,); by default a grey wall and a table.
+    noise : float
+        Standard deviation of the sensor noise, in codes of 255.
+    quality : float
+        H.264's constant rate factor: 0 is lossless but for the colours' coarser grid, 20 good, 35 poor.
+    seed : int
+        Seed of the noise. The same call gives the same film.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Film
+        The file's path and, as the truth to compare with, time and state of the disk per frame.
+
+    Raises
+    ------
+    UddError
+        For a trajectory that is empty, not finite or too coarsely sampled, an exposure longer than a frame, a
+        place that cannot be written to, any other value out of its range, or without the extra ``track``.
+        Nothing is left behind then.
+
+    Examples
+    --------
+    >>> import numpy as np, udd
+    >>> t = np.arange(0, 10, 0.005)
+    >>> run = udd.simulate(udd.Disk(W=0.039), t, [0.0, 1e-3, 0.04, 0.0])  # doctest: +SKIP
+    >>> film = udd.render(run, "disk.mp4")  # doctest: +SKIP
+    >>> film.t[1]  # doctest: +SKIP
+    0.04
+    """
+    require_video()
+    target = checked_path(path)
+    t, _ = checked(trajectory)
+    radius = float(getattr(getattr(trajectory, "model", None), "R", 0.08))
+    camera = make_camera(radius, size=size, fps=fps, exposure=exposure, scale=scale, pivot=pivot, tilt=tilt)
+    _check_rest(support, noise, quality, seed)
+    motion = motion_of(trajectory)
+    error = spacing_error(trajectory, radius) * camera.scale
+    if error > _COARSE:
+        raise UddError(
+            "the trajectory's samples are too far apart to film: "
+            f"a mark would be off by about {error:.2g} pixels; simulate more times (200/s are plenty)"
+        )
+    times = frame_times(t, camera)
+    scene = Scene(camera, radius, _background(background, camera, radius), support)
+    write_film(
+        target,
+        _frames(scene, motion, t[0] + times, Noise(noise, seed), progress),
+        camera.size,
+        camera.rate,
+        quality,
+    )
+    return Film(target, times, motion(t[0] + times), camera.size, camera.scale, camera.pivot, radius)
+
+
+def frame_times(t: Array, camera: Camera) -> Array:
+    """Stamp the frames that fit, k / fps; what is missing by rounding alone does not count."""
+    n = math.floor((t[-1] - t[0] - camera.exposure / 2) * camera.rate + 1e-6) + 1
+    if n < 1:
+        raise UddError(f"the trajectory lasts {t[-1] - t[0]:.3g} s, which is shorter than one exposure")
+    return np.arange(n) / float(camera.rate)
+
+
+def _frames(
+    scene: Scene, motion: Motion, times: Array, noise: Noise, progress: bool
+) -> Iterator[NDArray[np.uint8]]:
+    from tqdm import tqdm
+
+    for time in tqdm(times, desc="film", unit="frame", disable=not progress):
+        yield noise.on(scene.expose(motion, float(time)))
+
+
+def _background(background: ArrayLike | None, camera: Camera, radius: float) -> Picture:
+    if background is None:
+        return room(camera, radius / 0.08)
+    width, height = camera.size
+    codes = np.asarray(background, dtype=np.float64)
+    if (
+        codes.shape not in ((3,), (height, width, 3))
+        or not (np.isfinite(codes) & (codes >= 0) & (codes <= 255)).all()
+    ):
+        raise UddError(
+            f"background must be one colour (3,) or a picture ({height}, {width}, 3) of codes 0 to 255, "
+            f"got shape {codes.shape}"
+        )
+    return np.ascontiguousarray(np.broadcast_to(to_light(codes), (height, width, 3)))
+
+
+def _check_rest(support: float, noise: float, quality: float, seed: int) -> None:
+    for name, value, top in (("support", support, 10.0), ("noise", noise, 100.0), ("quality", quality, 51.0)):
+        if not (math.isfinite(value) and 0 <= value <= top):
+            raise UddError(f"{name} must be from 0 to {top:g}, got {value!r}")
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
+        raise UddError(f"seed must be a whole number, 0 or more, got {seed!r}")

@@ -1,0 +1,47 @@
+"""The disk itself, drawn once at twice the picture's resolution and at beta = 0."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.film.light import Picture, to_light
+
+FINE = 2  # sprite pixels per picture pixel
+DISK = (232, 230, 222)
+# Clockwise from the red mark, which sits at the angle beta.
+MARKS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
+# In units of the disk's radius: 65 mm and 16 mm for R = 80 mm.
+MARK_CENTRE, MARK_SIDE = 65 / 80, 16 / 80
+
+
+def disk_sprite(radius: float, focus: float) -> Picture:
+    """Draw the disk of `radius` picture pixels, (n, n, 4): light times cover in red, green, blue, and cover.
+
+    n is odd, so the disk's centre lies on the middle pixel. Edges are drawn from the exact distance to them,
+    then blurred by `focus` (picture pixels), so that no place and no angle is favoured.
+    """
+    from udd.film.scene import blurred
+
+    r = radius * FINE
+    reach = math.ceil(r + 4 * max(focus, 0.5) * FINE) + 2
+    v = np.arange(-reach, reach + 1, dtype=np.float64)
+    x, y = v[None, :], v[:, None]
+    disk = np.clip(r - np.hypot(x, y) + 0.5, 0.0, 1.0)
+    light = np.broadcast_to(to_light(DISK), (v.size, v.size, 3)).astype(np.float64)
+    for quarter, colour in enumerate(MARKS):
+        angle = quarter * math.pi / 2
+        mark = _band(x, MARK_CENTRE * r * round(math.sin(angle)), MARK_SIDE * r) * _band(
+            y, -MARK_CENTRE * r * round(math.cos(angle)), MARK_SIDE * r
+        )
+        light += mark[..., None] * (to_light(colour) - light)
+    sprite = np.concatenate([light * disk[..., None], disk[..., None]], axis=-1).astype(np.float32)
+    return blurred(sprite, focus * FINE)
+
+
+def _band(v: NDArray[np.float64], centre: float, width: float) -> NDArray[np.float64]:
+    """Find how much of each pixel (1 wide, at v) a band of that centre and width covers."""
+    low, high = np.maximum(v - 0.5, centre - width / 2), np.minimum(v + 0.5, centre + width / 2)
+    return np.asarray(np.clip(high - low, 0.0, 1.0), dtype=np.float64)
