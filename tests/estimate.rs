@@ -1,13 +1,12 @@
 //! The estimator against dense linear algebra, finite differences and a simulated truth.
 
-use std::sync::atomic::AtomicBool;
-
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 use udd::estimate::{Bordered, DiskCamera, Estimator, Free, Options, Point, Record, Role};
 use udd::integrate::{Tolerance, propagate};
 use udd::model::effects::{Effect, Kind, Momentum};
 use udd::model::{DiskFamily, Family};
+use udd::run::Stop;
 
 const PAPER: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 
@@ -199,7 +198,7 @@ fn a_chaotic_record_gives_its_parameters_back() {
     let mut last = None;
     for level in [[0.1, 1e-4, 1e-4, 1e-3], [0.02, 3e-5, 3e-5, 3e-4], [3e-3, 1e-5, 1e-5, 1e-4]] {
         estimator.diffusion = level.map(|q: f64| q / 0.04f64.sqrt());
-        let solution = estimator.solve(point, &Options::default(), &AtomicBool::new(false)).unwrap();
+        let solution = estimator.solve(point, &Options::default(), &Stop::new()).unwrap();
         assert!(solution.converged, "{level:?} took {} steps", solution.iterations);
         point = solution.point.clone();
         last = Some(solution);
@@ -224,10 +223,10 @@ fn the_score_foretells_the_fit() {
     let weak = [PAPER.as_slice(), &[0.3]].concat();
     let (record, states) = film(&with, &weak, 250, 5);
     let free: Vec<Free> = [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
-    let cancel = AtomicBool::new(false);
+    let stop = Stop::new();
     let plain = problem(family(&[]), record.clone(), free.clone());
     let start = Point { states, model: PAPER.to_vec(), camera: vec![0.0; 6], clock: 0.0 };
-    let fitted = plain.solve(start, &Options::default(), &cancel).unwrap();
+    let fitted = plain.solve(start, &Options::default(), &stop).unwrap();
     let mut values = fitted.point.model.clone();
     values.push(0.0);
     let score = plain.score(&fitted.point, &[(with.clone(), values.clone(), vec![Role::Model(6)])]).unwrap();
@@ -238,7 +237,7 @@ fn the_score_foretells_the_fit() {
     more.push(self::free(Role::Model(6), 0.0, f64::INFINITY));
     let full = problem(with, record, more);
     let start = Point { model: values, ..fitted.point.clone() };
-    let refitted = full.solve(start, &Options::default(), &cancel).unwrap();
+    let refitted = full.solve(start, &Options::default(), &stop).unwrap();
     // Equal up to the curvature of the model over so small an effect.
     let b = refitted.point.model[6];
     assert!((estimate - b).abs() < 0.1 * b.abs().max(score.information[(0, 0)].powf(-0.5)), "{estimate} {b}");

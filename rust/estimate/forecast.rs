@@ -1,13 +1,12 @@
 //! Forecasts: filter a window, then run free.
 
-use std::sync::atomic::AtomicBool;
-
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 
 use super::{EstimateError, Estimator, Options, Point, Record, Sensor};
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
+use crate::run::Stop;
 
 /// The state at a window's end with its covariance.
 pub type Filtered<const D: usize> = ([f64; D], SMatrix<f64, D, D>);
@@ -24,7 +23,7 @@ where
         point: &Point<D>,
         windows: &[(usize, usize)],
         options: &Options,
-        cancel: &AtomicBool,
+        stop: &Stop,
     ) -> Result<Vec<Filtered<D>>, EstimateError> {
         let one = |&(first, last): &(usize, usize)| {
             let part = Self {
@@ -35,7 +34,7 @@ where
                 ..*self
             };
             let start = Point { states: point.states[first..=last].to_vec(), ..point.clone() };
-            let solution = part.solve(start, options, cancel)?;
+            let solution = part.solve(start, options, stop)?;
             Ok((solution.point.states[last - first], solution.state_covariance[last - first]))
         };
         windows.par_iter().map(one).collect()

@@ -1,12 +1,11 @@
 //! The minimum, by Gauss-Newton with Levenberg-Marquardt damping.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::linearise::invert;
 use super::{Bordered, EstimateError, Estimator, Point, Role, Sensor};
 use crate::model::Family;
+use crate::run::Stop;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +106,7 @@ where
         &self,
         start: Point<D>,
         options: &Options,
-        cancel: &AtomicBool,
+        stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
         let roles = self.roles();
         let mut point = start;
@@ -116,9 +115,7 @@ where
         let mut lambda = 0.0_f64;
         let mut iterations = 0;
         loop {
-            if cancel.load(Ordering::Relaxed) {
-                return Err(EstimateError::Cancelled);
-            }
+            stop.check().map_err(|_| EstimateError::Cancelled)?;
             let linear = self.linearise(&point, &roles)?;
             let system = self.equations(&point, &linear);
             let mut converged = false;

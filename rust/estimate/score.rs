@@ -12,6 +12,9 @@ use crate::model::Family;
 pub struct Score {
     pub gradient: DVector<f64>,
     pub information: DMatrix<f64>,
+    /// The information on each amplitude were all free parameters known: where `information` is much
+    /// smaller, the free parameters already absorb the candidate.
+    pub alone: DVector<f64>,
 }
 
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
@@ -40,8 +43,9 @@ where
         let cross = reduced.schur.view((0, own), (own, more)).into_owned();
         let corner = reduced.schur.view((own, own), (more, more)).into_owned();
         let gradient = reduced.gradient.rows(own, more).into_owned();
+        let alone = corner.diagonal();
         if own == 0 {
-            return Ok(Score { gradient, information: corner });
+            return Ok(Score { gradient, information: corner, alone });
         }
         let covariance = invert(&matrix).ok_or_else(|| {
             EstimateError::Undetermined("some of them can change together without changing the fit".into())
@@ -50,6 +54,7 @@ where
         Ok(Score {
             gradient: gradient - solved.tr_mul(&reduced.gradient.rows(0, own)),
             information: corner - cross.tr_mul(&solved),
+            alone,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd.effects import Effect
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model
@@ -86,8 +87,8 @@ class Fit:
     states : ndarray (n, d)
         The state at each frame of `record`.
     state_covariance : ndarray (n, d, d)
-    misfit : ndarray (n, m)
-        What was seen less what was fitted; NaN where nothing was seen.
+    misfit, misfit_variance : ndarray (n, m)
+        What was seen less what was fitted, NaN where nothing was seen, and the variance of what was fitted.
     defect : ndarray (n - 1, d)
         By how much each state misses what the model makes of the one before, per second: the residual of each
         equation. NaN where frames are not linked.
@@ -108,6 +109,7 @@ class Fit:
     states: Array
     state_covariance: Array
     misfit: Array
+    misfit_variance: Array
     defect: Array
     noise: Noise
     problem: Problem
@@ -200,28 +202,49 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
-    problem, point = start(measurement, model, free, camera=camera, priors=priors)
-    return anneal(measurement, problem, point)
+    return fit_record(measurement, record_of(measurement), model, free, camera=camera, priors=priors)
 
 
-def start(
+def fit_record(
     measurement: Measurement,
+    record: Record,
     model: Model,
     free: Iterable[str] | None = None,
     *,
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[Problem, Point]:
-    """The problem that a fit solves, and where it starts."""
+) -> Fit:
+    """As :func:`fit`, of some of the measurement's frames."""
     if measurement.kind != getattr(model, "kind", None):
         raise FitError(
             f"the measurement has columns {', '.join(measurement.names)}, which {type(model).__name__} does not explain"
         )
-    record = record_of(measurement)
     parameters = free_parameters(model, free, camera, priors)
     cameras = _core.camera_parameters(measurement.kind)
     problem = Problem(model, record, parameters, stated(record), levels(measurement.kind)[0])
-    return problem, Point(record.states, model.parameters, np.zeros(len(cameras)), 0.0)
+    return _anneal(measurement, problem, Point(record.states, model.parameters, np.zeros(len(cameras)), 0.0))
+
+
+def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
+    """Fit again with more effects, all coefficients free, from where a fit ended.
+
+    The noise stays as it was estimated, so that the two fits' chi2 compare.
+
+    Parameters
+    ----------
+    fitted : Fit
+    effects : sequence of Effect
+        The effects to add.
+    amplitudes : sequence of float
+        Where their amplitudes start, in order.
+    """
+    names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
+    model = fitted.model.with_effects((*fitted.model.effects, *effects))
+    model = model.with_parameters(dict(zip(names, amplitudes, strict=True)))
+    order = list(model.parameters)
+    more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
+    problem = replace(fitted.problem, model=model, free=fitted.problem.free + more)
+    return _tighten(fitted.measurement, problem, replace(fitted.point, model=model.parameters))
 
 
 def levels(kind: str) -> tuple[tuple[float, ...], ...]:
@@ -229,20 +252,76 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(q / _FRAME**0.5 for q in level) for level in SCHEDULE[kind])
 
 
-def anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
+def _anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
     """Solve from loose to tight; the noise is estimated at the loose end, where a wrong model does no harm."""
-    loose, *tighter = levels(measurement.kind)
-    problem = replace(problem, diffusion=loose)
+    problem = replace(problem, diffusion=levels(measurement.kind)[0])
     for _ in range(3):
         result = solve(measurement, problem, point)
         point = result.point
-        variance = result.misfit_variance
         problem = replace(
             problem,
-            noise=estimated(problem.record, point.states[:, 0], result.misfit, variance, problem.noise),
+            noise=estimated(problem.record, point.states[:, 0], result.misfit, result.misfit_variance, problem.noise),
         )
-    for diffusion in tighter:
+    return _tighten(measurement, problem, point)
+
+
+def _tighten(measurement: Measurement, problem: Problem, point: Point) -> Fit:
+    """Solve for ever smaller errors of the model."""
+    for diffusion in levels(measurement.kind)[1:]:
         problem = replace(problem, diffusion=diffusion)
         result = solve(measurement, problem, point)
         point = result.point
     return result
+
+
+def information_for(fitted: Fit, record: Record) -> Array:
+    """The information of another record's frames, with the noise that a fit found."""
+    noise = replace(fitted.noise, weight=np.ones(len(record.t)))
+    return noise.information(record, record.states[:, 0])
+
+
+
+def solve(measurement: Measurement, problem: Problem, point: Point, iterations: int = 40) -> Fit:
+    """Minimise once, for the problem's assumed model error, from a point."""
+    try:
+        found = _core.solve(*problem.arguments(point), iterations)
+    except ValueError as error:
+        raise FitError(f"the fit failed: {error}") from error
+    record = problem.record
+    model = problem.model.with_parameters(dict(zip(problem.model.parameters, found["model"], strict=True)))
+    names = [f.name for f in problem.free]
+    end = Point(found["states"], model.parameters, found["camera"], found["clock"])
+    values = {f.name: _value(f, found) for f in problem.free}
+    chi2 = float(sum(found["cost"]))
+    seen = record.observed
+    # Every state but a run's first is tied to the one before: what remains are the frames' misfits.
+    runs = 1 + int((~record.linked).sum())
+    proper = sum(np.isfinite(f.sd) for f in problem.free)
+    dof = float(seen.sum()) + proper - len(problem.free) - runs * found["states"].shape[1]
+    defect = np.where(record.linked[:, None], found["defect"] / np.diff(record.t)[:, None], np.nan)
+    return Fit(
+        model=model,
+        parameters=values,
+        errors=dict(zip(names, np.sqrt(np.diag(found["covariance"])).tolist(), strict=True)),
+        covariance=found["covariance"],
+        chi2=chi2,
+        dof=dof,
+        converged=found["converged"],
+        iterations=found["iterations"],
+        measurement=measurement,
+        record=record,
+        states=found["states"],
+        state_covariance=found["state_covariance"],
+        misfit=np.where(seen, found["misfit"], np.nan),
+        misfit_variance=found["seen_variance"],
+        defect=defect,
+        noise=problem.noise,
+        problem=problem,
+        point=end,
+    )
+
+
+def _value(free: Free, found: Mapping[str, Any]) -> float:
+    if free.role == "clock":
+        return float(found["clock"])
+    return float(found[free.role][free.index])

@@ -1,0 +1,9 @@
+"""The loop's second half: which effect the model lacks, and the error before and after."""
+
+from __future__ import annotations
+
+from .discover import Alternative, Discovery, Found, discover
+from .heldout import Errors
+from .scan import Scored
+
+__all__ = ["Alternative", "Discovery", "Errors", "Found", "Scored", "discover"]

@@ -1,0 +1,96 @@
+"""The effects that a model may lack, as the library offers them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import effects
+from udd.models import Disk, Model
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect with its amplitudes at zero.
+
+    Attributes
+    ----------
+    effect : Effect
+        With the shape parameters that it is tried with.
+    title : str
+        What a reader calls it.
+    """
+
+    effect: effects.Effect
+    title: str
+
+    def added_to(self, model: Model) -> Model:
+        """The model with this effect added, all its amplitudes zero."""
+        return model.with_effects((*model.effects, self.effect))
+
+    def amplitude_indices(self, model: Model) -> list[int]:
+        """Where the amplitudes stand among the parameters of :meth:`added_to`'s model."""
+        names = list(self.added_to(model).parameters)
+        return [names.index(name) for name in self.amplitude_names]
+
+    @property
+    def amplitude_names(self) -> list[str]:
+        """The amplitudes' names among a model's parameters."""
+        return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]
+
+
+def library(model: Model) -> list[Candidate]:
+    """Every effect that can be added to a model, in each of its variants, but for scanned frequencies.
+
+    Terms that the free parameters absorb are not sorted out here: that shows in the data.
+    """
+    result = []
+    for spec in effects.library():
+        if spec.name in {e.name for e in model.effects} or not _suits(spec, model):
+            continue
+        if any(p.role == "frequency" for p in spec.parameters):
+            continue
+        shapes = [p for p in spec.parameters if p.role == "shape"]
+        for momentum in spec.momenta or (None,):
+            for values in itertools.product(*(p.grid for p in shapes)):
+                given = dict(zip((p.name for p in shapes), values, strict=True))
+                effect = spec.make(momentum=momentum, **given)
+                notes = [str(momentum)] if len(spec.momenta) > 1 else []
+                notes += [f"{p.name} = {given[p.name]:g}" for p in shapes if len(p.grid) > 1]
+                title = spec.title + (f" ({', '.join(notes)})" if notes else "")
+                result.append(Candidate(effect, title))
+    return result
+
+
+def ripples(model: Model, duration: float, step: float) -> list[Candidate]:
+    """Effects with a frequency of their own, at every frequency that a record of this length can tell apart.
+
+    Parameters
+    ----------
+    model : Model
+    duration, step : float
+        Of the record and between its frames, s.
+    """
+    result = []
+    for spec in effects.library():
+        scanned = [p for p in spec.parameters if p.role == "frequency"]
+        if not scanned or not _suits(spec, model) or spec.name in {e.name for e in model.effects}:
+            continue
+        for f in frequencies(duration, step):
+            effect = spec.make(**{scanned[0].name: float(f)})
+            result.append(Candidate(effect, f"{spec.title} at {f:.3g} Hz"))
+    return result
+
+
+def frequencies(duration: float, step: float) -> NDArray[np.float64]:
+    """Frequencies from two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart."""
+    highest = min(0.25 / step, 6.0)
+    return np.arange(2.0 / duration, highest, 0.5 / duration)
+
+
+def _suits(spec: effects.Spec, model: Model) -> bool:
+    """A pendulum's pivot does not move: only torques and friction can act on it."""
+    return isinstance(model, Disk) or set(spec.slots) <= {"torque", "friction"}

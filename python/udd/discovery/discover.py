@@ -1,0 +1,425 @@
+"""The loop's second half: which effect does the model lack?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from udd.effects import Effect
+from udd.errors import FitError
+from udd.fitting import Fit, Record, extend, fit, fit_record, record_of
+from udd.measurement import Measurement
+from udd.models import Model
+
+from .candidates import Candidate, library, ripples
+from .heldout import Errors, held_out_errors, improvement
+from .scan import Scan, Scored, physical, scan, scan_frequencies
+
+#: Chance that a record without any effect is said to have one, over all candidates together.
+ALPHA = 1e-3
+#: Forms of an effect whose fits differ by less than this many units of log-likelihood are not told apart.
+NATS = 10.0
+#: The share of the record that effects are sought in; the rest is held out.
+TRAIN = 0.6
+_TRIED = 6  # of the best candidates, fitted in full
+_MOST = 3  # effects added
+_SHORTEST = 60  # frames
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that was added, with its numbers and its evidence.
+
+    Attributes
+    ----------
+    effect : Effect
+        With the fitted parameters (all data).
+    title, equation, expression : str
+        In prose, as the library writes it, and with the numbers in it.
+    parameters, errors : dict of str to float
+        The fitted parameters with standard errors.
+    chi2 : float
+        By how much chi2 fell when it was added, in units of the fit's scatter.
+    p : float
+        Probability of so large a fall by chance, all candidates counted.
+    ratio : tuple of float
+        Held-out error after over before, with its 95 % interval, where the effect was added.
+    """
+
+    effect: Effect
+    title: str
+    equation: str
+    expression: str
+    parameters: dict[str, float]
+    errors: dict[str, float]
+    chi2: float
+    p: float
+    ratio: tuple[float, float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "name": self.effect.name,
+            "momentum": self.effect.momentum,
+            "title": self.title,
+            "equation": self.equation,
+            "expression": self.expression,
+            "parameters": {n: {"value": v, "se": self.errors.get(n)} for n, v in self.parameters.items()},
+            "chi2": self.chi2,
+            "p": self.p,
+            "held_out_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+        }
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A candidate that the data cannot tell from one that was chosen.
+
+    Attributes
+    ----------
+    instead_of : str
+        Name of the effect that it could replace.
+    effect : Effect
+    title, equation : str
+    nats : float
+        By how much worse it fits, in units of log-likelihood; negative where it fits better.
+    likeness : float
+        How alike the two act on these data, 0 to 1; 1 cannot be told apart at any length of record.
+    """
+
+    instead_of: str
+    effect: Effect
+    title: str
+    equation: str
+    nats: float
+    likeness: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "instead_of": self.instead_of,
+            "name": self.effect.name,
+            "momentum": self.effect.momentum,
+            "title": self.title,
+            "equation": self.equation,
+            "nats_worse": self.nats,
+            "likeness": self.likeness,
+        }
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """What a model lacks, given measured motion.
+
+    Attributes
+    ----------
+    verdict : str
+        ``"nothing missing"``, ``"effect identified"`` or ``"effect present, form not identified"``.
+    baseline, fit : Fit
+        The model without and with the added effects, each fitted to all data.
+    effects : list of Found
+        The effects that were added; empty when nothing is missing.
+    alternatives : list of Alternative
+        Candidates that the data cannot tell apart from the chosen ones.
+    error_before, error_after : Errors
+        The same held-out errors, of models fitted without the held-out data; the noise floor beside them.
+    ratio : tuple of float
+        Held-out error after over before at `horizon`, with its 95 % interval.
+    scans : list of list of Scored
+        What the score said of every candidate, for each round of the search, the best first.
+    measurement : Measurement
+    split : float
+        Time from which the data were held out, s.
+    """
+
+    verdict: str
+    baseline: Fit
+    fit: Fit
+    effects: list[Found]
+    alternatives: list[Alternative]
+    error_before: Errors
+    error_after: Errors
+    ratio: tuple[float, float, float]
+    horizon: float
+    scans: list[list[Scored]]
+    measurement: Measurement
+    split: float
+    trained: Fit = field(repr=False)
+
+    @property
+    def model(self) -> Model:
+        """The refitted model with the effects."""
+        return self.fit.model
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "verdict": self.verdict,
+            "effects": [found.to_dict() for found in self.effects],
+            "alternatives": [other.to_dict() for other in self.alternatives],
+            "error_before": self.error_before.to_dict(),
+            "error_after": self.error_after.to_dict(),
+            "held_out_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+            "horizon_s": self.horizon,
+            "held_out_from_s": self.split,
+            "baseline": self.baseline.to_dict(),
+            "fit": self.fit.to_dict(),
+        }
+
+    def report(self, path: str | os.PathLike[str], **details: Any) -> None:
+        """Write a page that a person reads: pictures first, one file. See :func:`udd.report.write`."""
+        from udd.report import write
+
+        write(self, path, **details)
+
+
+def discover(
+    measurement: Measurement,
+    model: Model,
+    free: Iterable[str] | None = None,
+    *,
+    camera: bool | Iterable[str] = True,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Discovery:
+    """Find the effect that a model lacks.
+
+    The model is fitted to the first 60 % of the record. Every effect of the library is scored around that fit;
+    the best are fitted in full. An effect is added only if so large a fall of chi2 has a chance below 0.1 % over all
+    candidates together, its amplitudes are physical, and the free runs on the last 40 % get better beyond doubt (the
+    95 % interval of the errors' ratio excludes 1). All coefficients are refitted and the search goes on; single effects
+    that do not pass are tried in pairs. Forms that the data cannot tell apart are named.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    model : Disk or Pendulum
+        The known model; its parameters are the start and the priors' means.
+    free, camera, priors
+        As for :func:`udd.fit`.
+    progress : callable, optional
+        Told in a few words what is being done.
+
+    Returns
+    -------
+    Discovery
+
+    Raises
+    ------
+    FitError
+        The record is too short, or the model cannot be fitted to it.
+    """
+    tell = progress or (lambda _text: None)
+    record = record_of(measurement)
+    n = len(record.t)
+    if n < _SHORTEST:
+        raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
+    first = int(TRAIN * n)
+    options: dict[str, Any] = {"camera": camera, "priors": priors}
+
+    tell("fitting the known model")
+    base = fit_record(measurement, record.part(slice(0, first)), model, free, **options)
+    search = _Search(record, first, tell)
+    before = search.errors(base)
+    trained, after, accepted, scans = search.run(base, before)
+
+    tell("refitting all data")
+    baseline = fit(measurement, model, free, **options)
+    final = baseline
+    for step in accepted:
+        final = extend(final, [c.effect for c in step.candidates], step.start)
+    found = [f for step in accepted for f in _describe(step, final)]
+    others = [a for step in accepted for a in step.alternatives]
+    doubtful = [a for a in others if a.likeness < 0.99]
+    verdict = "nothing missing"
+    if found:
+        verdict = "effect present, form not identified" if doubtful else "effect identified"
+    horizon = search.horizon(before)
+    return Discovery(
+        verdict=verdict,
+        baseline=baseline,
+        fit=final,
+        effects=found,
+        alternatives=others,
+        error_before=before,
+        error_after=after,
+        ratio=improvement(before, after, horizon) if found else (1.0, 1.0, 1.0),
+        horizon=horizon,
+        scans=scans,
+        measurement=measurement,
+        split=float(record.t[first]),
+        trained=trained,
+    )
+
+
+@dataclass(frozen=True)
+class _Step:
+    """An addition that was accepted: one candidate, or a pair."""
+
+    candidates: list[Candidate]
+    start: list[float]
+    chi2: float
+    p: float
+    ratio: tuple[float, float, float]
+    alternatives: list[Alternative]
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A combination of candidates fitted in full."""
+
+    candidates: list[Candidate]
+    fit: Fit
+
+    @property
+    def names(self) -> list[str]:
+        return [name for c in self.candidates for name in c.amplitude_names]
+
+    @property
+    def amplitudes(self) -> list[float]:
+        return [self.fit.parameters[name] for name in self.names]
+
+    @property
+    def physical(self) -> bool:
+        return all(
+            physical(c, [self.fit.parameters[n] for n in c.amplitude_names], [self.fit.errors[n] for n in c.amplitude_names])
+            for c in self.candidates
+        )
+
+
+class _Search:
+    """The search on the first part of a record, tested on the rest."""
+
+    def __init__(self, record: Record, first: int, tell: Callable[[str], None]) -> None:
+        self.record, self.first, self.tell = record, first, tell
+
+    def errors(self, fitted: Fit) -> Errors:
+        return held_out_errors(fitted, self.record, self.first)
+
+    def horizon(self, errors: Errors) -> float:
+        """The horizon at which models are compared: a second, or the longest there is."""
+        within = [h for h in errors.horizons if h <= (1.0 if errors.unit == "m" else 10.0)]
+        return within[-1] if within else errors.horizons[0]
+
+    def run(self, base: Fit, before: Errors) -> tuple[Fit, Errors, list[_Step], list[list[Scored]]]:
+        accepted: list[_Step] = []
+        scans: list[list[Scored]] = []
+        current, errors = base, before
+        while len(accepted) < _MOST:
+            self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
+            scanned, rippled = self._score(current)
+            scans.append(sorted([*scanned.scored, *rippled[:3]], key=lambda s: -s.chi2))
+            step = self._single(current, errors, scanned, rippled) or self._pair(current, errors, scanned)
+            if step is None:
+                break
+            added, trial, after = step
+            accepted.append(added)
+            current, errors = trial.fit, after
+        return current, errors, accepted, scans
+
+    def _score(self, current: Fit) -> tuple[Scan, list[Scored]]:
+        scanned = scan(current, library(current.model))
+        t = current.record.t
+        candidates = ripples(current.model, float(t[-1] - t[0]), float(np.median(np.diff(t))))
+        rippled = sorted(scan_frequencies(current, candidates), key=lambda s: -s.chi2)
+        self._looks = len(scanned.scored) + len(rippled)
+        return scanned, rippled
+
+    def _single(
+        self, current: Fit, errors: Errors, scanned: Scan, rippled: list[Scored]
+    ) -> tuple[_Step, _Trial, Errors] | None:
+        pool = [*scanned.scored, *rippled[:1]]
+        passing = [s for s in pool if s.physical and not s.absorbed and s.p * self._looks < ALPHA]
+        passing.sort(key=lambda s: -s.chi2)
+        trials = []
+        for s in passing[:_TRIED]:
+            self.tell(f"trying {s.candidate.title}")
+            trial = self._try(current, [s.candidate], list(s.amplitudes))
+            if trial is not None:
+                trials.append(trial)
+        return self._accept(current, errors, trials, scanned)
+
+    def _pair(self, current: Fit, errors: Errors, scanned: Scan) -> tuple[_Step, _Trial, Errors] | None:
+        best = scanned.pairs()
+        trials = []
+        for a, b, fall in best[:_TRIED]:
+            columns = len(a.amplitudes) + len(b.amplitudes)
+            if chi2.sf(fall, columns) * len(best) >= ALPHA or a.candidate.effect.name == b.candidate.effect.name:
+                continue
+            self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
+            trial = self._try(current, [a.candidate, b.candidate], [0.0] * columns)
+            if trial is not None:
+                trials.append(trial)
+        return self._accept(current, errors, trials, scanned)
+
+    def _try(self, current: Fit, candidates: list[Candidate], start: list[float]) -> _Trial | None:
+        try:
+            trial = _Trial(candidates, extend(current, [c.effect for c in candidates], start))
+        except FitError:
+            return None
+        return trial if trial.physical else None
+
+    def _accept(
+        self, current: Fit, errors: Errors, trials: list[_Trial], scanned: Scan
+    ) -> tuple[_Step, _Trial, Errors] | None:
+        """The best trial, if it passes all tests."""
+        for trial in sorted(trials, key=lambda t: t.fit.chi2):
+            scatter = max(trial.fit.scatter, 1.0)
+            fall = (current.chi2 - trial.fit.chi2) / scatter
+            p = float(chi2.sf(fall, len(trial.amplitudes))) * self._looks
+            after = self.errors(trial.fit)
+            ratio = improvement(errors, after, self.horizon(errors))
+            if p < ALPHA and ratio[2] < 1.0:
+                others = self._alternatives(trial, trials, scanned, scatter)
+                step = _Step(trial.candidates, trial.amplitudes, fall, p, ratio, others)
+                return step, trial, after
+        return None
+
+    def _alternatives(
+        self, chosen: _Trial, trials: list[_Trial], scanned: Scan, scatter: float
+    ) -> list[Alternative]:
+        listed = [s.candidate for s in scanned.scored]
+        result = []
+        for trial in trials:
+            nats = (trial.fit.chi2 - chosen.fit.chi2) / scatter / 2
+            if trial is chosen or nats > NATS or len(trial.candidates) != len(chosen.candidates):
+                continue
+            for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
+                if mine.effect == other.effect:
+                    continue
+                known = mine in listed and other in listed
+                likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
+                effect = other.effect.replace(
+                    **{p: trial.fit.parameters[f"{other.effect.name}.{p}"] for p in other.effect.amplitudes}
+                )
+                result.append(
+                    Alternative(mine.effect.name, effect, other.title, other.effect.equation, nats, likeness)
+                )
+        return result
+
+
+def _describe(step: _Step, final: Fit) -> list[Found]:
+    """The effects of a step, with the numbers of the fit to all data."""
+    result = []
+    for candidate in step.candidates:
+        effect = next(e for e in final.model.effects if e.name == candidate.effect.name)
+        names = {p: f"{effect.name}.{p}" for p in effect.parameters}
+        result.append(
+            Found(
+                effect=effect,
+                title=candidate.title,
+                equation=effect.equation,
+                expression=effect.expression,
+                parameters=dict(effect.parameters),
+                errors={p: final.errors[name] for p, name in names.items() if name in final.errors},
+                chi2=step.chi2,
+                p=step.p,
+                ratio=step.ratio,
+            )
+        )
+    return result

@@ -1,0 +1,148 @@
+"""The score scan: what every candidate would do for the fit, from one more solve."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from udd import _core
+from udd.fitting import Fit
+
+from .candidates import Candidate
+
+#: A candidate is absorbed when the free parameters take this share of its information.
+_ABSORBED = 1e-4
+#: How many candidates with a frequency are scored in one solve.
+_BATCH = 24
+
+
+@dataclass(frozen=True)
+class Scored:
+    """What the score says of one candidate.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    chi2 : float
+        By how much chi2 would fall, in units of the fit's own scatter.
+    p : float
+        Probability of so large a fall by chance, for one candidate looked at.
+    amplitudes, errors : tuple of float
+        Estimates with standard errors, in SI units.
+    absorbed : bool
+        The free parameters already do what this candidate does: the data cannot see it.
+    physical : bool
+        The amplitudes lie in their physical range (friction takes energy out).
+    """
+
+    candidate: Candidate
+    chi2: float
+    p: float
+    amplitudes: tuple[float, ...]
+    errors: tuple[float, ...]
+    absorbed: bool
+    physical: bool
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Scores of a list of candidates with what is needed for their combinations."""
+
+    scored: list[Scored]
+    gradient: NDArray[np.float64]
+    information: NDArray[np.float64]
+    columns: list[list[int]]
+    scatter: float
+
+    def pairs(self) -> list[tuple[Scored, Scored, float]]:
+        """Every pair of candidates with the fall of chi2 that both together give, largest first."""
+        usable = [k for k, s in enumerate(self.scored) if not s.absorbed]
+        result = []
+        for i, j in itertools.combinations(usable, 2):
+            columns = self.columns[i] + self.columns[j]
+            block = self.information[np.ix_(columns, columns)]
+            if np.linalg.cond(_unit(block)) > 1e6:
+                continue
+            g = self.gradient[columns]
+            result.append((self.scored[i], self.scored[j], float(g @ np.linalg.solve(block, g)) / self.scatter))
+        return sorted(result, key=lambda pair: -pair[2])
+
+    def likeness(self, i: int, j: int) -> float:
+        """How alike two candidates act on the data: the largest canonical correlation, 0 to 1."""
+        a, b = self.columns[i], self.columns[j]
+        block = self.information
+        left = np.linalg.solve(block[np.ix_(a, a)], block[np.ix_(a, b)])
+        right = np.linalg.solve(block[np.ix_(b, b)], block[np.ix_(b, a)])
+        return float(np.sqrt(max(np.linalg.eigvals(left @ right).real.max(), 0.0)))
+
+
+def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
+    """Score candidates around a fit."""
+    problem, model = fit.problem, fit.model
+    gradient, information, alone = _core.score(
+        *problem.arguments(fit.point),
+        [(c.added_to(model), c.amplitude_indices(model)) for c in candidates],
+    )
+    scatter = max(fit.scatter, 1.0)
+    scored, columns, first = [], [], 0
+    for candidate in candidates:
+        own = list(range(first, first + len(candidate.amplitude_names)))
+        first += len(own)
+        columns.append(own)
+        block = information[np.ix_(own, own)]
+        scored.append(_score(candidate, gradient[own], block, alone[own], scatter))
+    return Scan(scored, gradient, information, columns, scatter)
+
+
+def scan_frequencies(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
+    """Score many candidates, a few at a time: only each one's own score is kept."""
+    result: list[Scored] = []
+    for first in range(0, len(candidates), _BATCH):
+        result += scan(fit, candidates[first : first + _BATCH]).scored
+    return result
+
+
+def _score(
+    candidate: Candidate,
+    gradient: NDArray[np.float64],
+    information: NDArray[np.float64],
+    alone: NDArray[np.float64],
+    scatter: float,
+) -> Scored:
+    n = len(gradient)
+    nothing = Scored(candidate, 0.0, 1.0, (0.0,) * n, (np.inf,) * n, True, True)
+    own = np.diag(information)
+    if np.any(own <= _ABSORBED * alone) or np.linalg.eigvalsh(_unit(information)).min() < _ABSORBED:
+        return nothing
+    covariance = np.linalg.inv(information)
+    estimate = covariance @ gradient
+    errors = np.sqrt(np.diag(covariance) * scatter)
+    chi2 = float(gradient @ estimate) / scatter
+    return Scored(
+        candidate,
+        chi2,
+        float(chi2_distribution.sf(chi2, n)),
+        tuple(estimate.tolist()),
+        tuple(errors.tolist()),
+        False,
+        physical(candidate, estimate, errors),
+    )
+
+
+def physical(candidate: Candidate, estimate: Sequence[float], errors: Sequence[float]) -> bool:
+    """Whether amplitudes lie in their range, give or take their error."""
+    ranges = [candidate.effect.ranges[p] for p in candidate.effect.amplitudes]
+    return all(
+        low - 2 * e <= a <= high + 2 * e for a, e, (low, high) in zip(estimate, errors, ranges, strict=True)
+    )
+
+
+def _unit(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    result: NDArray[np.float64] = matrix * scale[:, None] * scale[None, :]
+    return result

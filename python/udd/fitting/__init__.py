@@ -1,0 +1,8 @@
+"""The loop's first half: what the model's numbers are, given measured motion."""
+
+from __future__ import annotations
+
+from .fit import Fit, extend, fit, fit_record, information_for
+from .record import Record, record_of
+
+__all__ = ["Fit", "Record", "extend", "fit", "fit_record", "information_for", "record_of"]

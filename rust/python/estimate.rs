@@ -1,0 +1,327 @@
+//! The estimator's door to Python: arrays in, arrays out.
+
+use nalgebra::{SMatrix, SVector};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::errors::FitError;
+use super::interrupt;
+use super::model::AnyModel;
+use crate::estimate::{
+    AngleSensor, DiskCamera, EstimateError, Estimator, Free, Options, Point, Record, Role, Sensor,
+};
+use crate::integrate::Tolerance;
+use crate::model::Family;
+
+/// Frame by frame: time, what was seen, its information, and whether the next frame is linked.
+type Data<'py> = (
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray3<'py, f64>,
+    PyReadonlyArray1<'py, bool>,
+);
+/// States, the camera's parameters, and the clock's error.
+type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>, f64);
+/// Role, index, prior mean and standard deviation.
+type FreeTuple = (String, usize, f64, f64);
+
+/// A frame's flow is followed much more closely than the model's smallest assumed error.
+const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
+
+impl From<EstimateError> for PyErr {
+    fn from(error: EstimateError) -> Self {
+        match error {
+            EstimateError::Cancelled => PyKeyboardInterrupt::new_err(()),
+            other => FitError::new_err(other.to_string()),
+        }
+    }
+}
+
+fn list<T: Copy + numpy::Element>(array: &PyReadonlyArray1<'_, T>) -> Vec<T> {
+    array.as_array().iter().copied().collect()
+}
+
+fn rows<const K: usize>(array: &PyReadonlyArray2<'_, f64>, what: &str) -> PyResult<Vec<[f64; K]>> {
+    let array = array.as_array();
+    if array.ncols() != K {
+        return Err(PyValueError::new_err(format!("{what} must have {K} columns, not {}", array.ncols())));
+    }
+    Ok(array.rows().into_iter().map(|row| std::array::from_fn(|k| row[k])).collect())
+}
+
+fn record<const M: usize>((t, seen, information, linked): &Data<'_>) -> PyResult<Record<M>> {
+    let record = Record {
+        t: list(t),
+        seen: rows::<M>(seen, "seen")?.into_iter().map(SVector::from).collect(),
+        information: information
+            .as_array()
+            .outer_iter()
+            .map(|own| SMatrix::from_fn(|i, j| own[[i, j]]))
+            .collect(),
+        linked: list(linked),
+    };
+    let n = record.t.len();
+    if n == 0 || record.seen.len() != n || record.information.len() != n || record.linked.len() + 1 != n {
+        return Err(PyValueError::new_err("t, seen, information and linked have different lengths"));
+    }
+    Ok(record)
+}
+
+fn frees(free: &[FreeTuple]) -> PyResult<Vec<Free>> {
+    let one = |(role, index, mean, sd): &FreeTuple| {
+        let role = match role.as_str() {
+            "model" => Role::Model(*index),
+            "camera" => Role::Camera(*index),
+            "clock" => Role::Clock,
+            other => return Err(PyValueError::new_err(format!("unknown role {other:?}"))),
+        };
+        Ok(Free { role, mean: *mean, sd: *sd })
+    };
+    free.iter().map(one).collect()
+}
+
+fn problem<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize>(
+    (family, values, sensor): (F, Vec<f64>, C),
+    data: &Data<'_>,
+    (states, camera, clock): &Start<'_>,
+    free: &[FreeTuple],
+    diffusion: &[f64],
+) -> PyResult<(Estimator<F, C, D, M>, Point<D>)> {
+    let diffusion = diffusion
+        .try_into()
+        .map_err(|_| PyValueError::new_err(format!("diffusion must have {D} numbers")))?;
+    let record = record(data)?;
+    let point = Point { states: rows(states, "states")?, model: values, camera: list(camera), clock: *clock };
+    if point.states.len() != record.t.len() || point.camera.len() != C::PARAMETERS.len() {
+        return Err(PyValueError::new_err("states and camera do not fit the record"));
+    }
+    let free = frees(free)?;
+    for free in &free {
+        let (index, most) = match free.role {
+            Role::Model(index) => (index, point.model.len()),
+            Role::Camera(index) => (index, point.camera.len()),
+            Role::Clock => (0, 1),
+        };
+        if index >= most {
+            return Err(PyValueError::new_err(format!("there is no parameter {index} of {most}")));
+        }
+    }
+    Ok((Estimator { family, sensor, record, free, diffusion, tolerance: TOLERANCE }, point))
+}
+
+/// An array of `shape` from its numbers in C order.
+fn array<'py, const N: usize>(
+    py: Python<'py>,
+    shape: [usize; N],
+    numbers: impl IntoIterator<Item = f64>,
+) -> PyResult<Bound<'py, PyAny>>
+where
+    [usize; N]: numpy::ndarray::IntoDimension,
+{
+    let flat: Vec<f64> = numbers.into_iter().collect();
+    Ok(PyArray1::from_vec(py, flat).reshape(shape)?.into_any())
+}
+
+/// The numbers of small matrices in C order.
+fn numbers<const A: usize, const B: usize>(blocks: &[SMatrix<f64, A, B>]) -> impl Iterator<Item = f64> + '_ {
+    blocks.iter().flat_map(|m| (0..A).flat_map(move |i| (0..B).map(move |j| m[(i, j)])))
+}
+
+macro_rules! each_family {
+    ($model:expr, $call:ident ( $($argument:expr),* )) => {
+        match $model {
+            AnyModel::Disk(family, values) => $call((family, values, DiskCamera), $($argument),*),
+            AnyModel::Pendulum(family, values) => $call((family, values, AngleSensor), $($argument),*),
+            AnyModel::Dle(..) => Err(PyValueError::new_err("no camera sees the dimensionless equations")),
+        }
+    };
+}
+
+/// Minimises the cost; see `rust/estimate`.
+#[pyfunction]
+fn solve<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    free: Vec<FreeTuple>,
+    diffusion: Vec<f64>,
+    iterations: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        model: (F, Vec<f64>, C),
+        py: Python<'py>,
+        (data, start): (&Data<'py>, &Start<'py>),
+        free: &[FreeTuple],
+        diffusion: &[f64],
+        iterations: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (estimator, point) = problem(model, data, start, free, diffusion)?;
+        let options = Options { iterations, ..Options::default() };
+        let s = interrupt::run(py, |stop| estimator.solve(point, &options, stop))?;
+        let (n, p) = (estimator.record.t.len(), estimator.free.len());
+        let result = PyDict::new(py);
+        result.set_item("states", array(py, [n, D], s.point.states.iter().flatten().copied())?)?;
+        result.set_item("model", s.point.model)?;
+        result.set_item("camera", array(py, [s.point.camera.len()], s.point.camera)?)?;
+        result.set_item("clock", s.point.clock)?;
+        result.set_item("covariance", array(py, [p, p], s.covariance.iter().copied())?)?;
+        result.set_item("state_covariance", array(py, [n, D, D], numbers(&s.state_covariance))?)?;
+        result.set_item("misfit", array(py, [n, M], numbers(&s.misfit))?)?;
+        result.set_item("seen_variance", array(py, [n, M], numbers(&s.seen_variance))?)?;
+        result.set_item("defect", array(py, [n - 1, D], numbers(&s.defect[..n - 1]))?)?;
+        result.set_item("cost", (s.cost.misfit, s.cost.defect, s.cost.prior))?;
+        result.set_item("converged", s.converged)?;
+        result.set_item("iterations", s.iterations)?;
+        Ok(result)
+    }
+    each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
+}
+
+/// Gradient, information, and information were the free parameters known.
+type Scored<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+/// Gradient and information of candidates' amplitudes at zero, everything else optimal.
+#[pyfunction]
+fn score<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    free: Vec<FreeTuple>,
+    diffusion: Vec<f64>,
+    candidates: Vec<(Bound<'py, PyAny>, Vec<usize>)>,
+) -> PyResult<Scored<'py>> {
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        model: (F, Vec<f64>, C),
+        py: Python<'py>,
+        (data, start): (&Data<'py>, &Start<'py>),
+        free: &[FreeTuple],
+        diffusion: &[f64],
+        groups: &[(F, Vec<f64>, Vec<Role>)],
+    ) -> PyResult<Scored<'py>> {
+        let (estimator, point) = problem(model, data, start, free, diffusion)?;
+        let score = interrupt::run(py, |_| estimator.score(&point, groups))?;
+        let c = score.gradient.len();
+        Ok((
+            array(py, [c], score.gradient.iter().copied())?,
+            array(py, [c, c], score.information.iter().copied())?,
+            array(py, [c], score.alone.iter().copied())?,
+        ))
+    }
+    let roles = |indices: Vec<usize>| indices.into_iter().map(Role::Model).collect::<Vec<_>>();
+    let mixed = || PyValueError::new_err("a candidate is a model of another kind");
+    match AnyModel::from_python(model)? {
+        AnyModel::Disk(family, values) => {
+            let groups = candidates
+                .into_iter()
+                .map(|(m, indices)| match AnyModel::from_python(&m)? {
+                    AnyModel::Disk(f, v) => Ok((f, v, roles(indices))),
+                    _ => Err(mixed()),
+                })
+                .collect::<PyResult<Vec<_>>>()?;
+            run((family, values, DiskCamera), py, (&data, &start), &free, &diffusion, &groups)
+        }
+        AnyModel::Pendulum(family, values) => {
+            let groups = candidates
+                .into_iter()
+                .map(|(m, indices)| match AnyModel::from_python(&m)? {
+                    AnyModel::Pendulum(f, v) => Ok((f, v, roles(indices))),
+                    _ => Err(mixed()),
+                })
+                .collect::<PyResult<Vec<_>>>()?;
+            run((family, values, AngleSensor), py, (&data, &start), &free, &diffusion, &groups)
+        }
+        AnyModel::Dle(..) => Err(PyValueError::new_err("no camera sees the dimensionless equations")),
+    }
+}
+
+/// The state and its covariance at the end of each window of frames, from that window alone.
+#[pyfunction]
+fn filter<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    diffusion: Vec<f64>,
+    windows: Vec<(usize, usize)>,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        model: (F, Vec<f64>, C),
+        py: Python<'py>,
+        (data, start): (&Data<'py>, &Start<'py>),
+        diffusion: &[f64],
+        windows: &[(usize, usize)],
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (estimator, point) = problem(model, data, start, &[], diffusion)?;
+        if windows.iter().any(|&(first, last)| first >= last || last >= estimator.record.t.len()) {
+            return Err(PyValueError::new_err("a window reaches beyond the record"));
+        }
+        let options = Options::default();
+        let ends = interrupt::run(py, |stop| estimator.filter(&point, windows, &options, stop))?;
+        let (states, covariances): (Vec<_>, Vec<_>) = ends.into_iter().unzip();
+        let n = states.len();
+        Ok((array(py, [n, D], states.into_iter().flatten())?, array(py, [n, D, D], numbers(&covariances))?))
+    }
+    each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &diffusion, &windows))
+}
+
+/// What would be seen at `times[k]`, increasing, after start `k` at `t0[k]`, by the model alone.
+#[pyfunction]
+fn predict<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    camera: PyReadonlyArray1<'py, f64>,
+    clock: f64,
+    t0: PyReadonlyArray1<'py, f64>,
+    states: PyReadonlyArray2<'py, f64>,
+    times: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    type Arrays<'a, 'py> = (
+        &'a PyReadonlyArray1<'py, f64>,
+        &'a PyReadonlyArray1<'py, f64>,
+        &'a PyReadonlyArray2<'py, f64>,
+        &'a PyReadonlyArray2<'py, f64>,
+    );
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        (family, values, sensor): (F, Vec<f64>, C),
+        py: Python<'py>,
+        clock: f64,
+        (camera, t0, states, times): Arrays<'_, 'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let starts: Vec<_> = list(t0).into_iter().zip(rows::<D>(states, "states")?).collect();
+        let times: Vec<Vec<f64>> = times.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
+        let (k, h) = (starts.len(), times.first().map_or(0, Vec::len));
+        let camera = list(camera);
+        if times.len() != k || camera.len() != C::PARAMETERS.len() {
+            return Err(PyValueError::new_err("starts, times and camera do not fit together"));
+        }
+        let record = Record { t: Vec::new(), seen: Vec::new(), information: Vec::new(), linked: Vec::new() };
+        let estimator =
+            Estimator { family, sensor, record, free: Vec::new(), diffusion: [1.0; D], tolerance: TOLERANCE };
+        let point = Point { states: Vec::new(), model: values, camera, clock };
+        let seen = interrupt::run(py, |_| estimator.predict(&point, &starts, &times))?;
+        array(py, [k, h, M], seen.into_iter().flatten().flatten())
+    }
+    each_family!(AnyModel::from_python(model)?, run(py, clock, (&camera, &t0, &states, &times)))
+}
+
+/// Names and units of a camera's parameters, for measurements of the `"disk"` or a `"pendulum"`.
+#[pyfunction]
+fn camera_parameters(kind: &str) -> PyResult<Vec<(&'static str, &'static str)>> {
+    match kind {
+        "disk" => Ok(DiskCamera::PARAMETERS.to_vec()),
+        "pendulum" => Ok(AngleSensor::PARAMETERS.to_vec()),
+        other => Err(PyValueError::new_err(format!("no camera sees a {other:?}"))),
+    }
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(solve, module)?)?;
+    module.add_function(wrap_pyfunction!(score, module)?)?;
+    module.add_function(wrap_pyfunction!(filter, module)?)?;
+    module.add_function(wrap_pyfunction!(predict, module)?)?;
+    module.add_function(wrap_pyfunction!(camera_parameters, module)?)
+}
