@@ -32,7 +32,7 @@ demo: .venv/.udd ## from the sample film to the report: run the main job and pri
 test: test-rust test-python ## build everything and run all tests (cargo and pytest)
 
 test-rust: ## only the tests of the Rust core; needs no Python
-	cargo test --locked
+	cargo test --locked --no-fail-fast
 
 test-python: .venv/.udd ## only the tests of the Python package
 	$(PY) -m pytest
