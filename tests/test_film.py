@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
 
 from udd.errors import UddError
@@ -231,6 +232,24 @@ def test_the_rates_of_a_model_bridge_wider_gaps(tmp_path: Path) -> None:
         render(Run(coarse.t[::3], coarse.state[::3]), tmp_path / "coarse.mp4")
 
 
+def test_dense_output_bridges_any_gap(tmp_path: Path) -> None:
+    fine = plain_run(1.5)
+    curve = CubicSpline(fine.t, fine.state)
+
+    class Dense(NamedTuple):
+        t: NDArray[np.float64]
+        state: NDArray[np.float64]
+
+        def __call__(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+            if t.min() < 0 or t.max() > self.t[-1]:
+                raise UddError("outside the run")  # the shutter opens before it: render must not ask for that
+            return np.asarray(curve(t))
+
+    run = Dense(fine.t[[0, -1]], fine.state[[0, -1]])
+    film = render(run, tmp_path / "run.mp4", size=(110, 140))
+    assert film.state == pytest.approx(fine.state[::8][: len(film.t)], abs=1e-12)
+
+
 def test_the_same_seed_gives_the_same_film(tmp_path: Path) -> None:
     run = plain_run(0.3)
     films = [render(run, tmp_path / f"{i}.mp4", seed=seed).path for i, seed in enumerate((1, 1, 2))]
@@ -351,9 +370,11 @@ def test_bad_trajectories_are_named(tmp_path: Path) -> None:
     hole[7, 2] = np.nan
     refused(film, "at least two samples", Run(np.empty(0), np.empty((0, 4))))
     refused(film, "not finite", Run(run.t, hole))
+    refused(film, "nine samples", Run(run.t[:5], run.state[:5]))
     refused(film, "increase", Run(run.t[::-1], run.state))
     refused(film, "shows one disk", Run(run.t, run.state[:, :3]))
     refused(film, "with t and state", 7)
+    refused(film, "too far apart", plain_run(2.0, rate=10.0))
     refused(film, "shorter than one exposure", Run(run.t / 100, run.state), exposure=0.02)
 
 

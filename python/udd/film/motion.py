@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ Motion = Callable[[Array], Array]
 class TrajectoryLike(Protocol):
     """A run of the disk: times `t` (n,) in s, `state` (n, 4) [Omega, Y, Z, beta] in rad/s, m, m, rad.
 
-    A `model` with `R` and `rates(t, state)` is used where there is one.
+    A `model` with `R` and `rates(t, state)`, and dense output (calling it with times), are used where there.
     """
 
     @property
@@ -57,30 +57,43 @@ def checked(trajectory: TrajectoryLike) -> tuple[Array, Array]:
 def motion_of(trajectory: TrajectoryLike) -> Motion:
     """Interpolate the motion: a function of time, (m,) s -> (m, 4).
 
-    It is a cubic through the samples, with the slopes of the model's right-hand side where the trajectory has
-    a model (Hermite, error of order h^4), otherwise those of a cubic spline. Before the first and after the
-    last sample the disk moves on uniformly: the shutter opens half an exposure before the first frame's time.
+    It is the run's own dense output where there is one; else a cubic through the samples, with the slopes
+    of the model's right-hand side where there is a model (Hermite), otherwise those of a spline. Before the
+    first and after the last sample the disk moves on uniformly: the shutter opens half an exposure before the
+    first frame's time.
     """
-    from scipy.interpolate import CubicHermiteSpline, CubicSpline
-
     t, state = checked(trajectory)
-    rates = getattr(getattr(trajectory, "model", None), "rates", None)
-    if rates is not None:
-        curve: Any = CubicHermiteSpline(t, state, np.asarray(rates(t, state), dtype=np.float64))
-    elif t.size >= 4:
-        curve = CubicSpline(t, state)
-    else:
-        raise UddError(f"a film of a trajectory without a model needs at least four samples, got {t.size}")
-    slope = curve.derivative()(t[[0, -1]])
+    curve = dense_output(trajectory) or _cubic(t, state, getattr(trajectory, "model", None))
+    step = 1e-4 * (t[-1] - t[0]) / (t.size - 1)  # so short that the chord is the slope
+    ends = curve(np.array([t[0], t[0] + step, t[-1] - step, t[-1]]))
+    first, last = (ends[1] - ends[0]) / step, (ends[3] - ends[2]) / step
 
     def motion(times: Array) -> Array:
-        inside = np.clip(times, t[0], t[-1])
         before, after = np.minimum(times - t[0], 0.0), np.maximum(times - t[-1], 0.0)
-        return np.asarray(
-            curve(inside) + before[:, None] * slope[0] + after[:, None] * slope[1], dtype=np.float64
-        )
+        inside = curve(np.clip(times, t[0], t[-1]))
+        return np.asarray(inside + before[:, None] * first + after[:, None] * last, dtype=np.float64)
 
     return motion
+
+
+def dense_output(trajectory: TrajectoryLike) -> Motion | None:
+    """Return the trajectory as a function of time where it was made with dense output."""
+    if not callable(trajectory):
+        return None
+    try:
+        trajectory(np.asarray(trajectory.t, dtype=np.float64)[[0, -1]])
+    except UddError:  # made without
+        return None
+    return trajectory
+
+
+def _cubic(t: Array, state: Array, model: Any) -> Motion:
+    from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+    rates = getattr(model, "rates", None)
+    if rates is None:
+        return cast(Motion, CubicSpline(t, state))
+    return cast(Motion, CubicHermiteSpline(t, state, np.asarray(rates(t, state), dtype=np.float64)))
 
 
 def spacing_error(trajectory: TrajectoryLike, radius: float) -> float:
@@ -89,15 +102,14 @@ def spacing_error(trajectory: TrajectoryLike, radius: float) -> float:
     Every second sample is left away and predicted from the others: a cubic's error falls by 2^4 when the
     spacing halves, so a sixteenth of the misfit is what stands between the samples that are there.
     """
-    from types import SimpleNamespace
-
-    t, state = checked(trajectory)
-    if t.size < 8:
+    if dense_output(trajectory) is not None:
         return 0.0
-    keep = slice(0, t.size - (t.size + 1) % 2, 2)
-    left = slice(1, t.size - (t.size + 1) % 2, 2)
-    coarse = motion_of(
-        SimpleNamespace(t=t[keep], state=state[keep], model=getattr(trajectory, "model", None))
-    )
-    miss = coarse(t[left]) - state[left]
+    t, state = checked(trajectory)
+    if t.size < 9:
+        raise UddError(
+            f"a film needs a trajectory of at least nine samples (or with dense output), got {t.size}"
+        )
+    n = t.size - (t.size + 1) % 2  # odd, so that the last sample that is kept comes after the last left away
+    coarse = _cubic(t[:n:2], state[:n:2], getattr(trajectory, "model", None))
+    miss = coarse(t[1:n:2]) - state[1:n:2]
     return float(np.max(np.hypot(miss[:, 1], miss[:, 2]) + radius * np.abs(miss[:, 3])) / 16)

@@ -90,8 +90,8 @@ def render(
     ----------
     trajectory : Trajectory
         A run of the disk, from `udd.simulate`: times `t` (n,) in s and `state` (n, 4), [Omega, Y, Z, beta].
-        Between the samples the motion is a cubic (with the model's own rates where the trajectory has a
-        model); samples too far apart for it are refused.
+        Between the samples the motion is the dense output of a run made with it, else a cubic (with the
+        model's rates where the trajectory has a model); samples too far apart for a cubic are refused.
     path : path-like
         File to write, ``.mp4`` or ``.mov``. An older film is replaced once the new one is complete.
     fps : float
@@ -153,7 +153,8 @@ def render(
     if error > _COARSE:
         raise UddError(
             "the trajectory's samples are too far apart to film: "
-            f"a mark would be off by about {error:.2g} pixels; simulate more times (200/s are plenty)"
+            f"a mark would be off by about {error:.2g} pixels; "
+            "simulate more times (200 per second are plenty) or with dense=True"
         )
     times = frame_times(t, camera)
     scene = Scene(camera, radius, _background(background, camera, radius), support)
