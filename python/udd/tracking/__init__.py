@@ -1,0 +1,9 @@
+"""The tracker: a film of the marked disk goes in, its motion in metres and radians comes out."""
+
+from __future__ import annotations
+
+from .decode import Film, TrackError
+from .result import Pixels, pixels
+from .run import Tracking, pictures_at, track, track_in_detail
+
+__all__ = ["Film", "Pixels", "TrackError", "Tracking", "pictures_at", "pixels", "track", "track_in_detail"]

@@ -1,0 +1,96 @@
+"""The disk's outline: its centre among the marks, and how many pixels its radius has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Picture, TrackError
+from .pose import Pose
+
+RAYS = 180
+SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
+SMEAR = 3.0  # pixels each side of the rim that lens and compression blur
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The rim in the body frame [pixels]: centre offset from the marks' origin, radius, standard errors."""
+
+    centre: complex
+    radius: float
+    sigma: float  # of the radius
+    points: int
+
+
+def outline(frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[np.bool_]) -> Outline:
+    """Circle through the rim points of many frames, in the frame that turns with the disk.
+
+    Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
+    averages it out of the centre.
+    """
+    angles = np.arange(RAYS) * (2 * np.pi / RAYS)
+    rays = np.exp(1j * angles)
+    points, group = [], []
+    for number, (picture, pose) in enumerate(frames):
+        r = _rim(picture.y, view, pose.centre, rays, reach)
+        ok = np.isfinite(r)
+        points.append(r[ok] * rays[ok] * np.exp(-1j * pose.angle))
+        group.append(np.full(int(ok.sum()), number))
+    z = np.concatenate(points) if points else np.empty(0, dtype=complex)
+    if len(z) < 60:
+        raise TrackError("the disk's rim cannot be told from the background, so the film has no scale")
+    weight = np.ones(len(z))
+    centre, radius, rest = 0j, float(np.median(np.abs(z))), np.zeros(len(z))
+    for _ in range(20):
+        arm = z - centre
+        rest = np.abs(arm) - radius
+        spread = max(1.48 * float(np.median(np.abs(rest - np.median(rest)))), 0.02)
+        weight = 1 / (1 + (rest / (2 * spread)) ** 2)
+        design = np.column_stack([arm.real / np.abs(arm), arm.imag / np.abs(arm), np.ones(len(z))])
+        change = np.linalg.lstsq(design * weight[:, None], rest * weight, rcond=None)[0]
+        centre += complex(change[0], change[1])
+        radius += float(change[2])
+        if np.abs(change).max() < 1e-6:
+            break
+    # frames are the independent pieces: edges within one share the light and the compression
+    means = np.array([np.average(rest[g], weights=weight[g]) for g in _groups(np.concatenate(group)) if g.any()])
+    sigma = float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else 0.5
+    return Outline(centre, radius, max(sigma, 0.01), len(z))
+
+
+def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
+    return [number == k for k in np.unique(number)]
+
+
+def _rim(y: NDArray[np.uint8], view: NDArray[np.bool_], centre: complex, rays: NDArray[np.complex128], reach: float) -> NDArray[np.float64]:
+    """Radius of the half-height crossing along each ray [pixels], NaN where none is clear."""
+    import cv2
+
+    step = 0.5
+    radii = np.arange(SPAN[0] * reach, SPAN[1] * reach, step)
+    at = centre + radii[None, :] * rays[:, None]
+    map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
+    profile = cv2.remap(y, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    clear = cv2.remap(view.astype(np.uint8), map_u, map_v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
+    fall = profile[:, :-4] - profile[:, 4:]
+    k = np.argmax(fall, axis=1) + 2
+    out = np.full(len(rays), np.nan)
+    n = int(SMEAR / step)
+    for i, j in enumerate(k):
+        if j < 2 * n + 2 or j > len(radii) - 2 * n - 3 or not clear[i, j - 2 * n : j + 2 * n].all():
+            continue
+        inner = float(np.median(profile[i, j - 2 * n : j - n]))
+        outer = float(np.median(profile[i, j + n : j + 2 * n]))
+        if inner - outer < 25:
+            continue
+        part = profile[i, j - n : j + n + 1]
+        below = np.flatnonzero(part < (inner + outer) / 2)
+        if len(below) and below[0] > 0:
+            b = int(below[0])
+            fraction = (part[b - 1] - (inner + outer) / 2) / (part[b - 1] - part[b])
+            out[i] = radii[j - n + b - 1] + step * fraction
+    return out

@@ -1,0 +1,142 @@
+"""Learning the marks from the film: their true places on the disk, sizes, orientation, contrast, sharpness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Picture, Plane
+from .find import BODY, Sight
+from .marks import MISFIT, Mark, Motion, Sighting, coverage
+from .pose import Look, Pose, align
+from .rigid import solve
+
+ROUNDS = 8
+MOST = 48  # frames to learn from
+WHOLE = 0.97  # share of its edges that a mark to learn from shows
+
+
+Seen = tuple[Pose, list[Sighting | None]]
+
+
+def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float) -> Look:
+    """Fit shape, place and contrast of the four marks to the slowest survey frames.
+
+    Poses and shapes are found in turns: poses from the present shapes, then one joint least-squares
+    step per mark for its shape with the pose of every frame left free.
+    """
+    frames = [(p.y, Pose(s.centre, s.angle)) for p, s in seen[:MOST]]
+    reach = float(np.median([s.reach for _, s in seen]))
+    half = float(np.sqrt(np.median([s.area for _, s in seen]))) / 2
+    noise = _noise(seen, view)
+    marks = [Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white)) for d in BODY]
+    psf = 0.8
+    for turn in range(ROUNDS):
+        look = Look(marks, psf, noise)
+        fits: list[Seen] = []
+        for y, pose in frames:
+            fit = align(y, view, look, pose, Motion(), [0.5, 0.5, MISFIT] if turn == 0 else [MISFIT], gain_slack=1.0)
+            if fit is not None:
+                fits.append((pose, fit.sightings))
+        marks, psf = _reshape(fits, look)
+    return Look(marks, psf, noise)
+
+
+def _noise(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_]) -> float:
+    """Brightness noise from second differences along rows near the disk's centre."""
+    levels = []
+    for picture, sight in seen[:20]:
+        r, c, n = int(sight.centre.imag), int(sight.centre.real), int(0.4 * sight.reach)
+        patch = picture.y[max(0, r - n) : r + n, max(0, c - n) : c + n].astype(float)
+        ok = view[max(0, r - n) : r + n, max(0, c - n) : c + n]
+        ok = ok[:, 2:] & ok[:, 1:-1] & ok[:, :-2]
+        second = patch[:, 2:] - 2 * patch[:, 1:-1] + patch[:, :-2]
+        if ok.sum() > 200:
+            levels.append(float(np.sqrt(np.mean(np.clip(second[ok], -20, 20) ** 2) / 6)))
+    return max(1.0, float(np.median(levels)) if levels else 2.0)
+
+
+def _level(frames: Sequence[tuple[Plane, Pose]], place: complex, view: NDArray[np.bool_], white: float) -> float:
+    """Brightness of a mark's middle against the disk's."""
+    values = []
+    for y, pose in frames:
+        at = pose.centre + place * np.exp(1j * pose.angle)
+        r, c = round(at.imag), round(at.real)
+        if 2 <= r < y.shape[0] - 2 and 2 <= c < y.shape[1] - 2 and view[r - 2 : r + 3, c - 2 : c + 3].all():
+            values.append(float(np.median(y[r - 2 : r + 3, c - 2 : c + 3])))
+    return (float(np.median(values)) if values else 0.5 * white) - white
+
+
+def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
+    marks, psfs = [], []
+    for k, mark in enumerate(look.marks):
+        normal, right = np.zeros((4, 4)), np.zeros(4)
+        gains = []
+        for pose, sightings in fits:
+            s = sightings[k]
+            if s is None or s.complete < WHOLE:
+                continue
+            n, r = _shape_step(mark, pose, look.psf, s)
+            normal, right = normal + n, right + r
+            gains.append(s.gain)
+        if not gains:
+            marks.append(mark)
+            continue
+        change = np.linalg.solve(normal + 1e-6 * np.trace(normal) * np.diag([1e-3, 1, 1, 1]), right)
+        change = np.clip(change, [-0.2, -2, -2, -0.3], [0.2, 2, 2, 0.3])
+        marks.append(
+            replace(
+                mark,
+                half=(mark.half[0] + change[1], mark.half[1] + change[2]),
+                turn=mark.turn + change[0],
+                level=mark.level * float(np.median(gains)),
+            )
+        )
+        psfs.append(change[3])
+    psf = float(np.clip(look.psf + (np.median(psfs) if psfs else 0.0), 0.35, 4.0))
+    return _replace_places(marks, fits), psf
+
+
+def _shape_step(mark: Mark, pose: Pose, psf: float, s: Sighting) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normal equations for (turn, half sides, psf) after the local unknowns have taken what they can."""
+    r0, r1, c0, c1 = s.box
+    still = Motion()
+
+    def cover(m: Mark, blur: float) -> NDArray[np.float64]:
+        return coverage(m, pose.centre, pose.angle, still, blur, s.box).ravel()
+
+    base = cover(mark, psf)
+    grad_v, grad_u = np.gradient(base.reshape(r1 - r0, c1 - c0))
+    local = np.stack([np.ones_like(base), base, grad_u.ravel(), grad_v.ravel()])
+    shape = np.stack(
+        [
+            (cover(replace(mark, turn=mark.turn + 0.01), psf) - base) / 0.01,
+            (cover(replace(mark, half=(mark.half[0] + 0.1, mark.half[1])), psf) - base) / 0.1,
+            (cover(replace(mark, half=(mark.half[0], mark.half[1] + 0.1)), psf) - base) / 0.1,
+            (cover(mark, psf + 0.05) - base) / 0.05,
+        ]
+    )
+    shape *= mark.level
+    w = s.weight
+    free = np.linalg.solve((local * w) @ local.T, (local * w) @ shape.T)
+    shape = shape - free.T @ local
+    return (shape * w) @ shape.T, (shape * w) @ s.residual
+
+
+def _replace_places(marks: list[Mark], fits: list[Seen]) -> list[Mark]:
+    """Move each mark's place on the disk to where it is on average, the disk's frame held by all of them."""
+    moved = []
+    for k, mark in enumerate(marks):
+        shifts = []
+        for pose, sightings in fits:
+            s = sightings[k]
+            if s is not None and s.complete > WHOLE:
+                step = solve(marks, sightings, pose.angle, np.array([float(x is not None and x.complete > WHOLE) for x in sightings]))
+                if step is not None:
+                    shifts.append(complex(step.leftover[k][0], step.leftover[k][1]) * np.exp(-1j * pose.angle))
+        shift = complex(np.median(np.real(shifts)), np.median(np.imag(shifts))) if len(shifts) > 2 else 0j
+        moved.append(replace(mark, place=mark.place + shift))
+    return moved

@@ -1,0 +1,100 @@
+"""The contact point, from the motion alone: the disk turns about it while it is driven past it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+Array = NDArray[np.float64]
+WINDOW = 1.5  # s; over longer stretches what the constraint leaves out (slip) adds up
+SHORTEST = 0.3  # s
+WORST = 0.03  # of the marks' reach: a contact known no better is not taken from the motion
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """Contact point [pixels, u + iv], its covariance (2, 2), and the drive that goes with it [pixels/s]."""
+
+    place: complex
+    covariance: Array
+    drive: complex
+    rms: float  # misfit [pixels]
+
+
+def pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray[np.bool_], reach: float) -> Pivot | None:
+    """Fit the rolling constraint in its integrated form; None where the motion does not determine it.
+
+    In picture axes (u right, v down, angle clockwise) material of the disk at the contact p moves
+    with the drive's velocity d:  dc/dt = d + i w (c - p), w = dangle/dt. Multiplying by exp(-i angle)
+    makes both sides total derivatives,
+
+        c exp(-i angle)  =  const + p exp(-i angle) + d * integral exp(-i angle) dt,
+
+    linear in p and d, without any derivative of the data. Each window has its own constant. `reach`
+    (the marks' distance from the centre [pixels]) is the size of the disk to compare with. The drive may have any direction here, so that a tilted camera does not move the contact.
+    """
+    rows: list[NDArray[np.complex128]] = []
+    values: list[NDArray[np.complex128]] = []
+    for a, b in _windows(t, good):
+        time, beta = t[a:b], angle[a:b]
+        turn = np.exp(-1j * beta)
+        dt = time - time[0]
+        swept = CubicSpline(dt, turn).antiderivative()(dt) if b - a > 3 else np.zeros(b - a)
+        block = np.column_stack([turn, swept])
+        rows.append(block - block.mean(axis=0))
+        left = centre[a:b] * turn
+        values.append(left - left.mean())
+    if not rows:
+        return None
+    design, value = np.concatenate(rows), np.concatenate(values)
+    weight = np.ones(len(value))
+    x = np.zeros(2, dtype=complex)
+    rest = value
+    for _ in range(12):
+        x = np.linalg.lstsq(design * weight[:, None], value * weight, rcond=None)[0]
+        rest = np.abs(value - design @ x)
+        weight = np.sqrt(1 / np.maximum(1.0, rest / (2 * np.median(rest) + 1e-12)))
+    rms = float(np.sqrt(np.mean(rest**2) / 2))
+    normal = (design.conj().T * weight**2) @ design
+    # misfits within a window go together: count windows, not frames
+    inflation = len(value) / max(len(rows) - 1, 1)
+    variance = rms**2 * inflation * np.real(np.linalg.inv(normal + 1e-12 * np.eye(2))[0, 0])
+    if not np.isfinite(variance) or variance > (WORST * reach) ** 2:
+        return None
+    return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms)
+
+
+def _windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Index ranges of unbroken good frames, cut to at most `WINDOW` seconds."""
+    if len(t) < 2:
+        return []
+    out = []
+    longest = 2.5 * float(np.median(np.diff(t)))
+    start: int | None = None
+    for i in range(len(t) + 1):
+        stop = i == len(t) or not good[i] or (start is not None and i > start and t[i] - t[i - 1] > longest)
+        full = start is not None and not stop and t[i] - t[start] >= WINDOW
+        if start is not None and (stop or full):
+            if t[i - 1] - t[start] >= SHORTEST and i - start >= 6:
+                out.append((start, i))
+            start = None
+        if start is None and i < len(t) and good[i]:
+            start = i
+    return out
+
+
+def support(view: NDArray[np.bool_]) -> complex | None:
+    """A guess at the contact from what stands before the disk: the wheel's axle, the widest part near its top."""
+    rows = np.flatnonzero((~view).any(axis=1))
+    if len(rows) < 10:
+        return None
+    top = rows[: max(5, len(rows) // 3)]
+    width = np.array([np.count_nonzero(~view[r]) for r in top])
+    widest = top[width > 0.9 * width.max()]
+    columns = np.flatnonzero((~view[widest]).all(axis=0))
+    if not len(columns):
+        return None
+    return complex(float(columns.mean()), float(widest.mean()))

@@ -1,0 +1,73 @@
+"""The pose of the disk in one picture, refined from a nearby one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Plane
+from .marks import Mark, Motion, Sighting, locate
+from .rigid import Step, solve
+
+LEAST = 0.15  # share of a mark's edges below which it is not used
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the marked disk looks in this film."""
+
+    marks: list[Mark]
+    psf: float  # blur of lens and pixels, standard deviation [pixels]
+    noise: float  # of the brightness on a flat part of the disk
+
+
+@dataclass
+class Pose:
+    """The disk in the picture: its centre [pixels, u + iv] and angle [rad]."""
+
+    centre: complex
+    angle: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The last correction made to a pose, and the marks it came from."""
+
+    step: Step
+    sightings: list[Sighting | None]
+    used: NDArray[np.bool_]
+    moved: float  # size of the last correction, in pixels at the marks
+
+
+def align(
+    y: Plane,
+    view: NDArray[np.bool_],
+    look: Look,
+    pose: Pose,
+    motion: Motion,
+    rounds: list[float],
+    gain_slack: float = 0.1,
+) -> Fit | None:
+    """Move `pose` onto a picture by Gauss-Newton steps; None if fewer than two marks hold it.
+
+    Each round has its misfit tolerance [pixels]; a large one reaches further.
+    """
+    fit = None
+    for misfit in rounds:
+        psf = float(np.hypot(look.psf, 3 * misfit if misfit > 0.3 else 0.0))
+        sightings = [
+            locate(y, view, m, pose.centre, pose.angle, motion, psf, look.noise, gain_slack, misfit) for m in look.marks
+        ]
+        used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])
+        step = solve(look.marks, sightings, pose.angle, used.astype(float))
+        if step is None or used.sum() < 2:
+            return None
+        pose.centre += complex(step.change[0], step.change[1])
+        pose.angle += float(step.change[2])
+        moved = float(np.hypot(np.hypot(*step.change[:2]), step.change[2] * abs(look.marks[0].place)))
+        fit = Fit(step, sightings, used, moved)
+        if moved < 0.01 and misfit == rounds[-1]:
+            break
+    return fit

@@ -1,0 +1,250 @@
+"""The whole way from a film to a measurement."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.measurement import DISK, Measurement, check_length
+
+from .acquire import colours_of
+from .decode import Film, Picture, TrackError
+from .disk import Outline, outline
+from .exposure import exposure
+from .find import Sight, sightings
+from .learn import learn
+from .loop import Known, Tracks, follow
+from .marks import MISFIT, Motion
+from .noise import covariance
+from .occluder import visible
+from .pivot import pivot as rolling
+from .pivot import support
+from .pose import Look, Pose, align
+from .result import Camera, metres
+from .survey import Survey, slowest, survey
+
+FEWEST_SIGHTS = 3  # survey frames that must show all four marks
+SHARP = 60  # slow frames from which the rim is measured
+CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """A measurement, and what it was made from."""
+
+    measurement: Measurement
+    tracks: Tracks
+    known: Known
+    camera: Camera
+    outline: Outline
+
+
+def track(
+    video: str | os.PathLike[str],
+    *,
+    disk_radius: float = 0.08,
+    pivot: tuple[float, float] | None = None,
+    progress: bool = False,
+) -> Measurement:
+    """Measure the motion of a disk with four coloured marks in a film.
+
+    Parameters
+    ----------
+    video : path
+        A film by a camera at rest, showing the whole disk with square marks red, orange, blue,
+        green (clockwise) near its rim.
+    disk_radius : float
+        Radius of the disk [m]; it sets the scale.
+    pivot : (u, v), optional
+        The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Measurement
+        ``Y, Z`` [m], ``beta`` [rad, unwrapped] at mid-exposure with standard errors and correlations,
+        one row per frame; a frame that cannot be used holds NaN and says why in ``flag``. ``meta``
+        holds the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``, ``exposure``, ...
+
+    Raises
+    ------
+    TrackError
+        The file is missing, empty, not a film or too short; no marks are found; the radius is not a
+        positive number.
+
+    Notes
+    -----
+    The contact point comes from the rolling constraint dY/dT = Z Omega, dZ/dT = -Y Omega + W, with a
+    drive of any constant velocity: a calibration that assumed no slip is never evidence about slip.
+
+    Examples
+    --------
+    >>> import udd
+    >>> m = udd.track("run.mp4", disk_radius=0.08)  # doctest: +SKIP
+    >>> m.to_csv("run.csv")  # doctest: +SKIP
+    """
+    return track_in_detail(video, disk_radius=disk_radius, pivot=pivot, progress=progress).measurement
+
+
+def track_in_detail(
+    video: str | os.PathLike[str],
+    *,
+    disk_radius: float = 0.08,
+    pivot: tuple[float, float] | None = None,
+    progress: bool = False,
+) -> Tracking:
+    """As `track`, with everything that was found on the way, in pixels."""
+    try:
+        radius = float(disk_radius)
+    except (TypeError, ValueError):
+        raise TrackError(f"disk_radius must be a number of metres, not {disk_radius!r}") from None
+    if not (math.isfinite(radius) and radius > 0):
+        raise TrackError(f"disk_radius must be positive and finite, not {disk_radius!r}")
+    film = Film(video)
+    look_over = survey(film)
+    sights = sightings(look_over.pictures)
+    seen = slowest(look_over.bursts, sights)
+    if len(seen) < FEWEST_SIGHTS:
+        raise TrackError(
+            f"{film.path}: no disk with marks in red, orange, blue and green (clockwise) was found: "
+            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all four"
+        )
+    known, rim = _prepare(film, look_over, sights, seen)
+    tracks = _follow(film, known, look_over.frames, progress)
+    camera = _camera(tracks, known, rim, radius, pivot)
+    spread = covariance(tracks, abs(known.look.marks[0].place))
+    values, sigma, rho = metres(tracks, spread, camera)
+    meta = _meta(film, look_over, tracks, known, rim, camera, radius)
+    measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
+    try:
+        check_length(measurement)
+    except ValueError as error:
+        raise TrackError(f"{film.path}: {error}") from None
+    return Tracking(measurement, tracks, known, camera, rim)
+
+
+def _prepare(
+    film: Film, look_over: Survey, sights: list[Sight | None], seen: list[tuple[Picture, Sight]]
+) -> tuple[Known, Outline]:
+    view, white = visible(seen)
+    look = learn(seen, view, white)
+    sharp: list[tuple[Picture, Pose]] = []
+    for picture, sight in seen[:SHARP]:
+        pose = Pose(sight.centre, sight.angle)
+        if align(picture.y, view, look, pose, Motion(), [MISFIT] * 4, gain_slack=0.3) is not None:
+            sharp.append((picture, pose))
+    if not sharp:
+        raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
+    try:
+        rim = outline(sharp, abs(look.marks[0].place), view)
+    except TrackError as error:
+        raise TrackError(f"{film.path}: {error}") from None
+    open_for = exposure(look_over.bursts, sights, look, view)
+    colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
+    return Known(_centred(look, rim.centre), view, colours, open_for), rim
+
+
+def _centred(look: Look, centre: complex) -> Look:
+    """Marks as seen from the disk's own centre, red exactly at beta."""
+    red = look.marks[0].place - centre
+    turn = red / abs(red) * 1j
+    marks = [
+        replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
+    ]
+    return replace(look, marks=marks)
+
+
+def _follow(film: Film, known: Known, frames: int, progress: bool) -> Tracks:
+    if not progress:
+        return follow(film.pictures(), known)
+    from tqdm import tqdm
+
+    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}") as bar:
+        return follow(film.pictures(), known, lambda _: bar.update())
+
+
+def _camera(tracks: Tracks, known: Known, rim: Outline, radius: float, given: tuple[float, float] | None) -> Camera:
+    scale = rim.radius / radius
+    angle, centre = np.array(tracks.angle), np.array(tracks.centre)
+    good = np.isfinite(angle)
+    found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
+    drive = complex(np.nan, np.nan) if found is None else np.conj(found.drive) / scale
+    common = {"scale": scale, "scale_sigma": rim.sigma / radius, "drive": drive}
+    if given is not None:
+        place = complex(float(given[0]), float(given[1]))
+        if not np.isfinite(place):
+            raise TrackError(f"pivot must be two finite numbers, not {given!r}")
+        return Camera(pivot=place, pivot_sigma=0.0, pivot_from="given", **common)
+    if found is not None:
+        sigma = float(np.sqrt(found.covariance[0, 0])) / scale
+        return Camera(pivot=found.place, pivot_sigma=sigma, pivot_from="rolling constraint", **common)
+    place_or_none = support(known.view)
+    if place_or_none is None:
+        raise TrackError(
+            "the motion does not tell where the contact point is (the disk hardly turns, or turns steadily) "
+            "and no support is seen: give pivot=(u, v) in pixels"
+        )
+    warnings.warn(
+        "the motion does not tell where the contact point is; it is taken from the support, to about "
+        f"{CLOSE_ENOUGH:.0f} mm",
+        stacklevel=4,
+    )
+    return Camera(pivot=place_or_none, pivot_sigma=CLOSE_ENOUGH * 1e-3, pivot_from="support", **common)
+
+
+def _meta(
+    film: Film, look_over: Survey, tracks: Tracks, known: Known, rim: Outline, camera: Camera, radius: float
+) -> dict[str, Any]:
+    lost = sum(flag != "" for flag in tracks.flag)
+    missing = max(0, film.promised - len(tracks.t))
+    if missing or film.broken:
+        warnings.warn(
+            f"{film.path}: {missing or film.broken} frames are missing or do not decode; the film may be cut off",
+            stacklevel=4,
+        )
+    return {
+        "source": film.path.name,
+        "R": radius,
+        "fps": film.fps,
+        "frames": len(tracks.t),
+        "frames_missing": missing,
+        "frames_lost": lost,
+        "exposure": known.exposure,
+        "px_per_m": camera.scale,
+        "px_per_m_sigma": camera.scale_sigma,
+        "pivot_u": camera.pivot.real,
+        "pivot_v": camera.pivot.imag,
+        "pivot_sigma": camera.pivot_sigma,
+        "pivot_from": camera.pivot_from,
+        "drive_seen": camera.drive.imag,
+        "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
+        "marks_px": [[m.place.real, m.place.imag] for m in known.look.marks],
+        "psf_px": known.look.psf,
+    }
+
+
+def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[NDArray[np.uint8]]:
+    """Frames of a film by their number, as RGB arrays (height, width, 3), for drawing upon."""
+    import cv2
+
+    wanted = {int(i) for i in frames}
+    found: dict[int, NDArray[np.uint8]] = {}
+    for picture in Film(video).pictures():
+        if picture.index in wanted:
+            h, w = picture.y.shape
+            planes = [picture.y, *(cv2.resize(p, (w, h), interpolation=cv2.INTER_LINEAR) for p in (picture.v, picture.u))]
+            found[picture.index] = np.asarray(cv2.cvtColor(np.dstack(planes), cv2.COLOR_YCrCb2RGB), dtype=np.uint8)
+            if len(found) == len(wanted):
+                break
+    lost = wanted - set(found)
+    if lost:
+        raise TrackError(f"{video}: there is no frame {min(lost)}")
+    return [found[int(i)] for i in frames]
