@@ -33,6 +33,15 @@ class Picture:
     v: Plane
 
 
+def light_of_codes(full_range: bool) -> NDArray[np.float64]:
+    """Amount of light, 0 to 255, for each brightness code of a film: the sRGB curve (IEC 61966-2-1).
+
+    A shutter adds up light, not codes; a streak is only symmetric about its middle in light.
+    """
+    x = np.arange(256) / 255 if full_range else np.clip((np.arange(256) - 16) / 219, 0, 1.08)
+    return np.asarray(255 * np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4))
+
+
 class Film:
     """A film file that can be run through any number of times.
 
@@ -54,6 +63,8 @@ class Film:
             self.promised = int(stream.frames)  # 0 where the container does not say
             rate = stream.average_rate or stream.guessed_rate
             self.fps = float(rate) if rate else math.nan
+            full = stream.codec_context.color_range == 2 or "yuvj" in (stream.codec_context.pix_fmt or "")
+            self.light = light_of_codes(full)  # of each brightness code
 
     def _open(self) -> Any:
         import av

@@ -26,7 +26,7 @@ class Outline:
     points: int
 
 
-def outline(frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[np.bool_]) -> Outline:
+def outline(frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[np.bool_], light: NDArray[np.float64]) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
     Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
@@ -36,7 +36,7 @@ def outline(frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[
     rays = np.exp(1j * angles)
     points, group = [], []
     for number, (picture, pose) in enumerate(frames):
-        r = _rim(picture.y, view, pose.centre, rays, reach)
+        r = _rim(light[picture.y], view, pose.centre, rays, reach)
         ok = np.isfinite(r)
         points.append(r[ok] * rays[ok] * np.exp(-1j * pose.angle))
         group.append(np.full(int(ok.sum()), number))
@@ -66,7 +66,7 @@ def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
     return [number == k for k in np.unique(number)]
 
 
-def _rim(y: NDArray[np.uint8], view: NDArray[np.bool_], centre: complex, rays: NDArray[np.complex128], reach: float) -> NDArray[np.float64]:
+def _rim(y: NDArray[np.float64], view: NDArray[np.bool_], centre: complex, rays: NDArray[np.complex128], reach: float) -> NDArray[np.float64]:
     """Radius of the half-height crossing along each ray [pixels], NaN where none is clear."""
     import cv2
 
@@ -74,7 +74,7 @@ def _rim(y: NDArray[np.uint8], view: NDArray[np.bool_], centre: complex, rays: N
     radii = np.arange(SPAN[0] * reach, SPAN[1] * reach, step)
     at = centre + radii[None, :] * rays[:, None]
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
-    profile = cv2.remap(y, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    profile = cv2.remap(y.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
     clear = cv2.remap(view.astype(np.uint8), map_u, map_v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
     fall = profile[:, :-4] - profile[:, 4:]
     k = np.argmax(fall, axis=1) + 2

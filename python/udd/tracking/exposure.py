@@ -71,7 +71,7 @@ def _misfit(picture: Picture, sight: Sight, whole: Motion, share: float, look: L
             continue
         cover = coverage(mark, pose.centre, pose.angle, motion, look.psf, (r0, r1, c0, c1))
         ok = view[r0:r1, c0:c1]
-        rest = picture.y[r0:r1, c0:c1] - mark.level * cover
+        rest = look.light[picture.y[r0:r1, c0:c1]] - mark.level * cover
         rest = rest[ok] - np.median(rest[ok]) if ok.any() else np.zeros(1)
         total += float((np.clip(rest, -60, 60) ** 2).sum())
     return total

@@ -22,7 +22,7 @@ WHOLE = 0.97  # share of its edges that a mark to learn from shows
 Seen = tuple[Pose, list[Sighting | None]]
 
 
-def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float) -> Look:
+def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float, light: NDArray[np.float64]) -> Look:
     """Fit shape, place and contrast of the four marks to the slowest survey frames.
 
     Poses and shapes are found in turns: poses from the present shapes, then one joint least-squares
@@ -31,26 +31,26 @@ def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white:
     frames = [(p.y, Pose(s.centre, s.angle)) for p, s in seen[:MOST]]
     reach = float(np.median([s.reach for _, s in seen]))
     half = float(np.sqrt(np.median([s.area for _, s in seen]))) / 2
-    noise = _noise(seen, view)
-    marks = [Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white)) for d in BODY]
+    noise = _noise(seen, view, light)
+    marks = [Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white, light)) for d in BODY]
     psf = 0.8
     for turn in range(ROUNDS):
-        look = Look(marks, psf, noise)
+        look = Look(marks, psf, noise, light)
         fits: list[Seen] = []
         for y, pose in frames:
             fit = align(y, view, look, pose, Motion(), [0.5, 0.5, MISFIT] if turn == 0 else [MISFIT], gain_slack=1.0)
             if fit is not None:
                 fits.append((pose, fit.sightings))
         marks, psf = _reshape(fits, look)
-    return Look(marks, psf, noise)
+    return Look(marks, psf, noise, light)
 
 
-def _noise(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_]) -> float:
-    """Brightness noise from second differences along rows near the disk's centre."""
+def _noise(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], light: NDArray[np.float64]) -> float:
+    """Noise of the light from second differences along rows near the disk's centre."""
     levels = []
     for picture, sight in seen[:20]:
         r, c, n = int(sight.centre.imag), int(sight.centre.real), int(0.4 * sight.reach)
-        patch = picture.y[max(0, r - n) : r + n, max(0, c - n) : c + n].astype(float)
+        patch = light[picture.y[max(0, r - n) : r + n, max(0, c - n) : c + n]]
         ok = view[max(0, r - n) : r + n, max(0, c - n) : c + n]
         ok = ok[:, 2:] & ok[:, 1:-1] & ok[:, :-2]
         second = patch[:, 2:] - 2 * patch[:, 1:-1] + patch[:, :-2]
@@ -59,15 +59,16 @@ def _noise(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_]) -> fl
     return max(1.0, float(np.median(levels)) if levels else 2.0)
 
 
-def _level(frames: Sequence[tuple[Plane, Pose]], place: complex, view: NDArray[np.bool_], white: float) -> float:
-    """Brightness of a mark's middle against the disk's."""
+def _level(frames: Sequence[tuple[Plane, Pose]], place: complex, view: NDArray[np.bool_], white: float, light: NDArray[np.float64]) -> float:
+    """Light of a mark's middle against the disk's."""
     values = []
     for y, pose in frames:
         at = pose.centre + place * np.exp(1j * pose.angle)
         r, c = round(at.imag), round(at.real)
         if 2 <= r < y.shape[0] - 2 and 2 <= c < y.shape[1] - 2 and view[r - 2 : r + 3, c - 2 : c + 3].all():
             values.append(float(np.median(y[r - 2 : r + 3, c - 2 : c + 3])))
-    return (float(np.median(values)) if values else 0.5 * white) - white
+    codes = [round(float(np.median(values))) if values else round(0.5 * white), round(white)]
+    return float(light[codes[0]] - light[codes[1]])
 
 
 def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:

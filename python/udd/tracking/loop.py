@@ -74,8 +74,10 @@ def _one(
         pose = Pose(guess.centre, guess.angle)
         fit = _hold(picture, known, pose, motion, CLOSE)
         if fit is not None:
-            motion = _motion(past, pose, picture.t, known.exposure)
-            fit = _hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
+            better = _motion(past, pose, picture.t, known.exposure)
+            if abs(_streak(better, known.look) - _streak(motion, known.look)) > 0.3:
+                motion = better
+                fit = _hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
             return "", fit, pose, _streak(motion, known.look)
     best = _anywhere(picture, known, guess, past)
     if best is None:

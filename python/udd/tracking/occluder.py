@@ -12,7 +12,7 @@ from .find import BODY, Sight
 
 DARKER = 0.12  # relative change of brightness that is no longer the bare disk
 TINTED = 9.0  # colour difference (of 127) that is no longer the bare disk
-MARGIN = 2  # pixels by which lens and compression smear the edge of the mask
+MARGIN = 2
 
 
 def visible(seen: Sequence[tuple[Picture, Sight]]) -> tuple[NDArray[np.bool_], float]:

@@ -12,6 +12,7 @@ from .marks import Mark, Motion, Sighting, locate
 from .rigid import Step, solve
 
 LEAST = 0.15  # share of a mark's edges below which it is not used
+SETTLED = 0.04  # pixels; Gauss-Newton's next correction would be far smaller
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,8 @@ class Look:
 
     marks: list[Mark]
     psf: float  # blur of lens and pixels, standard deviation [pixels]
-    noise: float  # of the brightness on a flat part of the disk
+    noise: float  # of the light on a flat part of the disk
+    light: NDArray[np.float64]  # amount of light for each code of the picture, (256,)
 
 
 @dataclass
@@ -58,7 +60,8 @@ def align(
     for misfit in rounds:
         psf = float(np.hypot(look.psf, 3 * misfit if misfit > 0.3 else 0.0))
         sightings = [
-            locate(y, view, m, pose.centre, pose.angle, motion, psf, look.noise, gain_slack, misfit) for m in look.marks
+            locate(y, look.light, view, m, pose.centre, pose.angle, motion, psf, look.noise, gain_slack, misfit)
+            for m in look.marks
         ]
         used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])
         step = solve(look.marks, sightings, pose.angle, used.astype(float))
@@ -68,6 +71,6 @@ def align(
         pose.angle += float(step.change[2])
         moved = float(np.hypot(np.hypot(*step.change[:2]), step.change[2] * abs(look.marks[0].place)))
         fit = Fit(step, sightings, used, moved)
-        if moved < 0.01 and misfit == rounds[-1]:
+        if moved < SETTLED and misfit == rounds[-1]:
             break
     return fit

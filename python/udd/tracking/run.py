@@ -135,7 +135,7 @@ def _prepare(
     film: Film, look_over: Survey, sights: list[Sight | None], seen: list[tuple[Picture, Sight]]
 ) -> tuple[Known, Outline]:
     view, white = visible(seen)
-    look = learn(seen, view, white)
+    look = learn(seen, view, white, film.light)
     sharp: list[tuple[Picture, Pose]] = []
     for picture, sight in seen[:SHARP]:
         pose = Pose(sight.centre, sight.angle)
@@ -144,7 +144,7 @@ def _prepare(
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
     try:
-        rim = outline(sharp, abs(look.marks[0].place), view)
+        rim = outline(sharp, abs(look.marks[0].place), view, film.light)
     except TrackError as error:
         raise TrackError(f"{film.path}: {error}") from None
     open_for = exposure(look_over.bursts, sights, look, view)
