@@ -31,32 +31,33 @@ def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white:
     frames = [(p.y, Pose(s.centre, s.angle)) for p, s in seen[:MOST]]
     reach = float(np.median([s.reach for _, s in seen]))
     half = float(np.sqrt(np.median([s.area for _, s in seen]))) / 2
-    noise = _noise(seen, view, light)
+    noise = _noise(seen, view, light, white)
     marks = [Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white, light)) for d in BODY]
-    psf = 0.8
+    psf, rim = 0.8, reach + 1.3 * half  # the true rim is found later, with these marks
     for turn in range(ROUNDS):
-        look = Look(marks, psf, noise, light)
+        look = Look(marks, psf, noise, light, rim)
         fits: list[Seen] = []
         for y, pose in frames:
             fit = align(y, view, look, pose, Motion(), [0.5, 0.5, MISFIT] if turn == 0 else [MISFIT], gain_slack=1.0)
             if fit is not None:
                 fits.append((pose, fit.sightings))
         marks, psf = _reshape(fits, look)
-    return Look(marks, psf, noise, light)
+    return Look(marks, psf, noise, light, rim)
 
 
-def _noise(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], light: NDArray[np.float64]) -> float:
-    """Noise of the light from second differences along rows near the disk's centre."""
+def _noise(
+    seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], light: NDArray[np.float64], white: float
+) -> float:
+    """Standard deviation of the light on bare parts near the disk's centre: grain, compression, stains."""
     levels = []
     for picture, sight in seen[:20]:
         r, c, n = int(sight.centre.imag), int(sight.centre.real), int(0.4 * sight.reach)
         patch = light[picture.y[max(0, r - n) : r + n, max(0, c - n) : c + n]]
-        ok = view[max(0, r - n) : r + n, max(0, c - n) : c + n]
-        ok = ok[:, 2:] & ok[:, 1:-1] & ok[:, :-2]
-        second = patch[:, 2:] - 2 * patch[:, 1:-1] + patch[:, :-2]
-        if ok.sum() > 200:
-            levels.append(float(np.sqrt(np.mean(np.clip(second[ok], -20, 20) ** 2) / 6)))
-    return max(1.0, float(np.median(levels)) if levels else 2.0)
+        bare = patch[view[max(0, r - n) : r + n, max(0, c - n) : c + n]]
+        if len(bare) > 200:
+            levels.append(1.48 * float(np.median(np.abs(bare - np.median(bare)))))
+    code = float(light[min(255, round(white) + 1)] - light[round(white)])
+    return max(1.5 * code, float(np.median(levels)) if levels else 0.0)  # compression flattens, wrongly
 
 
 def _level(frames: Sequence[tuple[Plane, Pose]], place: complex, view: NDArray[np.bool_], white: float, light: NDArray[np.float64]) -> float:

@@ -118,12 +118,14 @@ def locate(
     motion: Motion,
     psf: float,
     noise: float,
+    rim: float,
     gain_slack: float = 0.1,
     misfit: float = MISFIT,
 ) -> Sighting | None:
     """Offset of a mark from its expected place by least squares on the visible pixels.
 
-    `light` turns the codes of the picture into amounts of light (256 entries), in which blur adds up. The picture in the window is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
+    `light` turns the codes of the picture into amounts of light (256 entries), in which blur adds up; `rim` is the
+    distance from the centre [pixels] up to which the disk is. The picture in the window is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
     gain, du, dv free, the gain within `gain_slack` of 1. `view` is False where something stands in
     front. Pixels that nothing of this explains (a hand, a cable) lose their weight.
     """
@@ -135,7 +137,9 @@ def locate(
     grad_v, grad_u = np.gradient(cover)
     edge2 = grad_u * grad_u + grad_v * grad_v
     total = float(edge2.sum())
-    seen = view[r0:r1, c0:c1].ravel()
+    away_u, away_v = np.arange(c0, c1) - centre.real, np.arange(r0, r1) - centre.imag
+    inside = np.add.outer(away_v**2, away_u**2) < (rim - 0.5 * abs(motion.shift)) ** 2
+    seen = (view[r0:r1, c0:c1] & inside).ravel()
     if total <= 0 or seen.sum() < 25:
         return None
     patch = light[y[r0:r1, c0:c1]].ravel()

@@ -23,6 +23,7 @@ class Look:
     psf: float  # blur of lens and pixels, standard deviation [pixels]
     noise: float  # of the light on a flat part of the disk
     light: NDArray[np.float64]  # amount of light for each code of the picture, (256,)
+    rim: float  # distance from the centre up to which the picture shows the disk [pixels]
 
 
 @dataclass
@@ -60,7 +61,7 @@ def align(
     for misfit in rounds:
         psf = float(np.hypot(look.psf, 3 * misfit if misfit > 0.3 else 0.0))
         sightings = [
-            locate(y, look.light, view, m, pose.centre, pose.angle, motion, psf, look.noise, gain_slack, misfit)
+            locate(y, look.light, view, m, pose.centre, pose.angle, motion, psf, look.noise, look.rim, gain_slack, misfit)
             for m in look.marks
         ]
         used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])

@@ -32,6 +32,7 @@ from .survey import Survey, slowest, survey
 
 FEWEST_SIGHTS = 3  # survey frames that must show all four marks
 SHARP = 60  # slow frames from which the rim is measured
+RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 
 
@@ -149,7 +150,8 @@ def _prepare(
         raise TrackError(f"{film.path}: {error}") from None
     open_for = exposure(look_over.bursts, sights, look, view)
     colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
-    return Known(_centred(look, rim.centre), view, colours, open_for), rim
+    look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
+    return Known(look, view, colours, open_for), rim
 
 
 def _centred(look: Look, centre: complex) -> Look:
