@@ -5,3 +5,66 @@ model does.
 """
 
 from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+# Every public name and the module that it comes from; a module itself where both are the same. Nothing is
+# imported before it is used, so that `import udd` stays fast. The names must not be those of other modules.
+_PUBLIC = {
+    "DLE": "udd.models",
+    "ConvergenceWarning": "udd.errors",
+    "Discovery": "udd.discovery",
+    "Disk": "udd.models",
+    "Fit": "udd.fitting",
+    "Measurement": "udd.measurement",
+    "Pendulum": "udd.models",
+    "Trajectory": "udd.trajectory",
+    "UddError": "udd.errors",
+    "discover": "udd.discovery",
+    "effects": "udd.effects",
+    "errors": "udd.errors",
+    "fit": "udd.fitting",
+    "lyapunov": "udd.exponents",
+    "plot": "udd.plot",
+    "read_measurement": "udd.measurement",
+    "render": "udd.film",
+    "simulate": "udd.trajectory",
+    "track": "udd.tracking",
+}
+
+__all__ = [*_PUBLIC]
+
+if TYPE_CHECKING:  # the same for type checkers
+    from udd import effects as effects
+    from udd import errors as errors
+    from udd import plot as plot
+    from udd.discovery import Discovery as Discovery
+    from udd.discovery.discover import discover as discover
+    from udd.errors import ConvergenceWarning as ConvergenceWarning
+    from udd.errors import UddError as UddError
+    from udd.exponents import lyapunov as lyapunov
+    from udd.film import render as render
+    from udd.fitting import Fit as Fit
+    from udd.fitting.fit import fit as fit
+    from udd.measurement import Measurement as Measurement
+    from udd.measurement import read_measurement as read_measurement
+    from udd.models import DLE as DLE
+    from udd.models import Disk as Disk
+    from udd.models import Pendulum as Pendulum
+    from udd.tracking import track as track
+    from udd.trajectory import Trajectory as Trajectory
+    from udd.trajectory import simulate as simulate
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'udd' has no attribute {name!r}")
+    module = importlib.import_module(_PUBLIC[name])
+    value = module if _PUBLIC[name] == f"udd.{name}" else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PUBLIC})

@@ -5,3 +5,19 @@ from __future__ import annotations
 
 class UddError(ValueError):
     """Base class of what `udd` raises for bad input."""
+
+
+class ModelError(UddError):
+    """A model, an effect, a state or an option of a run cannot be used."""
+
+
+class IntegrationError(UddError):
+    """A run could not go on: the solution blows up, or leaves the model's domain where it must not."""
+
+
+class FitError(UddError):
+    """A measurement cannot be fitted by a model."""
+
+
+class ConvergenceWarning(UserWarning):
+    """A result's error bar does not meet the tolerance asked for."""

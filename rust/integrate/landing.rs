@@ -85,7 +85,7 @@ where
             let mut high = (PROBES[i], values[i]);
             if i == 0 && start <= ON_TARGET * scale {
                 // On the target: either it goes to the right side for a moment only, or not at all.
-                match excursion(&on, &mut high, ON_TARGET * scale) {
+                match excursion(on, &mut high, ON_TARGET * scale) {
                     Some(point) => low = point,
                     None => return Find::Stale(target),
                 }

@@ -48,6 +48,8 @@ pub enum Failure {
     TooManySteps { t: f64, limit: u64 },
     #[error("the law switches back and forth without end at t = {t}")]
     Chattering { t: f64 },
+    #[error("the disk left the wheels at t = {t}")]
+    LeftDomain { t: f64 },
     #[error("interrupted")]
     Interrupted,
 }

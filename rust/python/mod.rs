@@ -1,1 +1,22 @@
-//! Under construction.
+//! The Python module `udd._core`: conversion, errors, interrupts; no numerics.
+
+mod effects;
+mod errors;
+mod estimate;
+mod interrupt;
+mod lyapunov;
+mod model;
+mod simulate;
+
+use pyo3::prelude::*;
+
+/// The compiled core of udd.
+#[pymodule(gil_used = false)]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    effects::register(module)?;
+    model::register(module)?;
+    simulate::register(module)?;
+    lyapunov::register(module)?;
+    estimate::register(module)?;
+    Ok(())
+}

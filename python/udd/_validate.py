@@ -1,0 +1,54 @@
+"""Checks of what users hand over: each says in one sentence what is wrong."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, SupportsFloat, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd.errors import ModelError
+
+
+def number(name: str, value: object, *, least: float | None = None, above: float | None = None) -> float:
+    """A finite float, at least `least` or above `above`.
+
+    Raises
+    ------
+    ModelError
+        Naming the parameter.
+    """
+    try:
+        if isinstance(value, (str, bytes, bool, np.bool_)):
+            raise TypeError
+        result = float(cast("SupportsFloat", value))
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} must be a number, not {value!r}") from None
+    if not math.isfinite(result):
+        raise ModelError(f"{name} must be finite, not {result}")
+    if least is not None and result < least:
+        raise ModelError(f"{name} must not be below {least:g}, not {result:g}")
+    if above is not None and result <= above:
+        raise ModelError(f"{name} must be above {above:g}, not {result:g}")
+    return result
+
+
+def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """A C-contiguous float64 array of finite numbers.
+
+    Raises
+    ------
+    ModelError
+        Naming the argument.
+    """
+    try:
+        given: NDArray[Any] = np.asarray(value)
+        if given.dtype.kind not in "iuf":
+            raise TypeError
+        result = np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} must be numbers") from None
+    if not np.isfinite(result).all():
+        raise ModelError(f"{name} must be finite")
+    return result

@@ -1,0 +1,293 @@
+"""Physical effects that the plain models lack.
+
+Each effect of the library has a constructor here, named after it: ``relaxation(b=5.0)``,
+``quadratic_drag(c=1e-4)``, ... They follow from the core's library, where each effect is one file that
+states its formula, its parameters with units and ranges, and the equation that it enters;
+:func:`library` lists them.
+
+Examples
+--------
+>>> from udd import Disk, effects
+>>> effects.relaxation(b=5.0)
+relaxation(b=5.0, momentum='constraint')
+>>> model = Disk(0.039, effects=[effects.relaxation(b=5.0), effects.quadratic_drag(c=1e-4)])
+>>> model.parameters["relaxation.b"]
+5.0
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from udd import _core
+from udd._validate import number
+from udd.errors import ModelError
+
+__all__ = ["Effect", "Parameter", "Spec", "library"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+        The unit is SI, empty where dimensionless.
+    default : float
+        The value taken where none is given.
+    range : tuple of float
+        The physically sensible range.
+    role : str
+        ``"amplitude"`` (the effect is proportional to it and absent where all amplitudes are zero),
+        ``"shape"`` or ``"frequency"``.
+    grid : tuple of float
+        Values that a scan of candidates tries, for a shape.
+    """
+
+    name: str
+    unit: str
+    default: float
+    range: tuple[float, float]
+    role: str
+    grid: tuple[float, ...]
+
+    def check(self, effect: str, value: object, *, strict: bool) -> float:
+        """The value as a float, within the range; amplitudes may leave it unless `strict`."""
+        result = number(f"{self.name} of {effect}", value)
+        low, high = self.range
+        if (strict or self.role != "amplitude") and not low <= result <= high:
+            unit = f" {self.unit}" if self.unit else ""
+            raise ModelError(
+                f"{self.name} of {effect} must lie between {low:g} and {high:g}{unit}, not at {result:g}"
+            )
+        return result
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What is said of an effect beside its formula.
+
+    Attributes
+    ----------
+    name : str
+        Its constructor's name in this module.
+    title, equation, meaning : str
+        What a reader calls it, its formula, and what it would mean physically.
+    slots : tuple of str
+        Where it enters the equations: ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``.
+    momenta : tuple of str
+        How it may enter the angular momentum, the default first: ``"consistent"`` (the contact's
+        velocity and its rate of change exert a torque) or ``"constraint"`` (only the rolling constraint
+        changes, as in the paper). Empty for torque and friction.
+    parameters : tuple of Parameter
+        In the order of the formula.
+    """
+
+    name: str
+    title: str
+    equation: str
+    meaning: str
+    slots: tuple[str, ...]
+    momenta: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+
+    def make(self, *, momentum: str | None = None, **values: float) -> Effect:
+        """The effect with these parameter values; the others take their defaults.
+
+        Raises
+        ------
+        ModelError
+            An unknown parameter, a value outside its range, or a momentum that the effect does not have.
+        """
+        known = {p.name: p for p in self.parameters}
+        for name in values:
+            if name not in known:
+                raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
+        given = tuple(p.check(self.name, values.get(p.name, p.default), strict=True) for p in self.parameters)
+        return Effect(self.name, given, momentum)
+
+
+@functools.cache
+def _specs() -> Mapping[str, Spec]:
+    """The core's library by name."""
+    specs = {}
+    for entry in _core.effect_library():
+        parameters = tuple(
+            Parameter(p["name"], p["unit"], p["default"], p["range"], p["role"], tuple(p["scan"]))
+            for p in entry["parameters"]
+        )
+        name = entry["name"]
+        texts = entry["title"], entry["equation"], entry["meaning"]
+        specs[name] = Spec(name, *texts, tuple(entry["slots"]), tuple(entry["momenta"]), parameters)
+    return MappingProxyType(specs)
+
+
+def library() -> tuple[Spec, ...]:
+    """Every effect that there is.
+
+    Examples
+    --------
+    >>> from udd import effects
+    >>> for spec in effects.library()[:2]:
+    ...     print(f"{spec.title}: {spec.equation}")
+    quadratic drag: torque = -c |Omega| Omega
+    cubic drag: torque = -c Omega^3
+    """
+    return tuple(_specs().values())
+
+
+@dataclass(frozen=True, repr=False)
+class Effect:
+    """An effect with its numbers; made by the constructors of this module.
+
+    Parameters
+    ----------
+    name : str
+        One of the library.
+    values : tuple of float
+        Parameter values in the library's order. Amplitudes may lie outside their physical range, as on
+        the way of a fit; shapes and frequencies may not.
+    momentum : str, optional
+        ``"consistent"`` or ``"constraint"``, where the effect has the choice; by default its first.
+
+    Raises
+    ------
+    ModelError
+        An unknown name, a number that is not finite or out of range, a momentum that does not apply.
+    """
+
+    name: str
+    values: tuple[float, ...]
+    momentum: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.name not in _specs():
+            raise ModelError(f"no effect is called {self.name!r}; there are {', '.join(_specs())}")
+        spec = self.spec
+        if len(self.values) != len(spec.parameters):
+            raise ModelError(f"{self.name} takes {len(spec.parameters)} numbers, not {len(self.values)}")
+        checked = (
+            p.check(self.name, v, strict=False) for p, v in zip(spec.parameters, self.values, strict=True)
+        )
+        object.__setattr__(self, "values", tuple(checked))
+        if self.momentum is None and spec.momenta:
+            object.__setattr__(self, "momentum", spec.momenta[0])
+        if self.momentum is not None and self.momentum not in spec.momenta:
+            allowed = " or ".join(map(repr, spec.momenta)) or "left out: it enters no velocity"
+            raise ModelError(f"momentum of {self.name} must be {allowed}, not {self.momentum!r}")
+
+    @property
+    def spec(self) -> Spec:
+        """What the library says of it."""
+        return _specs()[self.name]
+
+    @property
+    def title(self) -> str:
+        """What a reader calls it."""
+        return self.spec.title
+
+    @property
+    def equation(self) -> str:
+        """Its formula."""
+        return self.spec.equation
+
+    @property
+    def meaning(self) -> str:
+        """What it means physically."""
+        return self.spec.meaning
+
+    @property
+    def slots(self) -> tuple[str, ...]:
+        """Where it enters the equations."""
+        return self.spec.slots
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Its parameters' values by name."""
+        return dict(zip((p.name for p in self.spec.parameters), self.values, strict=True))
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        """The names of the parameters to which it is proportional."""
+        return tuple(p.name for p in self.spec.parameters if p.role == "amplitude")
+
+    @property
+    def expression(self) -> str:
+        """Its formula with the numbers put in.
+
+        Examples
+        --------
+        >>> from udd import effects
+        >>> effects.quadratic_drag(c=1.5e-4).expression
+        'torque = -0.00015 |Omega| Omega'
+        """
+        values = self.parameters
+
+        def put(match: re.Match[str]) -> str:
+            value = values[match[0]]
+            return f"({value:.4g})" if value < 0 else f"{value:.4g}"
+
+        names = "|".join(map(re.escape, values))
+        return re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, self.equation)
+
+    def replace(self, *, momentum: str | None = None, **values: float) -> Effect:
+        """The effect with other values of some parameters.
+
+        Raises
+        ------
+        ModelError
+            An unknown parameter or a value that is not usable.
+        """
+        new = self.parameters
+        for name, value in values.items():
+            if name not in new:
+                raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(new)}")
+            new[name] = value
+        return Effect(self.name, tuple(new.values()), momentum or self.momentum)
+
+    def __repr__(self) -> str:
+        items = [f"{name}={value!r}" for name, value in self.parameters.items()]
+        if self.momentum is not None:
+            items.append(f"momentum={self.momentum!r}")
+        return f"{self.name}({', '.join(items)})"
+
+
+def _constructor(spec: Spec) -> Callable[..., Effect]:
+    """The function that makes an effect, with its signature and documentation."""
+    kind = inspect.Parameter.KEYWORD_ONLY
+    arguments = [inspect.Parameter(p.name, kind, default=p.default) for p in spec.parameters]
+    if spec.momenta:
+        arguments.append(inspect.Parameter("momentum", kind, default=spec.momenta[0]))
+
+    def make(*, momentum: str | None = None, **values: float) -> Effect:
+        return spec.make(momentum=momentum, **values)
+
+    lines = [f"{spec.title[0].upper()}{spec.title[1:]}: ``{spec.equation}``.", ""]
+    lines += [f"{spec.meaning[0].upper()}{spec.meaning[1:]}.", "", "Parameters", "----------"]
+    for p in spec.parameters:
+        low, high = p.range
+        lines += [f"{p.name} : float", f"    {p.role.capitalize()} [{p.unit or '1'}], {low:g} to {high:g}."]
+    if spec.momenta:
+        lines += [f"momentum : {{{', '.join(map(repr, spec.momenta))}}}", "    How it enters the momentum."]
+    lines += ["", "Returns", "-------", "Effect"]
+    make.__name__ = make.__qualname__ = spec.name
+    make.__doc__ = "\n".join(lines)
+    make.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
+    return make
+
+
+def __getattr__(name: str) -> Callable[..., Effect]:
+    if name in _specs():
+        made = globals()[name] = _constructor(_specs()[name])
+        return made
+    raise AttributeError(f"no effect is called {name!r}; there are {', '.join(_specs())}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_specs()])

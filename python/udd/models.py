@@ -1,0 +1,376 @@
+"""What is integrated: the equations of the paper, and of a pendulum."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._validate import array, number
+from udd.effects import Effect
+from udd.errors import ModelError
+
+__all__ = ["DLE", "Disk", "Model", "Pendulum"]
+
+
+class Model:
+    """What all models have in common. Models are immutable: changes make a new one."""
+
+    kind: ClassVar[str]
+    """``"dle"``, ``"disk"`` or ``"pendulum"``."""
+    state_names: ClassVar[tuple[str, ...]]
+    """The names of the state's components, in order."""
+    state_units: ClassVar[tuple[str, ...]]
+    """Their units, empty where dimensionless."""
+    _plain: ClassVar[tuple[str, ...]]
+    _options: ClassVar[tuple[str, ...]] = ("effects",)
+    effects: tuple[Effect, ...]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Name and value of every parameter, in order; an effect's are called ``effect.name``."""
+        result = {name: float(getattr(self, name)) for name in self._plain}
+        for effect in self.effects:
+            result.update({f"{effect.name}.{name}": value for name, value in effect.parameters.items()})
+        return result
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every parameter, empty where dimensionless."""
+        return dict(_core.model_parameters(self))
+
+    @property
+    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None]], bool]:
+        """What the core needs to know."""
+        effects = [(effect.name, effect.momentum) for effect in self.effects]
+        return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """The model with other values of some parameters.
+
+        Parameters
+        ----------
+        values : mapping
+            Any of :attr:`parameters`. As on the way of a fit, friction, drive and amplitudes may leave their
+            physical ranges; sizes must stay positive and everything finite.
+
+        Raises
+        ------
+        ModelError
+            An unknown name or an unusable value.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.Disk(0.039).with_parameters({"W": 0.05}).W
+        0.05
+        """
+        known = self.parameters
+        for name in values:
+            if name not in known:
+                raise ModelError(
+                    f"{type(self).__name__} has no parameter {name!r}; it has {', '.join(known)}"
+                )
+        effects = []
+        for effect in self.effects:
+            own = {
+                name: values[key] for name in effect.parameters if (key := f"{effect.name}.{name}") in values
+            }
+            effects.append(effect.replace(momentum=None, **own) if own else effect)
+        return self._changed({n: values[n] for n in self._plain if n in values}, tuple(effects))
+
+    def with_effects(self, effects: Iterable[Effect]) -> Self:
+        """The model with these effects instead of its own.
+
+        Raises
+        ------
+        ModelError
+            An effect given twice, or one that the model cannot have.
+        """
+        return self._changed({}, self._effects(effects))
+
+    def _changed(self, plain: Mapping[str, float], effects: tuple[Effect, ...]) -> Self:
+        """A copy with other numbers, checked for what would break the equations only."""
+        new = object.__new__(type(self))
+        for name, value in vars(self).items():
+            object.__setattr__(new, name, value)
+        for name, value in plain.items():
+            positive = 0.0 if name in ("R", "length", "inertia") else None
+            object.__setattr__(new, name, number(name, value, above=positive))
+        object.__setattr__(new, "effects", effects)
+        return new
+
+    def _effects(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+        if isinstance(effects, Effect):
+            effects = (effects,)
+        result = tuple(effects)
+        for effect in result:
+            if not isinstance(effect, Effect):
+                raise ModelError(f"effects must be made by udd.effects, not {effect!r}")
+            if self.kind == "pendulum" and effect.momentum is not None:
+                raise ModelError(
+                    f"a pendulum takes effects through torque or friction only, not {effect.name}"
+                )
+        names = [effect.name for effect in result]
+        for name in names:
+            if names.count(name) > 1:
+                raise ModelError(f"the effect {name} is given twice")
+        return result
+
+    def rates(self, t: ArrayLike, state: ArrayLike) -> NDArray[np.float64]:
+        """The right-hand side of the equations of motion.
+
+        Parameters
+        ----------
+        t : array_like, shape (...)
+            Times; broadcast against the states.
+        state : array_like, shape (..., dim)
+            States.
+
+        Returns
+        -------
+        ndarray, shape (..., dim)
+            The state's time derivatives.
+
+        Raises
+        ------
+        ModelError
+            Numbers that are not finite, or shapes that do not fit.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.DLE(1.0).rates(0.0, [1.0, 1.0, 0.5])
+        array([0. , 0.5, 0. ])
+        """
+        times, states = array("t", t), array("state", state)
+        dim = len(self.state_names)
+        if states.ndim == 0 or states.shape[-1] != dim:
+            raise ModelError(
+                f"the state must have {dim} components ({', '.join(self.state_names)}), not {states.shape}"
+            )
+        try:
+            shape = np.broadcast_shapes(times.shape, states.shape[:-1])
+        except ValueError:
+            raise ModelError(f"times {times.shape} and states {states.shape} do not fit together") from None
+        flat_t = np.broadcast_to(times, shape).ravel()
+        flat_x = np.broadcast_to(states, (*shape, dim)).ravel()
+        return _core.rates(self, flat_t, flat_x).reshape(*shape, dim)
+
+    def replace(self, **changes: Any) -> Self:
+        """The model with other arguments of its constructor or other parameters.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of the constructor, or parameters of effects as in ``**{"relaxation.b": 5.0}``.
+
+        Raises
+        ------
+        ModelError
+            An unknown name or an unusable value.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.Disk(0.039).replace(edge="ignore").edge
+        'ignore'
+        """
+        dotted = {name: changes.pop(name) for name in list(changes) if "." in name}
+        arguments = {name: getattr(self, name) for name in (*self._plain, *self._options)}
+        for name in changes:
+            if name not in arguments:
+                raise ModelError(f"{type(self).__name__} has no {name!r}; it has {', '.join(arguments)}")
+        new = type(self)(**(arguments | changes))
+        return new.with_parameters(dotted) if dotted else new
+
+
+@dataclass(frozen=True)
+class DLE(Model):
+    """The diffusionless Lorenz equations, dimensionless, for the state ``[omega, y, z]``.
+
+    ::
+
+        omega' = y - omega
+        y'     = omega z
+        z'     = -omega y + w - B w z
+
+    Parameters
+    ----------
+    w : float
+        The drive, not negative.
+    B : float
+        The damping of the rolling constraint (the paper's B; 0.2 there), not negative.
+
+    Raises
+    ------
+    ModelError
+        A parameter that is negative or not finite.
+
+    Notes
+    -----
+    With ``L = 2 k0^2/(g R^2)`` and ``tau = R^2/(2 k0)`` the disk has ``w = tau W/L``. Time averages on every
+    bounded orbit are exact: ``<omega y> = <omega^2> = w`` and ``<z> = 0`` for ``B = 0``.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.DLE(1.0).rates(0.0, [1.0, 1.0, 0.0])
+    array([0., 0., 0.])
+    """
+
+    kind: ClassVar[str] = "dle"
+    state_names: ClassVar[tuple[str, ...]] = ("omega", "y", "z")
+    state_units: ClassVar[tuple[str, ...]] = ("", "", "")
+    _plain: ClassVar[tuple[str, ...]] = ("w", "B")
+    _options: ClassVar[tuple[str, ...]] = ()
+
+    w: float
+    B: float = 0.0
+    effects: tuple[Effect, ...] = field(default=(), init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "w", number("w", self.w, least=0.0))
+        object.__setattr__(self, "B", number("B", self.B, least=0.0))
+
+    def with_effects(self, effects: Iterable[Effect]) -> Self:
+        """The dimensionless equations take no effects; use :class:`Disk`."""
+        if tuple(effects):
+            raise ModelError("the dimensionless equations take no effects; use udd.Disk")
+        return self
+
+
+@dataclass(frozen=True)
+class Disk(Model):
+    """The upward-driven disk, per unit mass, for the state ``[Omega, Y, Z, beta]`` in rad/s, m, m, rad.
+
+    ::
+
+        dY/dT = Z Omega        dZ/dT = -Y Omega + W        dbeta/dT = Omega
+        (R^2/2 + Y^2 + Z^2) dOmega/dT = g Y - k Omega - Z W Omega,   k = max(k1 - k2 |Omega|, k0)
+
+    (Y, Z) is the centre of the disk relative to the contact with the wheels, Y to the right, Z up; angles are
+    clockwise positive. Effects add to the torque, to k, and to the contact's velocity (0, W).
+
+    Parameters
+    ----------
+    W : float
+        Drive speed [m/s], not negative.
+    R : float
+        Radius of the disk [m].
+    g : float
+        Gravity [m/s^2].
+    k0, k1, k2 : float
+        Friction: floor at high speed [m^2/s], value at rest [m^2/s], fall with the speed [m^2].
+    effects : iterable of Effect
+        See :mod:`udd.effects`.
+    edge : {"stop", "ignore"}
+        What happens where the contact reaches the edge, ``Y^2 + Z^2 = R^2``: the run ends with the outcome
+        "ejected", or the equations are followed beyond their domain.
+
+    Raises
+    ------
+    ModelError
+        A parameter that is not finite or has the wrong sign, an effect given twice.
+
+    References
+    ----------
+    The equations are the paper's full model (paper/upward_driven_disk.tex), with its constants as defaults.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.Disk(0.039).rates(0.0, [0.0, 0.01, 0.0, 0.0])
+    array([29.72727273,  0.        ,  0.039     ,  0.        ])
+    """
+
+    kind: ClassVar[str] = "disk"
+    state_names: ClassVar[tuple[str, ...]] = ("Omega", "Y", "Z", "beta")
+    state_units: ClassVar[tuple[str, ...]] = ("rad/s", "m", "m", "rad")
+    _plain: ClassVar[tuple[str, ...]] = ("W", "R", "g", "k0", "k1", "k2")
+    _options: ClassVar[tuple[str, ...]] = ("effects", "edge")
+
+    W: float
+    R: float = field(default=0.08, kw_only=True)
+    g: float = field(default=9.81, kw_only=True)
+    k0: float = field(default=0.012, kw_only=True)
+    k1: float = field(default=0.103, kw_only=True)
+    k2: float = field(default=0.055, kw_only=True)
+    effects: tuple[Effect, ...] = field(default=(), kw_only=True)
+    edge: str = field(default="stop", kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "R", number("R", self.R, above=0.0))
+        for name in ("W", "g", "k0", "k1", "k2"):
+            object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
+        object.__setattr__(self, "effects", self._effects(self.effects))
+        if self.edge not in ("stop", "ignore"):
+            raise ModelError(f'edge must be "stop" or "ignore", not {self.edge!r}')
+
+
+@dataclass(frozen=True, init=False)
+class Pendulum(Model):
+    """A pendulum, per unit mass, for the state ``[Omega, theta]`` in rad/s, rad, with ``theta = 0`` hanging.
+
+    ::
+
+        inertia dOmega/dT = -g length sin(theta) - k0 Omega        dtheta/dT = Omega
+
+    Parameters
+    ----------
+    length : float
+        Distance from the pivot to the centre of mass [m].
+    inertia : float, optional
+        Moment of inertia about the pivot per unit mass [m^2]; by default `length` squared, a point mass.
+    g : float
+        Gravity [m/s^2].
+    k0 : float
+        Viscous friction [m^2/s].
+    effects : iterable of Effect
+        Those that enter through torque or friction; see :mod:`udd.effects`.
+
+    Raises
+    ------
+    ModelError
+        A parameter that is not finite or has the wrong sign, an effect that moves the pivot.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.Pendulum(0.5).inertia
+    0.25
+    """
+
+    kind: ClassVar[str] = "pendulum"
+    state_names: ClassVar[tuple[str, ...]] = ("Omega", "theta")
+    state_units: ClassVar[tuple[str, ...]] = ("rad/s", "rad")
+    _plain: ClassVar[tuple[str, ...]] = ("length", "inertia", "g", "k0")
+
+    length: float
+    inertia: float
+    g: float
+    k0: float
+    effects: tuple[Effect, ...]
+
+    def __init__(
+        self,
+        length: float,
+        *,
+        inertia: float | None = None,
+        g: float = 9.81,
+        k0: float = 0.0,
+        effects: Iterable[Effect] = (),
+    ) -> None:
+        size = number("length", length, above=0.0)
+        object.__setattr__(self, "length", size)
+        default = size * size
+        object.__setattr__(
+            self, "inertia", default if inertia is None else number("inertia", inertia, above=0.0)
+        )
+        object.__setattr__(self, "g", number("g", g, least=0.0))
+        object.__setattr__(self, "k0", number("k0", k0, least=0.0))
+        object.__setattr__(self, "effects", self._effects(effects))

@@ -1,0 +1,244 @@
+"""Runs of a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._validate import array, number
+from udd.errors import ModelError
+from udd.models import Model
+
+__all__ = ["Event", "Events", "Stats", "Trajectory", "simulate"]
+
+
+class Event(NamedTuple):
+    """Something that happened on the way.
+
+    Attributes
+    ----------
+    kind : str
+        ``"reversal"`` (Omega = 0), ``"friction kink"`` (k reaches its floor), ``"edge"`` (the disk leaves
+        the wheels).
+    t : float
+        When.
+    state : ndarray, shape (dim,)
+        The state then, on the event's surface to 1e-12 of its size.
+    """
+
+    kind: str
+    t: float
+    state: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """The events of a run, in order.
+
+    Attributes
+    ----------
+    kind : tuple of str
+        What each is.
+    t : ndarray, shape (n,)
+        When.
+    state : ndarray, shape (n, dim)
+        The states then.
+    """
+
+    kind: tuple[str, ...]
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def __getitem__(self, index: int) -> Event:
+        return Event(self.kind[index], float(self.t[index]), self.state[index])
+
+    def __iter__(self) -> Iterator[Event]:
+        return (self[index] for index in range(len(self)))
+
+    def of(self, kind: str) -> Events:
+        """The events of one kind."""
+        chosen = np.array([own == kind for own in self.kind], dtype=bool)
+        return Events(tuple(own for own in self.kind if own == kind), self.t[chosen], self.state[chosen])
+
+
+class Stats(NamedTuple):
+    """What the work was: accepted and rejected steps, evaluations of the rates."""
+
+    accepted: int
+    rejected: int
+    evaluations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A run.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times, in s (dimensionless for the DLE).
+    state : ndarray, shape (n, dim)
+        States, in the order of ``model.state_names``. The components are attributes too: ``run.Omega``.
+    events : Events
+        Crossings of the surfaces where the law changes, and of the disk's edge.
+    outcome : {"finished", "ejected"}
+        An ejected run ends on the disk's edge; its last time and state are there.
+    stats : Stats
+        Accepted and rejected steps, evaluations of the rates.
+    model : Model
+        What was run.
+    dense : callable or None
+        The core's record of all steps where ``simulate(..., dense=True)`` was asked for; call the
+        trajectory instead.
+    """
+
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+    events: Events
+    outcome: str
+    stats: Stats
+    model: Model
+    dense: _core.Dense | None = None
+
+    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The state at any times within the run, to order 4.
+
+        Parameters
+        ----------
+        t : array_like, shape (...)
+            Times.
+
+        Returns
+        -------
+        ndarray, shape (..., dim)
+
+        Raises
+        ------
+        ModelError
+            The run kept no dense output.
+        IntegrationError
+            A time outside the run.
+        """
+        if self.dense is None:
+            raise ModelError("this run kept no dense output; use simulate(..., dense=True)")
+        times = array("t", t)
+        return self.dense(times.ravel()).reshape(*times.shape, len(self.model.state_names))
+
+    def __getattr__(self, name: str) -> NDArray[np.float64]:
+        # Only for what is not an attribute otherwise; `model` is missing while unpickling.
+        names = self.__dict__["model"].state_names if "model" in self.__dict__ else ()
+        if name in names:
+            column: NDArray[np.float64] = self.state[:, names.index(name)]
+            return column
+        raise AttributeError(f"a trajectory of this model has no {name!r}")
+
+    def __dir__(self) -> list[str]:
+        return sorted([*super().__dir__(), *self.model.state_names])
+
+    def __repr__(self) -> str:
+        return (
+            f"<Trajectory of {self.model!r}: {len(self.t)} states, t = {self.t[0]:g} to {self.t[-1]:g}, "
+            f"{len(self.events)} events, {self.outcome}>"
+        )
+
+
+def tolerances(rtol: float, atol: float) -> tuple[float, float]:
+    """Checked tolerances."""
+    rtol, atol = number("rtol", rtol, least=0.0), number("atol", atol, least=0.0)
+    if rtol < 1e-14 and atol <= 0.0:
+        raise ModelError("one of rtol (at least 1e-14) and atol must be positive")
+    return rtol, atol
+
+
+def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
+    """A checked initial state."""
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    state = array("state0", state0)
+    if state.shape != (len(model.state_names),):
+        raise ModelError(
+            f"state0 must have the {len(model.state_names)} components {', '.join(model.state_names)}, "
+            f"not shape {state.shape}"
+        )
+    return state
+
+
+def simulate(
+    model: Model,
+    t: ArrayLike,
+    state0: ArrayLike,
+    *,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    method: str = "dopri5",
+    dense: bool = False,
+) -> Trajectory:
+    """Run a model from an initial state.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+    t : array_like, shape (n,), or float
+        Times at which the state is wanted, increasing; the first is the initial time. A number is the
+        end of a run from 0, of which the states after all accepted steps are given.
+    state0 : array_like, shape (dim,)
+        The initial state.
+    rtol, atol : float
+        Relative and absolute tolerance of a step's error, component by component, in the state's units.
+    method : {"dopri5"}
+        Dormand & Prince's method of order 5(4), with dense output of order 4. It lands on the surfaces
+        where the law changes.
+    dense : bool
+        Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
+
+    Returns
+    -------
+    Trajectory
+        A run that leaves the disk is cut at the edge and has the outcome "ejected".
+
+    Raises
+    ------
+    ModelError
+        Times, state or tolerances that cannot be used; a start outside the disk.
+    IntegrationError
+        The solution blows up.
+    KeyboardInterrupt
+        On Ctrl-C, at once.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import udd
+    >>> run = udd.simulate(udd.DLE(1.0), np.linspace(0, 10, 101), [1.0, 1.0, 0.01])
+    >>> run.state.shape, run.outcome
+    ((101, 3), 'finished')
+    >>> print(np.round(run.state[-1], 8))
+    [0.97664031 0.9831748  0.04343309]
+    """
+    state = initial_state(model, state0)
+    if method != "dopri5":
+        raise ModelError(f'method must be "dopri5", not {method!r}')
+    rtol, atol = tolerances(rtol, atol)
+    times = array("t", t)
+    if times.ndim > 1 or times.size == 0:
+        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
+    if times.ndim == 0:
+        end = number("t", float(times), least=0.0)
+        found = _core.simulate(model, None, end, state.tolist(), rtol, atol, dense)
+    else:
+        if not (np.diff(times) > 0).all():
+            raise ModelError("the times must increase, without duplicates")
+        found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, dense)
+    events = Events(tuple(found["event_kind"]), found["event_t"], found["event_state"])
+    stats = Stats(*found["counts"])
+    return Trajectory(found["t"], found["state"], events, found["outcome"], stats, model, found["dense"])

@@ -1,0 +1,41 @@
+//! What happened when.
+
+use crate::integrate::{Driver, Ending};
+use crate::model::System;
+
+/// What an event is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// A switching surface was crossed.
+    Surface(usize),
+    /// The wall of the model's domain was reached.
+    Wall,
+}
+
+/// Something that happened on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event<const D: usize> {
+    pub kind: EventKind,
+    pub t: f64,
+    pub x: [f64; D],
+}
+
+impl<const D: usize> Event<D> {
+    /// The event at the end of the driver's last step, if there is one.
+    pub fn seen<M: System<f64, D>>(ending: Ending, driver: &Driver<'_, M, f64, D>) -> Option<Self> {
+        let kind = match ending {
+            Ending::Free => return None,
+            Ending::Surface(j) => EventKind::Surface(j),
+            Ending::Wall => EventKind::Wall,
+        };
+        Some(Self { kind, t: driver.t(), x: *driver.x() })
+    }
+
+    /// Its name, as the model gives it.
+    pub fn name(&self, system: &impl System<f64, D>) -> &'static str {
+        match self.kind {
+            EventKind::Surface(j) => system.surface_name(j),
+            EventKind::Wall => "edge",
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Long work: off the interpreter lock, stopped by Ctrl-C.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::run::Stop;
+
+/// How often the calling thread looks for signals.
+const POLL: Duration = Duration::from_millis(20);
+
+/// Runs `work` on another thread, from which it may use all cores, with the interpreter lock released.
+///
+/// The calling thread looks for signals meanwhile; on Ctrl-C it sets the [`Stop`], waits for the work
+/// to end, and raises `KeyboardInterrupt`. A panic becomes a `RuntimeError`.
+pub fn run<T, E>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T, E> + Send) -> PyResult<T>
+where
+    T: Send,
+    E: Into<PyErr> + Send,
+{
+    let stop = Stop::new();
+    let done = AtomicBool::new(false);
+    let caller = thread::current();
+    thread::scope(|scope| {
+        let worker = scope.spawn(|| {
+            let result = catch_unwind(AssertUnwindSafe(|| work(&stop)));
+            done.store(true, Ordering::Release);
+            caller.unpark();
+            result
+        });
+        let mut signal = Ok(());
+        while !done.load(Ordering::Acquire) {
+            py.detach(|| thread::park_timeout(POLL));
+            if signal.is_ok() {
+                signal = py.check_signals();
+                if signal.is_err() {
+                    stop.set();
+                }
+            }
+        }
+        let result = worker.join();
+        signal?;
+        match result.and_then(|inner| inner) {
+            Ok(value) => value.map_err(Into::into),
+            Err(panic) => {
+                let what = message(panic.as_ref());
+                Err(PyRuntimeError::new_err(format!("internal error, please report it: {what}")))
+            }
+        }
+    })
+}
+
+fn message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("unknown")
+}

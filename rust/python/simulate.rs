@@ -1,0 +1,144 @@
+//! `udd.simulate`.
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::errors::{IntegrationError, ModelError};
+use super::interrupt;
+use super::model::{AnyModel, state, with_model};
+use crate::integrate::{Failure, Tolerance};
+use crate::model::{Family, System};
+use crate::observe::Record;
+use crate::run::{Output, Run, Stop, trajectory};
+
+/// A finished run, its dimension forgotten: states are flat.
+struct Flat {
+    dimension: usize,
+    t: Vec<f64>,
+    x: Vec<f64>,
+    event_kinds: Vec<&'static str>,
+    event_t: Vec<f64>,
+    event_x: Vec<f64>,
+    outcome: &'static str,
+    counts: (u64, u64, u64),
+    record: Option<Box<dyn Piecewise>>,
+}
+
+/// A run as a function of time.
+trait Piecewise: Send + Sync {
+    fn span(&self) -> (f64, f64);
+    /// Appends the state at `t`; false outside the run.
+    fn append(&self, t: f64, out: &mut Vec<f64>) -> bool;
+}
+
+impl<const D: usize> Piecewise for Record<D> {
+    fn span(&self) -> (f64, f64) {
+        Record::span(self)
+    }
+    fn append(&self, t: f64, out: &mut Vec<f64>) -> bool {
+        self.at(t).map(|x| out.extend(x)).is_some()
+    }
+}
+
+fn run<F: Family<D>, const D: usize>(
+    family: &F,
+    values: &[f64],
+    output: Output<'_>,
+    x0: [f64; D],
+    tolerance: &Tolerance,
+    keep: bool,
+    stop: &Stop,
+) -> Result<Flat, Failure> {
+    let system = family.build(values);
+    let Run { t, x, events, outcome, counts, record } =
+        trajectory(&system, output, x0, tolerance, keep, stop)?;
+    Ok(Flat {
+        dimension: D,
+        t,
+        x: x.into_flattened(),
+        event_kinds: events.iter().map(|event| event.name(&system)).collect(),
+        event_t: events.iter().map(|event| event.t).collect(),
+        event_x: events.iter().flat_map(|event| event.x).collect(),
+        outcome: outcome.name(),
+        counts: (counts.accepted, counts.rejected, counts.evaluations),
+        record: record.map(|record| Box::new(record) as Box<dyn Piecewise>),
+    })
+}
+
+/// A dense run: calling it with times gives the states, flat.
+#[pyclass(frozen, module = "udd._core")]
+struct Dense(Box<dyn Piecewise>);
+
+#[pymethods]
+impl Dense {
+    /// The first and the last time.
+    #[getter]
+    fn span(&self) -> (f64, f64) {
+        self.0.span()
+    }
+
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let mut out = Vec::new();
+        for &t in t.as_slice()? {
+            if !self.0.append(t, &mut out) {
+                let (first, last) = self.0.span();
+                let message = format!("t = {t} lies outside the run, which goes from {first} to {last}");
+                return Err(IntegrationError::new_err(message));
+            }
+        }
+        Ok(PyArray1::from_vec(py, out))
+    }
+}
+
+/// Runs a model from a state, at the given times or, where none are given, from 0 to `end` with every
+/// accepted step. Returns a dict.
+#[pyfunction]
+#[pyo3(signature = (model, times, end, state0, rtol, atol, dense))]
+#[allow(clippy::too_many_arguments)]
+fn simulate<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    times: Option<PyReadonlyArray1<'py, f64>>,
+    end: f64,
+    state0: Vec<f64>,
+    rtol: f64,
+    atol: f64,
+    dense: bool,
+) -> PyResult<Bound<'py, PyDict>> {
+    let model = AnyModel::from_python(model)?;
+    let tolerance = Tolerance { rtol, atol };
+    let times: Option<Vec<f64>> = times.map(|t| t.as_slice().map(<[f64]>::to_vec)).transpose()?;
+    let output = times.as_deref().map_or(Output::Steps(0.0, end), Output::At);
+    let flat = with_model!(&model, |family, values| {
+        let x0 = state(&state0)?;
+        if family.build(values).wall(&x0).is_some_and(|value: f64| value <= 0.0) {
+            let message = "the initial state lies outside the disk: Y^2 + Z^2 must be below R^2 (or use edge=\"ignore\")";
+            return Err(ModelError::new_err(message));
+        }
+        interrupt::run(py, |stop| run(family, values, output, x0, &tolerance, dense, stop))?
+    });
+
+    let table = |values: Vec<f64>| PyArray1::from_vec(py, values);
+    let rows = flat.t.len();
+    let events = flat.event_t.len();
+    let dict = PyDict::new(py);
+    dict.set_item("t", table(flat.t))?;
+    dict.set_item("state", table(flat.x).reshape([rows, flat.dimension])?)?;
+    dict.set_item("event_kind", flat.event_kinds)?;
+    dict.set_item("event_t", table(flat.event_t))?;
+    dict.set_item("event_state", table(flat.event_x).reshape([events, flat.dimension])?)?;
+    dict.set_item("outcome", flat.outcome)?;
+    dict.set_item("counts", flat.counts)?;
+    dict.set_item("dense", flat.record.map(Dense))?;
+    Ok(dict)
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Dense>()?;
+    module.add_function(wrap_pyfunction!(simulate, module)?)
+}
