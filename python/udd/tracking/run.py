@@ -17,7 +17,7 @@ from udd.measurement import DISK, Measurement, check_length
 from .acquire import colours_of
 from .decode import Film, Picture, TrackError
 from .disk import Outline, outline
-from .exposure import exposure
+from .exposure import at_middle, exposure
 from .find import Sight, sightings
 from .learn import learn
 from .loop import Known, Tracks, follow
@@ -120,6 +120,8 @@ def track_in_detail(
         )
     known, rim = _prepare(film, look_over, sights, seen)
     tracks = _follow(film, known, look_over.frames, progress)
+    centre, angle = at_middle(np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure)
+    tracks = replace(tracks, centre=list(centre), angle=list(angle))
     camera = _camera(tracks, known, rim, radius, pivot)
     spread = covariance(tracks, abs(known.look.marks[0].place))
     values, sigma, rho = metres(tracks, spread, camera)
