@@ -1,0 +1,25 @@
+"""Pictures of what the other functions return: a result goes in, the Axes come back.
+
+Every function takes ``ax=None``; without Axes it makes a new figure. Nothing is computed here that the results do
+not already hold, and no global matplotlib setting is changed.
+"""
+
+from __future__ import annotations
+
+from .evidence import errors, evidence
+from .fits import misfit, residuals
+from .friction import friction
+from .motion import orbit, phase_space, time_series
+from .picture import overlay
+
+__all__ = [
+    "errors",
+    "evidence",
+    "friction",
+    "misfit",
+    "orbit",
+    "overlay",
+    "phase_space",
+    "residuals",
+    "time_series",
+]

@@ -1,0 +1,132 @@
+"""What a discovery rests on: the evidence for each candidate, and the errors before and after."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd.errors import UddError
+
+from .style import AFTER, ALIKE, BEFORE, FAINT, FLOOR, new_axes, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def evidence(discovery: Any, ax: Any = None, *, stage: int = 0, most: int = 12) -> Axes:
+    """The fall of chi2 that each candidate would bring, beside what it takes to be believed.
+
+    Parameters
+    ----------
+    discovery : Discovery
+    ax : Axes, optional
+    stage : int
+        The first search is 0; each effect that is added is followed by another.
+    most : int
+        How many candidates, the best first.
+
+    Returns
+    -------
+    Axes
+    """
+    if not hasattr(discovery, "scans"):
+        raise UddError(f"a discovery holds evidence, not {type(discovery).__name__}")
+    if not 0 <= stage < len(discovery.scans):
+        raise UddError(f"the discovery searched {len(discovery.scans)} times; there is no stage {stage}")
+    scan = [s for s in discovery.scans[stage] if not s.absorbed][:most]
+    ax = new_axes(ax)
+    chosen = {f.title for f in discovery.effects}
+    alike = {a.title for a in discovery.alternatives}
+    seen: set[str] = set()
+    for k, scored in enumerate(scan):
+        title = scored.candidate.title
+        kind, colour = (
+            ("found", AFTER)
+            if title in chosen
+            else ("cannot be told apart from it", ALIKE)
+            if title in alike
+            else ("unphysical sign", "white")
+            if not scored.physical
+            else ("other candidates", FAINT)
+        )
+        ax.barh(
+            k,
+            max(scored.chi2, 0.1),
+            color=colour,
+            edgecolor="#8a8a8a" if colour == "white" else colour,
+            label=None if kind in seen else kind,
+        )
+        seen.add(kind)
+    ax.axvline(
+        threshold(discovery, stage), color="black", linestyle="--", linewidth=1.2, label="what chance hardly reaches"
+    )
+    ax.set_yticks(range(len(scan)), [s.candidate.title for s in scan])
+    ax.set_ylim(max(len(scan), 1) - 0.4, -0.6)
+    ax.set_xscale("log")
+    ax.set_xlim(left=0.5)
+    ax.set_xlabel("evidence: fall of χ² if this effect were added [1]")
+    ax.legend(frameon=False, loc="lower right")
+    tidy(ax)
+    ax.grid(False, axis="y")
+    return ax
+
+
+def looks(discovery: Any, stage: int) -> int:
+    """How many candidates a stage of the search looked at, each scanned frequency counted."""
+    from udd.discovery.candidates import ripples
+
+    scan = discovery.scans[stage]
+    shown = sum(any(p.role == "frequency" for p in s.candidate.effect.spec.parameters) for s in scan)
+    scanned = len(ripples(discovery.baseline.model, discovery.trained.record.t)) if shown else 0
+    return len(scan) - shown + scanned
+
+
+def threshold(discovery: Any, stage: int) -> float:
+    """The chi2 that a candidate with one amplitude must reach, all candidates counted."""
+    from scipy.stats import chi2
+
+    from udd.discovery.discover import ALPHA
+
+    return float(chi2.isf(ALPHA / looks(discovery, stage), 1))
+
+
+def errors(discovery: Any, ax: Any = None) -> Axes:
+    """How far the model runs away from data it has not seen: before, after, and what no model could beat.
+
+    Parameters
+    ----------
+    discovery : Discovery
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+    """
+    if not hasattr(discovery, "error_before"):
+        raise UddError(f"a discovery holds errors, not {type(discovery).__name__}")
+    before, after = discovery.error_before, discovery.error_after
+    factor, unit = (1e3, "mm") if before.unit == "m" else (1e3, "mrad")
+    ax = new_axes(ax)
+    lines = [(before, BEFORE, "o", "the known model")]
+    if discovery.effects:
+        lines.append((after, AFTER, "s", "with the added effect" + ("s" if len(discovery.effects) > 1 else "")))
+    for k, (e, colour, marker, words) in enumerate(lines):
+        h = np.array(e.horizons) * (1 + 0.03 * k)
+        ax.plot(h, factor * e.median, color=colour, marker=marker, linewidth=1.8, label=words)
+        ax.vlines(h, factor * e.low, factor * e.high, color=colour, linewidth=3, alpha=0.4)
+    last = lines[-1][0]
+    ax.plot(
+        last.horizons, factor * last.floor, color=FLOOR, linestyle=":", marker=".", linewidth=1.5, label="noise floor"
+    )
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xticks(before.horizons, [f"{h:g}" for h in before.horizons])
+    ax.minorticks_off()
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.set_xlabel("time since the model was let go [s]")
+    ax.set_ylabel(f"median error [{unit}]")
+    ax.legend(frameon=False, loc="upper left")
+    tidy(ax)
+    return ax
+

@@ -1,0 +1,168 @@
+"""What a fit leaves over: of each equation, and of each thing that was seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import UddError
+
+from .inputs import is_fit
+from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, label, new_axes, scale, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+_BINS = 24
+
+
+def residuals(
+    fit: Any,
+    ax: Any = None,
+    *,
+    equation: str | None = None,
+    against: str | None = None,
+    colour: str = AFTER,
+) -> Axes:
+    """The residual of one equation, frame by frame, with its mean along a coordinate.
+
+    It is by how much each fitted state misses what the model makes of the one before, per second. Where the model is
+    right it is noise about zero, whatever it is drawn against.
+
+    Parameters
+    ----------
+    fit : Fit
+    ax : Axes, optional
+    equation : str, optional
+        The state whose rate it is; by default the one with the clearest pattern.
+    against : str, optional
+        ``"t"``, a state, or ``"R"``; by default the coordinate along which the pattern is clearest.
+    colour : str
+        Of the means.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        No such equation or coordinate, or not a fit.
+    """
+    _check(fit)
+    names = fit.model.state_names
+    if equation is not None and equation not in names:
+        raise UddError(f"the model has equations for {', '.join(names)}, not for {equation}")
+    places = coordinates(fit)
+    if against is not None and against not in places:
+        raise UddError(f"a residual can be drawn against {', '.join(places)}, not {against}")
+    if equation is None or against is None:
+        equation, against = clearest(fit, equation, against)
+    words, unit, factor = EQUATIONS[equation]
+    x, y = scale(against) * places[against], factor * fit.defect[:, names.index(equation)]
+    ax = new_axes(ax)
+    ax.plot(x, y, ".", color=MEASURED, alpha=0.35, markersize=2.5, rasterized=True)
+    centre, mean, error = binned(x, y)
+    ax.errorbar(
+        centre, mean, 2 * error, color=colour, marker="o", markersize=4, linewidth=1.6, capsize=2, label="mean ± 2 s.e."
+    )
+    ax.axhline(0, color="black", linewidth=0.8)
+    ax.set_xlabel(label(against))
+    ax.set_ylabel(f"residual of {words} [{unit}]")
+    tidy(ax)
+    return ax
+
+
+def misfit(fit: Any, ax: Any = None, *, channel: str | None = None) -> Axes:
+    """What was seen less what was fitted, against time, with the noise that was found (two standard deviations).
+
+    Parameters
+    ----------
+    fit : Fit
+    ax : Axes, optional
+    channel : str, optional
+        One of the measurement's columns; by default the first.
+
+    Returns
+    -------
+    Axes
+    """
+    _check(fit)
+    names = fit.measurement.names
+    channel = names[0] if channel is None else channel
+    if channel not in names:
+        raise UddError(f"the measurement has {', '.join(names)}, not {channel}")
+    words, unit, factor = CHANNELS[channel]
+    k = names.index(channel)
+    sd = fit.noise.sd(fit.record, fit.states[:, 0])[:, k]
+    there = np.isfinite(sd)
+    ax = new_axes(ax)
+    t = fit.record.t
+    ax.fill_between(
+        t[there], -2 * factor * sd[there], 2 * factor * sd[there], color=AFTER, alpha=0.2, linewidth=0, label="noise, ± 2 s.d."
+    )
+    ax.plot(t, factor * fit.misfit[:, k], ".", color=MEASURED, markersize=2.5, label="measured − fitted", rasterized=len(t) > 3000)
+    ax.axhline(0, color="black", linewidth=0.8)
+    ax.set_xlabel(label("t"))
+    ax.set_ylabel(f"{words}: measured − fitted [{unit}]")
+    ax.legend(frameon=False, loc="upper right", ncols=2)
+    tidy(ax)
+    return ax
+
+
+def coordinates(fit: Any) -> dict[str, Array]:
+    """What a residual can be drawn against, at the frame that each flow starts from."""
+    columns = dict(zip(fit.model.state_names, fit.states[:-1].T, strict=True))
+    result = {"t": fit.record.t[:-1], **columns}
+    if "Z" in columns:
+        result["R"] = np.hypot(columns["Y"], columns["Z"])
+    return result
+
+
+def clearest(fit: Any, equation: str | None = None, against: str | None = None) -> tuple[str, str]:
+    """The equation and the coordinate between which the residual shows the clearest pattern."""
+    names = fit.model.state_names
+    best, found = -1.0, (names[0], "t")
+    for name in [equation] if equation else names:
+        for place, x in coordinates(fit).items():
+            if against not in (None, place):
+                continue
+            share = pattern(x, fit.defect[:, names.index(name)])
+            if share > best:
+                best, found = share, (name, place)
+    return found
+
+
+def pattern(x: Array, y: Array) -> float:
+    """Share of the variance of `y` that its means along `x` explain, less what chance explains."""
+    there = np.isfinite(x) & np.isfinite(y)
+    n = int(there.sum())
+    if n < 3 * _BINS:
+        return 0.0
+    x, y = x[there], y[there] - y[there].mean()
+    number = np.argsort(np.argsort(x, kind="stable"), kind="stable") * _BINS // n
+    count = np.bincount(number, minlength=_BINS)
+    mean = np.bincount(number, y, minlength=_BINS) / count
+    total = float(y @ y)
+    return float(count @ mean**2) / total - (_BINS - 1) / (n - 1) if total > 0 else 0.0
+
+
+def binned(x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Means of `y` along `x` with their standard errors, in bins that hold equally many frames."""
+    there = np.isfinite(x) & np.isfinite(y)
+    x, y = x[there], y[there]
+    order = np.argsort(x, kind="stable")
+    groups = [g for g in np.array_split(order, min(_BINS, max(len(order) // 8, 1))) if len(g) > 1]
+    centre = np.array([x[g].mean() for g in groups])
+    mean = np.array([y[g].mean() for g in groups])
+    error = np.array([y[g].std(ddof=1) / np.sqrt(len(g)) for g in groups])
+    return centre, mean, error
+
+
+def _check(fit: Any) -> None:
+    if not is_fit(fit):
+        raise UddError(f"a fit leaves residuals, not {type(fit).__name__}")

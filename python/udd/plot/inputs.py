@@ -1,0 +1,108 @@
+"""What the results have in common: coordinates over time, by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import UddError
+
+Array = NDArray[np.float64]
+
+#: Names of the states, by the kind of model.
+STATES = {"disk": ("Omega", "Y", "Z", "beta"), "dle": ("omega", "y", "z"), "pendulum": ("Omega", "theta")}
+_BY_NUMBER = {len(names): names for names in STATES.values()}
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Coordinates over time, in SI units (those of the DLE have none).
+
+    Attributes
+    ----------
+    title : str
+        ``"simulated"``, ``"measured"`` or ``"fitted"``.
+    t : ndarray (n,)
+    columns : dict of str to ndarray (n,)
+    model : Model or None
+    radius : float or None
+        Of the disk, m.
+    """
+
+    title: str
+    t: Array
+    columns: dict[str, Array]
+    model: Any
+    radius: float | None
+
+    @property
+    def kind(self) -> str:
+        """``"disk"``, ``"pendulum"`` or ``"dle"``."""
+        return "disk" if "Z" in self.columns else "pendulum" if "theta" in self.columns else "dle"
+
+    def __getitem__(self, name: str) -> Array:
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise UddError(
+                f"the {self.title} motion has no {name}; it has {', '.join(self.columns)}"
+            ) from None
+
+
+def is_fit(result: Any) -> bool:
+    """Whether a result is a fit of a model to a measurement."""
+    return hasattr(result, "misfit") and hasattr(result, "record")
+
+
+def motions(result: Any) -> list[Motion]:
+    """The motions that a trajectory, a measurement or a fit (measured, then fitted) holds.
+
+    Raises
+    ------
+    UddError
+        The result holds none.
+    """
+    if is_fit(result):
+        return [measured(result.measurement, result.model), fitted(result)]
+    if hasattr(result, "state") and hasattr(result, "t"):
+        state = np.asarray(result.state, dtype=np.float64)
+        if state.ndim != 2 or state.shape[1] not in _BY_NUMBER:
+            raise UddError(f"one trajectory can be drawn, state (time, 2 to 4), not {state.shape}")
+        model = getattr(result, "model", None)
+        columns = dict(zip(_BY_NUMBER[state.shape[1]], state.T, strict=True))
+        return [Motion("simulated", np.asarray(result.t), columns, model, _radius(model))]
+    if hasattr(result, "values") and hasattr(result, "names"):
+        return [measured(result, None)]
+    raise UddError(f"a trajectory, a measurement or a fit can be drawn, not {type(result).__name__}")
+
+
+def measured(measurement: Any, model: Any) -> Motion:
+    """What was measured, where it was seen."""
+    seen = measurement.seen
+    columns = {name: np.where(seen, measurement[name], np.nan) for name in measurement.names}
+    radius = _radius(model) or (float(measurement.meta["R"]) if "R" in measurement.meta else None)
+    return Motion("measured", measurement.t, columns, model, radius)
+
+
+def fitted(fit: Any) -> Motion:
+    """The fitted states; a coordinate that was measured is given as the camera should have seen it.
+
+    So that it lies on the measured one where the fit is good, in spite of the camera's offset and tilt.
+    """
+    columns = dict(zip(fit.model.state_names, fit.states.T, strict=True))
+    for k, name in enumerate(fit.measurement.names):
+        columns[name] = fit.record.seen[:, k] - fit.misfit[:, k]
+    return Motion("fitted", fit.record.t, columns, fit.model, _radius(fit.model))
+
+
+def only(result: Any) -> Motion:
+    """The one motion with all states: a trajectory's, or the fitted one."""
+    return motions(result)[-1]
+
+
+def _radius(model: Any) -> float | None:
+    value = getattr(model, "R", None)
+    return None if value is None else float(value)

@@ -1,0 +1,174 @@
+"""The motion itself: over time, in the picture's plane, in phase space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd.errors import UddError
+
+from .inputs import STATES, Motion, motions, only
+from .style import AFTER, AXES, BEFORE, FAINT, MEASURED, label, new_axes, scale, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SHOWN = {"disk": ("Y", "Z"), "pendulum": ("theta",), "dle": ("y", "z")}
+_COLOURS = (AFTER, BEFORE, "#009e73", "#cc79a7")
+
+
+def time_series(result: Any, ax: Any = None, *, coordinates: Sequence[str] | None = None) -> Axes:
+    """Coordinates against time; of a fit the measured ones as dots and the fitted ones as lines.
+
+    Parameters
+    ----------
+    result : Trajectory, Measurement or Fit
+    ax : Axes, optional
+    coordinates : sequence of str, optional
+        Which, all in the same unit; by default Y and Z of a disk, theta of a pendulum, y and z of the DLE.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        A coordinate that the result does not have, or coordinates with different units.
+
+    Examples
+    --------
+    >>> import numpy as np, udd
+    >>> m = udd.Measurement(np.arange(20) / 25, {"theta": 0.1 * np.cos(np.arange(20) / 6)})
+    >>> udd.plot.time_series(m).get_xlabel()
+    'time T [s]'
+    """
+    drawn = motions(result)
+    kind = drawn[0].kind
+    names = tuple(coordinates) if coordinates is not None else _SHOWN[kind]
+    units = {AXES[n][1] for n in names if n in AXES}
+    if not names or not all(n in AXES for n in names) or len(units) != 1:
+        raise UddError(f"coordinates must share a unit and be of {', '.join(STATES[kind])}, not {', '.join(names)}")
+    ax = new_axes(ax)
+    for motion in drawn:
+        dots = motion.title == "measured"
+        for name, colour in zip(names, _COLOURS, strict=False):
+            what = AXES[name][0] + (f", {motion.title}" if len(drawn) > 1 else "")
+            style: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 3} if dots else {"linewidth": 1.2}
+            values = motion[name] if name in motion.columns or len(drawn) == 1 else np.full(len(motion.t), np.nan)
+            shade = MEASURED if dots and len(drawn) > 1 else colour
+            ax.plot(motion.t, scale(name) * values, color=shade, label=what, **style)
+    ax.set_xlabel(label("tau" if kind == "dle" else "t"))
+    ax.set_ylabel(label(names[0]) if len(names) == 1 else f"{' and '.join(names)} [{units.pop()}]")
+    if len(names) * len(drawn) > 1:
+        ax.legend(frameon=False, loc="upper right", ncols=2)
+    tidy(ax)
+    return ax
+
+
+def orbit(result: Any, ax: Any = None) -> Axes:
+    """The path of the disk's centre in the picture's plane, with the contact and the reach of the wheels.
+
+    A pendulum's path is drawn in its phase plane, the DLE's as (y, z).
+
+    Parameters
+    ----------
+    result : Trajectory, Measurement or Fit
+        Of a pendulum not a measurement, which holds no angular velocity.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+    """
+    drawn = motions(result)
+    kind = drawn[0].kind
+    across, up = {"disk": ("Y", "Z"), "pendulum": ("theta", "Omega"), "dle": ("y", "z")}[kind]
+    if kind == "pendulum":
+        if up not in drawn[-1].columns:
+            raise UddError("a pendulum's measurement holds no angular velocity: fit it first, then draw the fit")
+        drawn = drawn[-1:]
+    ax = new_axes(ax)
+    for motion in drawn:
+        x, y = scale(across) * motion[across], scale(up) * motion[up]
+        if motion.title == "measured":
+            ax.plot(x, y, ".", color=MEASURED, markersize=2.5, label="measured", rasterized=len(x) > 3000)
+        else:
+            ax.plot(x, y, color=AFTER, linewidth=0.9, label=motion.title)
+    ax.set_xlabel(label(across))
+    ax.set_ylabel(label(up))
+    if kind == "disk":
+        _device(ax, drawn)
+    if len(drawn) > 1:
+        ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    tidy(ax)
+    return ax
+
+
+def _device(ax: Axes, drawn: Sequence[Motion]) -> None:
+    """The contact in the middle, and the circle on which the disk would leave the wheels."""
+    from matplotlib.patches import Circle
+
+    ax.plot(0, 0, "+", color="black", markersize=9, markeredgewidth=1.5)
+    radius = next((m.radius for m in drawn if m.radius is not None), None)
+    if radius is not None:
+        reach = scale("Y") * radius
+        ax.add_patch(Circle((0, 0), reach, fill=False, edgecolor=FAINT, linewidth=1.5, linestyle="--"))
+        ax.set_xlim(-1.08 * reach, 1.08 * reach)
+        ax.set_ylim(-1.08 * reach, 1.08 * reach)
+        ax.annotate(
+            "beyond this circle the disk\nleaves the wheels",
+            (0, -reach),
+            xytext=(0, 5),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize="x-small",
+            color="#666666",
+        )
+    ax.set_aspect("equal", adjustable="box")
+
+
+def phase_space(result: Any, ax: Any = None) -> Axes:
+    """The orbit in three dimensions: J, Y, Z of the disk with J = I Omega - W Y; omega, y, z of the DLE.
+
+    Parameters
+    ----------
+    result : Trajectory or Fit
+    ax : Axes3D, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        Of a pendulum, whose phase space is a plane (see :func:`orbit`), of a measurement, which holds no angular
+        velocity, or of Axes without a third dimension.
+    """
+    motion = only(result)
+    if motion.kind == "pendulum":
+        raise UddError("a pendulum's phase space is a plane: use udd.plot.orbit")
+    if motion.title == "measured":
+        raise UddError("a measurement holds no angular velocity: fit it first, then draw the fit")
+    if motion.kind == "disk":
+        if motion.model is None:
+            raise UddError("J needs the model's W and R: the trajectory has no model")
+        y, z, omega = motion["Y"], motion["Z"], motion["Omega"]
+        inertia = motion.model.R**2 / 2 + y**2 + z**2
+        coordinates = {"J": inertia * omega - motion.model.W * y, "Y": y, "Z": z}
+    else:
+        coordinates = {name: motion[name] for name in ("omega", "y", "z")}
+    space: Any = new_axes(ax, projection="3d")
+    if space.name != "3d":
+        raise UddError('phase_space needs three-dimensional Axes (projection="3d")')
+    names = tuple(coordinates)
+    space.plot(*(scale(n) * v for n, v in coordinates.items()), color=AFTER, linewidth=0.7)
+    for axis, name in zip("xyz", names, strict=True):
+        getattr(space, f"set_{axis}label")(label(name))
+    space.set_box_aspect(None, zoom=0.85)
+    made: Axes = space
+    return made

@@ -1,0 +1,81 @@
+"""How all pictures look: colours, names of axes, and where new Axes come from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito's palette, which colour-blind readers can tell apart; lightness differs too, for grey prints.
+MEASURED = "#4d4d4d"
+BEFORE = "#d55e00"
+AFTER = "#0072b2"
+ALIKE = "#e69f00"
+FLOOR = "#000000"
+FAINT = "#c4c4c4"
+
+#: What a coordinate is called on an axis, its unit, and by what its SI value is multiplied.
+AXES: dict[str, tuple[str, str, float]] = {
+    "t": ("time T", "s", 1.0),
+    "Omega": ("angular velocity Ω", "rad/s", 1.0),
+    "Y": ("Y (to the right)", "cm", 100.0),
+    "Z": ("Z (up)", "cm", 100.0),
+    "beta": ("orientation β", "rad", 1.0),
+    "theta": ("angle θ from hanging", "rad", 1.0),
+    "omega": ("ω", "1", 1.0),
+    "y": ("y", "1", 1.0),
+    "z": ("z", "1", 1.0),
+    "tau": ("time t", "1", 1.0),
+    "J": ("J = I Ω − W Y", "cm²/s", 1e4),
+    "k": ("friction coefficient k", "m²/s", 1.0),
+    "R": ("distance R from the contact", "cm", 100.0),
+}
+
+#: Residual of the equation for a state's rate, likewise.
+EQUATIONS: dict[str, tuple[str, str, float]] = {
+    "Omega": ("dΩ/dT", "rad/s²", 1.0),
+    "Y": ("dY/dT", "mm/s", 1e3),
+    "Z": ("dZ/dT", "mm/s", 1e3),
+    "beta": ("dβ/dT", "rad/s", 1.0),
+    "theta": ("dθ/dT", "rad/s", 1.0),
+}
+
+#: A channel of a measurement, likewise: misfits are small.
+CHANNELS: dict[str, tuple[str, str, float]] = {
+    "Y": ("Y", "mm", 1e3),
+    "Z": ("Z", "mm", 1e3),
+    "beta": ("β", "mrad", 1e3),
+    "theta": ("θ", "mrad", 1e3),
+}
+
+
+def label(name: str) -> str:
+    """Name and unit of a coordinate, as an axis says it."""
+    words, unit, _ = AXES[name]
+    return f"{words} [{unit}]"
+
+
+def scale(name: str) -> float:
+    """By what a coordinate's SI value is multiplied on its axis."""
+    return AXES[name][2]
+
+
+def new_axes(ax: Any = None, projection: str | None = None) -> Axes:
+    """The Axes given, or those of a new figure."""
+    if ax is not None:
+        result: Axes = ax
+        return result
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=(6.4, 4.4), layout="constrained")
+    made: Axes = figure.add_subplot(projection=projection)
+    return made
+
+
+def tidy(ax: Axes, grid: bool = True) -> None:
+    """Take away what says nothing."""
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.set_axisbelow(True)
+    if grid:
+        ax.grid(color="#e4e4e4", linewidth=0.6)

@@ -1,0 +1,7 @@
+"""The page that a person reads: what was found, shown in pictures, in one file."""
+
+from __future__ import annotations
+
+from .page import write
+
+__all__ = ["write"]

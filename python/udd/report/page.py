@@ -1,0 +1,87 @@
+"""The page, from the parts."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from udd.errors import UddError
+from udd.files import write_whole
+
+from . import figures, tables, words
+
+
+def write(
+    discovery: Any,
+    path: str | os.PathLike[str],
+    *,
+    film: str | os.PathLike[str] | None = None,
+    source: str | os.PathLike[str] | None = None,
+    command: str | None = None,
+) -> None:
+    """Write a discovery as one HTML page that stands alone: pictures first, no script, nothing from elsewhere.
+
+    Parameters
+    ----------
+    discovery : Discovery
+    path : path
+        Of the page; an older one is replaced once the new one is complete.
+    film : path, optional
+        The film that the measurement was tracked in; some of its frames are shown.
+    source : path, optional
+        The file that the analysis began with, named on the page with its SHA-256; by default the film.
+    command : str, optional
+        How the page was made, for those who want to make it again.
+
+    Raises
+    ------
+    UddError
+        The page cannot be written there, or the film is not the one that was tracked.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    target = Path(path)
+    if target.is_dir():
+        raise UddError(f"{target} is a folder, not a page to write to")
+    environment = Environment(
+        loader=PackageLoader("udd.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["pretty"] = words.pretty
+    origin = film if source is None else source
+    page = environment.get_template("page.html").render(
+        d=discovery,
+        style=environment.loader.get_source(environment, "page.css")[0] if environment.loader else "",
+        words=words,
+        tables=tables,
+        pictures=figures.draw(discovery, film),
+        numbers=words.headline(discovery),
+        command=command,
+        version=_version(),
+        source=_identity(origin),
+    )
+    write_whole(target, page.encode())
+
+
+def _identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
+    """A file's name and SHA-256."""
+    if path is None:
+        return None
+    try:
+        with Path(path).open("rb") as file:
+            return Path(path).name, hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise UddError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def _version() -> str:
+    try:
+        return version("udd")
+    except PackageNotFoundError:
+        return "not installed"

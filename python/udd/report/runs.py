@@ -1,0 +1,71 @@
+"""Free runs of the fitted models, for the pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.errors import IntegrationError
+from udd.trajectory import Trajectory, simulate
+
+Array = NDArray[np.float64]
+
+_STEP = 0.01  # s
+_BEFORE = 1.0  # s of data shown before the start
+_LONGEST = {"disk": 3.0, "pendulum": 12.0}  # s
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Measured motion around a moment, and what the models make of it from there, as the camera would see it.
+
+    Attributes
+    ----------
+    start : float
+        When the models are let go, s.
+    t_seen, seen : ndarray (n,), (n, m)
+    t : ndarray (k,)
+    before, after : ndarray (k, m)
+    """
+
+    start: float
+    t_seen: Array
+    seen: Array
+    t: Array
+    before: Array
+    after: Array
+
+
+def free_run(fit: Any) -> Trajectory | None:
+    """The fitted model from the first fitted state on, for as long as the record; None where it diverges."""
+    t = fit.record.t
+    times = np.arange(t[0], t[-1], _STEP)
+    try:
+        return simulate(fit.model, times, fit.states[0])
+    except IntegrationError:
+        return None
+
+
+def forecast(discovery: Any) -> Forecast:
+    """From the first held-out frame on."""
+    fit = discovery.fit
+    t = fit.record.t
+    first = min(int(np.searchsorted(t, discovery.split)), len(t) - 2)
+    end = min(t[first] + _LONGEST[discovery.measurement.kind], t[-1])
+    times = np.arange(t[first] + _STEP, end, _STEP)
+    m = discovery.measurement
+    shown = m.slice(t[first] - _BEFORE, end)
+    seen = np.where(shown.seen[:, None], shown.values, np.nan)
+    before, after = (_predicted(f, first, times) for f in (discovery.baseline, fit))
+    return Forecast(float(t[first]), shown.t, seen, times, before, after)
+
+
+def _predicted(fit: Any, first: int, times: Array) -> Array:
+    start = fit.record.t[first : first + 1]
+    states = fit.states[first : first + 1]
+    result: Array = _core.predict(fit.model, fit.point.camera, fit.point.clock, start, states, times[None, :])[0]
+    return result

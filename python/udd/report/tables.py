@@ -1,0 +1,155 @@
+"""The page's tables: rows of text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from udd import _core
+
+from . import words
+
+
+def parameters(discovery: Any) -> list[dict[str, str]]:
+    """The model's free parameters: name, meaning, before, after, unit."""
+    return _rows(discovery, lambda name: name in discovery.fit.model.parameters)
+
+
+def camera(discovery: Any) -> list[dict[str, str]]:
+    """What the camera got wrong, likewise."""
+    return _rows(discovery, lambda name: name not in discovery.fit.model.parameters)
+
+
+def _rows(discovery: Any, wanted: Any) -> list[dict[str, str]]:
+    known = units(discovery.fit)
+    rows = []
+    for name in filter(wanted, discovery.fit.parameters):
+        rows.append(
+            {
+                "name": words.pretty(name.split(".")[-1]),
+                "meaning": _meaning(name, discovery),
+                "before": _value(discovery.baseline, name, known[name]),
+                "after": _value(discovery.fit, name, known[name]),
+                "unit": words.pretty(_shown(known[name])[0]),
+            }
+        )
+    return rows
+
+
+def fixed(discovery: Any) -> list[dict[str, str]]:
+    """The model's parameters that were taken as known: name, meaning, value, unit."""
+    model = discovery.fit.model
+    rows = []
+    for name, value in model.parameters.items():
+        if name not in discovery.fit.parameters:
+            unit, factor = model.units[name], 1.0
+            rows.append(
+                {
+                    "name": words.pretty(name.split(".")[-1]),
+                    "meaning": _meaning(name, discovery),
+                    "value": f"{factor * value:.5g}",
+                    "unit": words.pretty(unit),
+                }
+            )
+    return rows
+
+
+def _value(fit: Any, name: str, unit: str) -> str:
+    if name not in fit.parameters:
+        return "–"
+    factor = _shown(unit)[1]
+    return words.with_error(factor * fit.parameters[name], factor * fit.errors[name])
+
+
+def _shown(unit: str) -> tuple[str, float]:
+    """The unit in which small things are told, and by what to multiply."""
+    return {"rad": ("mrad", 1e3), "s": ("ms", 1e3), "m": ("mm", 1e3), "s/m": ("ms/m", 1e3), "": ("", 1.0)}.get(
+        unit, (unit, 1.0)
+    )
+
+
+def _meaning(name: str, discovery: Any) -> str:
+    effect, dot, parameter = name.partition(".")
+    if not dot:
+        return words.MEANINGS.get(name, name)
+    found = next((f for f in discovery.effects if f.effect.name == effect), None)
+    return f"{found.title if found else effect}: {words.pretty(parameter)}"
+
+
+def units(fit: Any) -> dict[str, str]:
+    """The SI unit of every free parameter."""
+    known = fit.model.units | dict(_core.camera_parameters(fit.measurement.kind))
+    return {name: known.get(name, "") for name in fit.parameters}
+
+
+def noise(fit: Any) -> list[dict[str, str]]:
+    """The noise that was found: channel, at rest, growth with the speed, what the measurement states."""
+    rows = []
+    for k, name in enumerate(fit.measurement.names):
+        sigma = fit.record.sigma[:, k]
+        stated = float(np.median(sigma[np.isfinite(sigma)]))
+        unit = "m" if name in ("Y", "Z") else "rad"
+        rows.append(
+            {
+                "name": words.pretty(name),
+                "found": words.length(stated * float(fit.noise.factor[k]), unit),
+                "growth": words.length(float(fit.noise.blur[k]), unit) + " per rad/s",
+                "stated": words.length(stated, unit),
+            }
+        )
+    return rows
+
+
+def errors(discovery: Any) -> list[dict[str, str]]:
+    """Held-out errors at every horizon."""
+    before, after = discovery.error_before, discovery.error_after
+    rows = []
+    for h in before.horizons:
+        b, a = before.at(h), after.at(h)
+        rows.append(
+            {
+                "horizon": f"{h:g} s",
+                "before": _interval(b, before.unit),
+                "after": _interval(a, after.unit),
+                "floor": words.length(a[3], after.unit),
+            }
+        )
+    return rows
+
+
+def _interval(e: tuple[float, float, float, float], unit: str) -> str:
+    low, high = words.length(e[1], unit).split()[0], words.length(e[2], unit).split()[0]
+    return f"{words.length(e[0], unit)} ({low} to {high})"
+
+
+def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str]]:
+    """What the score said of the best candidates."""
+    rows = []
+    found = {f.title for f in discovery.effects}
+    alike = {a.title for a in discovery.alternatives}
+    for s in discovery.scans[stage][:most]:
+        title = s.candidate.title
+        rows.append(
+            {
+                "title": title,
+                "equation": s.candidate.effect.equation,
+                "chi2": "–" if s.absorbed else f"{s.chi2:.1f}",
+                "estimate": "–"
+                if s.absorbed
+                else ", ".join(
+                    f"{words.pretty(p)} = {words.with_error(v, e)}"
+                    for p, v, e in zip(s.candidate.effect.amplitudes, s.amplitudes, s.errors, strict=True)
+                ),
+                "said": "found"
+                if title in found
+                else "cannot be told apart"
+                if title in alike
+                else "not visible in this record"
+                if s.absorbed
+                else "unphysical"
+                if not s.physical
+                else "",
+            }
+        )
+    return rows

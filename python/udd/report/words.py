@@ -1,0 +1,192 @@
+"""What the page says in words, and how it writes numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+#: From this likeness on, no length of record at one drive tells two effects apart.
+IDENTICAL = 0.999
+
+_SYMBOLS = (
+    (r"\bOmega\b", "Ω"),
+    (r"\bomega\b", "ω"),
+    (r"\bbeta\b", "β"),
+    (r"\btheta\b", "θ"),
+    (r"\bkappa\b", "κ"),
+    (r"\bphi\b", "φ"),
+    (r"\beps\b", "ε"),
+    (r"\bpi\b", "π"),
+    (r"dOmega\b", "dΩ"),
+    (r"\^2", "²"),
+    (r"\^3", "³"),
+    (r"\bk_plain\b", "k₀(Ω)"),
+    (r"\bW_c\b", "Wc"),
+    (r"\+-", "±"),
+    (r"(?<![\w.])-(?=[\w(|.])", "−"),
+    (r" - ", " − "),
+    (r"(?<=\w) \* (?=\w)", " "),
+)
+
+#: Parameters in words.
+MEANINGS = {
+    "W": "speed at which the wheels lift the disk",
+    "R": "radius of the disk",
+    "g": "gravity",
+    "k0": "friction coefficient: fast rotation",
+    "k1": "friction coefficient: at rest",
+    "k2": "how fast friction falls with the speed of rotation",
+    "length": "length of the pendulum",
+    "inertia": "moment of inertia per unit mass",
+    "y0": "contact, to the right of where it was taken to be",
+    "z0": "contact, above where it was taken to be",
+    "tilt": "camera turned clockwise",
+    "scale": "picture larger than taken to be",
+    "lag": "orientation seen later than position",
+    "row": "rolling shutter: time per height in the picture",
+    "clock": "recorded time runs fast",
+    "theta0": "zero of the angle",
+}
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The numbers that stand at the top."""
+
+    horizon: str
+    before: str
+    after: str
+    floor: str
+    ratio: str
+    interval: str
+    better: str
+
+
+def pretty(text: str) -> str:
+    """A formula as a reader writes it: Greek letters, powers, minus signs."""
+    for pattern, symbol in _SYMBOLS:
+        text = re.sub(pattern, symbol, text)
+    return text
+
+
+def verdict(discovery: Any) -> str:
+    """The whole result in one sentence."""
+    said = " and ".join(effect_sentence(f.effect) for f in discovery.effects)
+    if discovery.verdict == "nothing missing":
+        return "Nothing is missing: the known model explains this motion down to the noise of the measurement."
+    if discovery.verdict == "effect identified":
+        return f"{said[0].upper()}{said[1:]}."
+    return f"The model lacks something. Most likely {said}; but this record does not settle its form."
+
+
+def effect_sentence(effect: Any) -> str:
+    """What an effect does, as a clause."""
+    meaning = str(getattr(effect, "meaning", "") or effect.equation)
+    return meaning.rstrip(".")
+
+
+def headline(discovery: Any) -> Headline:
+    """The held-out errors at the horizon on which the decision rests."""
+    h = discovery.horizon
+    before, after = discovery.error_before.at(h), discovery.error_after.at(h)
+    unit = discovery.error_before.unit
+    value, low, high = discovery.ratio
+    return Headline(
+        horizon=f"{h:g} s",
+        before=length(before[0], unit),
+        after=length(after[0], unit),
+        floor=length(after[3], unit),
+        ratio=f"{value:.2g}",
+        interval=f"{low:.2g} to {high:.2g}" if math.isfinite(low) else "not known: too few blocks",
+        better=f"{1 / value:.2g}",
+    )
+
+
+def length(value: float, unit: str) -> str:
+    """An error with its unit, in thousandths: mm or mrad."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{_three(1e3 * value)} {'mm' if unit == 'm' else 'mrad'}"
+
+
+def _three(value: float) -> str:
+    """Three significant digits without an exponent."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    decimals = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def with_error(value: float, error: float | None) -> str:
+    """A value and its standard error with two digits: ``5.03 ± 0.12``."""
+    if error is None or not math.isfinite(error) or error <= 0:
+        return f"{value:.5g}".replace("-", "−")
+    place = math.floor(math.log10(error))
+    size = math.floor(math.log10(max(abs(value), error)))
+    if size >= 5 or size <= -4:
+        digits = max(size - place + 1, 0)
+        power = str(size).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"({value / 10**size:.{digits}f} ± {error / 10**size:.{digits}f}) × 10{power}".replace("-", "−")
+    digits = max(1 - place, 0)
+    return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
+
+
+def probability(p: float) -> str:
+    """A small probability as a person says it."""
+    if p < 1e-300:
+        return "below 10⁻³⁰⁰"
+    if p < 1e-3:
+        power = str(math.floor(math.log10(p)) + 1).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"below 10{power}"
+    return f"{min(p, 1.0):.2g}"
+
+
+def unit_words(unit: str) -> str:
+    """A unit as it is written: ``1/m`` becomes ``per metre``."""
+    return {"1/m": "per metre", "1/s": "per second", "": ""}.get(unit, pretty(unit))
+
+
+def limit(other: Any) -> str:
+    """Why one alternative stays open."""
+    if other.likeness > IDENTICAL:
+        return (
+            "At one drive speed the two act on the disk identically, and no longer record would tell them apart: "
+            "film a second drive and fit both together."
+        )
+    if other.nats < 0:
+        return f"It fits even a little better ({-other.nats:.1f} units of log-likelihood), but was not chosen first."
+    return (
+        f"It fits worse by {other.nats:.1f} units of log-likelihood; only from 10 on is a form excluded. "
+        "A longer record, or one at another drive, would settle it."
+    )
+
+
+def short_limits(discovery: Any) -> list[str]:
+    """What must stand beside the verdict, lest it says too much."""
+    same = [a for a in discovery.alternatives if a.likeness > IDENTICAL]
+    if not same:
+        return []
+    names = " or ".join(dict.fromkeys(a.effect.title for a in same))
+    return [f"At this one drive speed it cannot be told from {names}: a film at a second drive would."]
+
+
+def limits(discovery: Any) -> list[str]:
+    """What holds for every such page."""
+    found = len(discovery.effects) > 0
+    result = []
+    if not found:
+        result.append(
+            "An effect smaller than this record can show may still be there: nothing missing means nothing that these "
+            "data demand."
+        )
+    result.append("Only the effects of the library were tried; the tables above name them.")
+    if discovery.measurement.kind == "disk":
+        result.append(
+            "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that all lean the "
+            "same way look upright: only angles between them can be seen."
+        )
+    else:
+        result.append("Gravity was taken as known; only the ratio of the length to the inertia sets the period.")
+    return result
