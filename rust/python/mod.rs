@@ -18,5 +18,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulate::register(module)?;
     lyapunov::register(module)?;
     estimate::register(module)?;
+    // Redundant with the stub, which would have to repeat it.
+    module.delattr("__all__")?;
     Ok(())
 }
