@@ -14,7 +14,9 @@ from .pose import Look, Pose
 NEAR = 0.22  # of the marks' reach: how far a blob may lie from the mark it stands for
 
 
-def colours_of(pictures: list[Picture], poses: list[Pose], look: Look, view: NDArray[np.bool_]) -> NDArray[np.float64]:
+def colours_of(
+    pictures: list[Picture], poses: list[Pose], look: Look, view: NDArray[np.bool_]
+) -> NDArray[np.float64]:
     """Colour differences (U, V) of the four marks' middles, shape (4, 2), from frames whose pose is known."""
     out = np.full((4, 2), np.nan)
     for k, mark in enumerate(look.marks):
@@ -30,7 +32,9 @@ def colours_of(pictures: list[Picture], poses: list[Pose], look: Look, view: NDA
     return out
 
 
-def classify(picture: Picture, colours: NDArray[np.float64], view: NDArray[np.bool_], box: tuple[int, int, int, int]) -> list[Blobs]:
+def classify(
+    picture: Picture, colours: NDArray[np.float64], view: NDArray[np.bool_], box: tuple[int, int, int, int]
+) -> list[Blobs]:
     """Blobs of each mark's colour inside a box (rows, columns of the full picture), in front of nothing."""
     r0, r1, c0, c1 = (x // 2 for x in box)
     u = picture.u[r0:r1, c0:c1].astype(np.float32) - 128
@@ -67,18 +71,27 @@ def candidates(patches: list[Blobs], look: Look, guess: Pose | None) -> list[Pos
                     continue
                 turn = (b - a) / arm
                 turn /= abs(turn)
-                pose = _support(patches, places, Pose((a + b) / 2 - turn * (places[i] + places[j]) / 2, float(np.angle(turn))), reach)
+                pose = _support(
+                    patches,
+                    places,
+                    Pose((a + b) / 2 - turn * (places[i] + places[j]) / 2, float(np.angle(turn))),
+                    reach,
+                )
                 if pose is not None:
                     score, p = pose
                     if guess is not None:
-                        away = abs(p.centre - guess.centre) + reach * abs(np.angle(np.exp(1j * (p.angle - guess.angle))))
+                        away = abs(p.centre - guess.centre) + reach * abs(
+                            np.angle(np.exp(1j * (p.angle - guess.angle)))
+                        )
                         score -= 0.8 * min(away / reach, 1.0)
                     found.append((score, p))
     found.sort(key=lambda item: -item[0])
     return [pose for _, pose in found]
 
 
-def _support(patches: list[Blobs], places: NDArray[np.complex128], pose: Pose, reach: float) -> tuple[float, Pose] | None:
+def _support(
+    patches: list[Blobs], places: NDArray[np.complex128], pose: Pose, reach: float
+) -> tuple[float, Pose] | None:
     expected = pose.centre + places * np.exp(1j * pose.angle)
     at, got = [], []
     score = 0.0
@@ -96,5 +109,3 @@ def _support(patches: list[Blobs], places: NDArray[np.complex128], pose: Pose, r
     spin = np.vdot(body - body.mean(), seen - seen.mean())
     angle = float(np.angle(spin))
     return score, Pose(complex(seen.mean() - np.exp(1j * angle) * body.mean()), angle)
-
-

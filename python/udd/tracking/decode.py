@@ -31,6 +31,7 @@ class Picture:
     y: Plane
     u: Plane
     v: Plane
+    damaged: bool = False  # it, or one it was coded from, did not decode whole
 
 
 def light_of_codes(full_range: bool) -> NDArray[np.float64]:
@@ -63,8 +64,11 @@ class Film:
             self.promised = int(stream.frames)  # 0 where the container does not say
             rate = stream.average_rate or stream.guessed_rate
             self.fps = float(rate) if rate else math.nan
-            full = stream.codec_context.color_range == 2 or "yuvj" in (stream.codec_context.pix_fmt or "")
-            self.light = light_of_codes(full)  # of each brightness code
+            pixel = stream.codec_context.pix_fmt or ""
+            self.full_range = stream.codec_context.color_range == 2 or pixel.startswith(
+                ("yuvj", "rgb", "bgr", "gbr")
+            )
+            self.light = light_of_codes(self.full_range)  # of each brightness code
 
     def _open(self) -> Any:
         import av
@@ -83,7 +87,7 @@ class Film:
         import av
 
         self.broken = 0
-        index, last, row = 0, -math.inf, 0
+        index, last, row, damaged = 0, -math.inf, 0, False
         with self._open() as container:
             stream = container.streams.video[0]
             origin = stream.start_time or 0
@@ -96,10 +100,12 @@ class Film:
                 except StopIteration:
                     return
                 except av.error.FFmpegError:
-                    self.broken += 1
-                    row += 1
+                    self.broken, row, damaged = self.broken + 1, row + 1, True
                     continue
                 for frame in frames:
+                    broken = bool(frame.is_corrupt or packet.is_corrupt)
+                    # frames are coded as changes: after a broken one all are wrong up to the next whole picture
+                    damaged = broken or (damaged and not frame.key_frame)
                     if frame.pts is None or frame.time_base is None:
                         t = index / self.fps
                     else:
@@ -107,11 +113,12 @@ class Film:
                     if not t > last:  # a time stamp that stands still carries no new instant
                         self.broken += 1
                         continue
-                    yield _picture(frame, index, t)
+                    self.broken += broken
+                    yield _picture(frame, index, t, damaged)
                     index, last = index + 1, t
 
 
-def _picture(frame: Any, index: int, t: float) -> Picture:
+def _picture(frame: Any, index: int, t: float, damaged: bool) -> Picture:
     if frame.format.name not in ("yuv420p", "yuvj420p"):
         frame = frame.reformat(format="yuv420p")
     planes = []
@@ -121,4 +128,4 @@ def _picture(frame: Any, index: int, t: float) -> Picture:
     turns = round((frame.rotation or 0) / 90) % 4  # phones note how they were held
     if turns:
         planes = [np.ascontiguousarray(np.rot90(p, turns)) for p in planes]
-    return Picture(index, t, *planes)
+    return Picture(index, t, *planes, damaged=damaged)

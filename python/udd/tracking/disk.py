@@ -26,7 +26,9 @@ class Outline:
     points: int
 
 
-def outline(frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[np.bool_], light: NDArray[np.float64]) -> Outline:
+def outline(
+    frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[np.bool_], light: NDArray[np.float64]
+) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
     Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
@@ -57,7 +59,9 @@ def outline(frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[
         if np.abs(change).max() < 1e-6:
             break
     # frames are the independent pieces: edges within one share the light and the compression
-    means = np.array([np.average(rest[g], weights=weight[g]) for g in _groups(np.concatenate(group)) if g.any()])
+    means = np.array(
+        [np.average(rest[g], weights=weight[g]) for g in _groups(np.concatenate(group)) if g.any()]
+    )
     sigma = float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else 0.5
     return Outline(centre, radius, max(sigma, 0.01), len(z))
 
@@ -66,7 +70,13 @@ def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
     return [number == k for k in np.unique(number)]
 
 
-def _rim(y: NDArray[np.float64], view: NDArray[np.bool_], centre: complex, rays: NDArray[np.complex128], reach: float) -> NDArray[np.float64]:
+def _rim(
+    y: NDArray[np.float64],
+    view: NDArray[np.bool_],
+    centre: complex,
+    rays: NDArray[np.complex128],
+    reach: float,
+) -> NDArray[np.float64]:
     """Radius of the half-height crossing along each ray [pixels], NaN where none is clear."""
     import cv2
 
@@ -74,7 +84,9 @@ def _rim(y: NDArray[np.float64], view: NDArray[np.bool_], centre: complex, rays:
     radii = np.arange(SPAN[0] * reach, SPAN[1] * reach, step)
     at = centre + radii[None, :] * rays[:, None]
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
-    profile = cv2.remap(y.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    profile = cv2.remap(
+        y.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    ).astype(np.float64)
     clear = cv2.remap(view.astype(np.uint8), map_u, map_v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
     fall = profile[:, :-4] - profile[:, 4:]
     k = np.argmax(fall, axis=1) + 2

@@ -17,7 +17,9 @@ FASTEST = 24
 STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
 
 
-def exposure(bursts: list[list[Picture]], sights: list[Sight | None], look: Look, view: NDArray[np.bool_]) -> float:
+def exposure(
+    bursts: list[list[Picture]], sights: list[Sight | None], look: Look, view: NDArray[np.bool_]
+) -> float:
     """Exposure time [s]: what explains the fastest survey frames best; 0 if none is fast."""
     fast = _fast(bursts, sights, abs(look.marks[0].place))[:FASTEST]
     if not fast:
@@ -33,7 +35,7 @@ def exposure(bursts: list[list[Picture]], sights: list[Sight | None], look: Look
     best = float(SHARES[k])
     if 0 < k < len(SHARES) - 1:  # the vertex of the parabola through the lowest three
         a, b, c = cost[k - 1 : k + 2]
-        best += 0.5 * (a - c) / (a - 2 * b + c) * float(SHARES[1])
+        best += float(0.5 * (a - c) / (a - 2 * b + c) * SHARES[1])
     return best * float(np.median([dt for *_, dt in fast]))
 
 
@@ -47,7 +49,10 @@ def _fast(
         if len(burst) < 3 or here[0] is None or here[1] is None or here[2] is None:
             continue
         before, now, after = here[0], here[1], here[2]
-        turn = float(np.angle(np.exp(1j * (after.angle - now.angle))) + np.angle(np.exp(1j * (now.angle - before.angle))))
+        turn = float(
+            np.angle(np.exp(1j * (after.angle - now.angle)))
+            + np.angle(np.exp(1j * (now.angle - before.angle)))
+        )
         motion = Motion((after.centre - before.centre) / 2, turn / 2)
         path = abs(motion.shift) + abs(motion.turn) * reach
         if path > STREAK:
@@ -55,7 +60,9 @@ def _fast(
     return [tuple(item[1:]) for item in sorted(found, key=lambda item: -item[0])]  # type: ignore[misc]
 
 
-def _misfit(picture: Picture, sight: Sight, whole: Motion, share: float, look: Look, view: NDArray[np.bool_]) -> float:
+def _misfit(
+    picture: Picture, sight: Sight, whole: Motion, share: float, look: Look, view: NDArray[np.bool_]
+) -> float:
     """Sum of squares over fixed windows around the marks, so that shares compare on the same pixels."""
     motion = Motion(whole.shift * share, whole.turn * share)
     pose = Pose(sight.centre, sight.angle)

@@ -111,6 +111,4 @@ def sightings(pictures: list[Picture]) -> list[Sight | None]:
         return [None] * len(pictures)
     near = np.abs(np.log(reaches[:, None] / reaches[None, :])) < 0.03
     reach = float(reaches[np.argmax(near @ weight)])
-    return [
-        next((s for _, s in found if abs(np.log(s.reach / reach)) < 0.04), None) for found in everything
-    ]
+    return [next((s for _, s in found if abs(np.log(s.reach / reach)) < 0.04), None) for found in everything]

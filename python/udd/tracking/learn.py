@@ -22,7 +22,9 @@ WHOLE = 0.97  # share of its edges that a mark to learn from shows
 Seen = tuple[Pose, list[Sighting | None]]
 
 
-def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float, light: NDArray[np.float64]) -> Look:
+def learn(
+    seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float, light: NDArray[np.float64]
+) -> Look:
     """Fit shape, place and contrast of the four marks to the slowest survey frames.
 
     Poses and shapes are found in turns: poses from the present shapes, then one joint least-squares
@@ -32,13 +34,18 @@ def learn(seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white:
     reach = float(np.median([s.reach for _, s in seen]))
     half = float(np.sqrt(np.median([s.area for _, s in seen]))) / 2
     noise = _noise(seen, view, light, white)
-    marks = [Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white, light)) for d in BODY]
+    marks = [
+        Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white, light))
+        for d in BODY
+    ]
     psf, rim = 0.8, reach + 1.3 * half  # the true rim is found later, with these marks
     for turn in range(ROUNDS):
         look = Look(marks, psf, noise, light, rim)
         fits: list[Seen] = []
         for y, pose in frames:
-            fit = align(y, view, look, pose, Motion(), [0.5, 0.5, MISFIT] if turn == 0 else [MISFIT], gain_slack=1.0)
+            fit = align(
+                y, view, look, pose, Motion(), [0.5, 0.5, MISFIT] if turn == 0 else [MISFIT], gain_slack=1.0
+            )
             if fit is not None:
                 fits.append((pose, fit.sightings))
         marks, psf = _reshape(fits, look)
@@ -60,7 +67,13 @@ def _noise(
     return max(1.5 * code, float(np.median(levels)) if levels else 0.0)  # compression flattens, wrongly
 
 
-def _level(frames: Sequence[tuple[Plane, Pose]], place: complex, view: NDArray[np.bool_], white: float, light: NDArray[np.float64]) -> float:
+def _level(
+    frames: Sequence[tuple[Plane, Pose]],
+    place: complex,
+    view: NDArray[np.bool_],
+    white: float,
+    light: NDArray[np.float64],
+) -> float:
     """Light of a mark's middle against the disk's."""
     values = []
     for y, pose in frames:
@@ -92,8 +105,8 @@ def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
         marks.append(
             replace(
                 mark,
-                half=(mark.half[0] + change[1], mark.half[1] + change[2]),
-                turn=mark.turn + change[0],
+                half=(float(mark.half[0] + change[1]), float(mark.half[1] + change[2])),
+                turn=float(mark.turn + change[0]),
                 level=mark.level * float(np.median(gains)),
             )
         )
@@ -102,7 +115,9 @@ def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
     return _replace_places(marks, fits), psf
 
 
-def _shape_step(mark: Mark, pose: Pose, psf: float, s: Sighting) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _shape_step(
+    mark: Mark, pose: Pose, psf: float, s: Sighting
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normal equations for (turn, half sides, psf) after the local unknowns have taken what they can."""
     r0, r1, c0, c1 = s.box
     still = Motion()
@@ -136,9 +151,16 @@ def _replace_places(marks: list[Mark], fits: list[Seen]) -> list[Mark]:
         for pose, sightings in fits:
             s = sightings[k]
             if s is not None and s.complete > WHOLE:
-                step = solve(marks, sightings, pose.angle, np.array([float(x is not None and x.complete > WHOLE) for x in sightings]))
+                step = solve(
+                    marks,
+                    sightings,
+                    pose.angle,
+                    np.array([float(x is not None and x.complete > WHOLE) for x in sightings]),
+                )
                 if step is not None:
-                    shifts.append(complex(step.leftover[k][0], step.leftover[k][1]) * np.exp(-1j * pose.angle))
+                    shifts.append(
+                        complex(step.leftover[k][0], step.leftover[k][1]) * np.exp(-1j * pose.angle)
+                    )
         shift = complex(np.median(np.real(shifts)), np.median(np.imag(shifts))) if len(shifts) > 2 else 0j
         moved.append(replace(mark, place=mark.place + shift))
     return moved

@@ -64,6 +64,8 @@ def _one(
     picture: Picture, known: Known, past: list[tuple[float, Pose]], last: NDArray[np.uint8] | None
 ) -> tuple[str, Fit | None, Pose, float]:
     nowhere = Pose(complex(np.nan, np.nan), np.nan)
+    if picture.damaged:
+        return "damaged: the frame does not decode whole", None, nowhere, 0.0
     if float(picture.y[::8, ::8].std()) < FLAT:
         return "black: the frame shows nothing", None, nowhere, 0.0
     guess = predict(past, picture.t)
@@ -124,7 +126,9 @@ def _anywhere(
         motion = _motion(past, pose if recent else None, picture.t, known.exposure)
         fit = _hold(picture, known, pose, motion, FAR)
         if fit is not None:
-            score = float(np.nansum([s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s]))
+            score = float(
+                np.nansum([s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s])
+            )
             if best is None or score > best[0]:
                 best = (score, fit, pose, motion)
     return None if best is None else best[1:]
@@ -190,4 +194,6 @@ def _append(tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, st
     tracks.information.append(fit.step.information)
     tracks.leftover.append(np.where(used, fit.step.leftover, np.nan))
     tracks.chi2.append(np.where(fit.used, fit.step.chi2, np.nan))
-    tracks.complete.append(np.array([s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]))
+    tracks.complete.append(
+        np.array([s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)])
+    )

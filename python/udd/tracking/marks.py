@@ -47,7 +47,9 @@ class Sighting:
     residual: Array  # brightness left over, flat
 
 
-def coverage(mark: Mark, centre: complex, angle: float, motion: Motion, psf: float, box: tuple[int, int, int, int]) -> Array:
+def coverage(
+    mark: Mark, centre: complex, angle: float, motion: Motion, psf: float, box: tuple[int, int, int, int]
+) -> Array:
     """Share of each pixel of a window that the mark covers, averaged over the exposure.
 
     Parameters
@@ -92,9 +94,13 @@ def _slab(x: NDArray[np.float32], half: float, psf: float) -> NDArray[np.float32
     return x
 
 
-def window(mark: Mark, centre: complex, angle: float, motion: Motion, shape: tuple[int, int], margin: float = 5.0) -> tuple[int, int, int, int]:
+def window(
+    mark: Mark, centre: complex, angle: float, motion: Motion, shape: tuple[int, int], margin: float = 5.0
+) -> tuple[int, int, int, int]:
     """Rows and columns that hold the mark over the exposure, clipped to the picture."""
-    ends = [centre + s * motion.shift + mark.place * np.exp(1j * (angle + s * motion.turn)) for s in (-0.5, 0.5)]
+    ends = [
+        centre + s * motion.shift + mark.place * np.exp(1j * (angle + s * motion.turn)) for s in (-0.5, 0.5)
+    ]
     reach = np.hypot(*mark.half) + margin
     us, vs = [e.real for e in ends], [e.imag for e in ends]
     return (
@@ -144,7 +150,9 @@ def locate(
         return None
     patch = light[y[r0:r1, c0:c1]].ravel()
     level = mark.level
-    columns = np.stack([np.ones(cover.size), level * cover.ravel(), -level * grad_u.ravel(), -level * grad_v.ravel()])
+    columns = np.stack(
+        [np.ones(cover.size), level * cover.ravel(), -level * grad_u.ravel(), -level * grad_v.ravel()]
+    )
     precise = seen / (noise**2 + (misfit * level) ** 2 * edge2.ravel())
     weight = precise
     prior = np.diag([1e-12, gain_slack**-2, 1e-12, 1e-12])

@@ -24,7 +24,9 @@ class Pivot:
     rms: float  # misfit [pixels]
 
 
-def pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray[np.bool_], reach: float) -> Pivot | None:
+def pivot(
+    t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray[np.bool_], reach: float
+) -> Pivot | None:
     """Fit the rolling constraint in its integrated form; None where the motion does not determine it.
 
     In picture axes (u right, v down, angle clockwise) material of the disk at the contact p moves

@@ -61,7 +61,20 @@ def align(
     for misfit in rounds:
         psf = float(np.hypot(look.psf, 3 * misfit if misfit > 0.3 else 0.0))
         sightings = [
-            locate(y, look.light, view, m, pose.centre, pose.angle, motion, psf, look.noise, look.rim, gain_slack, misfit)
+            locate(
+                y,
+                look.light,
+                view,
+                m,
+                pose.centre,
+                pose.angle,
+                motion,
+                psf,
+                look.noise,
+                look.rim,
+                gain_slack,
+                misfit,
+            )
             for m in look.marks
         ]
         used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])

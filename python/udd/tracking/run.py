@@ -120,7 +120,9 @@ def track_in_detail(
         )
     known, rim = _prepare(film, look_over, sights, seen)
     tracks = _follow(film, known, look_over.frames, progress)
-    centre, angle = at_middle(np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure)
+    centre, angle = at_middle(
+        np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure
+    )
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     camera = _camera(tracks, known, rim, radius, pivot)
     spread = covariance(tracks, abs(known.look.marks[0].place))
@@ -175,7 +177,9 @@ def _follow(film: Film, known: Known, frames: int, progress: bool) -> Tracks:
         return follow(film.pictures(), known, lambda _: bar.update())
 
 
-def _camera(tracks: Tracks, known: Known, rim: Outline, radius: float, given: tuple[float, float] | None) -> Camera:
+def _camera(
+    tracks: Tracks, known: Known, rim: Outline, radius: float, given: tuple[float, float] | None
+) -> Camera:
     scale = rim.radius / radius
     angle, centre = np.array(tracks.angle), np.array(tracks.centre)
     good = np.isfinite(angle)
@@ -228,7 +232,7 @@ def _meta(
         "pivot_v": camera.pivot.imag,
         "pivot_sigma": camera.pivot_sigma,
         "pivot_from": camera.pivot_from,
-        "drive_seen": camera.drive.imag,
+        "drive_seen": float(camera.drive.imag),
         "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
         "marks_px": [[m.place.real, m.place.imag] for m in known.look.marks],
         "psf_px": known.look.psf,
@@ -237,18 +241,29 @@ def _meta(
 
 def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[NDArray[np.uint8]]:
     """Frames of a film by their number, as RGB arrays (height, width, 3), for drawing upon."""
-    import cv2
-
     wanted = {int(i) for i in frames}
     found: dict[int, NDArray[np.uint8]] = {}
-    for picture in Film(video).pictures():
+    film = Film(video)
+    for picture in film.pictures():
         if picture.index in wanted:
-            h, w = picture.y.shape
-            planes = [picture.y, *(cv2.resize(p, (w, h), interpolation=cv2.INTER_LINEAR) for p in (picture.v, picture.u))]
-            found[picture.index] = np.asarray(cv2.cvtColor(np.dstack(planes), cv2.COLOR_YCrCb2RGB), dtype=np.uint8)
+            found[picture.index] = _rgb(picture, film.full_range)
             if len(found) == len(wanted):
                 break
     lost = wanted - set(found)
     if lost:
         raise TrackError(f"{video}: there is no frame {min(lost)}")
     return [found[int(i)] for i in frames]
+
+
+def _rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
+    import cv2
+
+    h, w = picture.y.shape
+    y, u, v = (
+        cv2.resize(p, (w, h), interpolation=cv2.INTER_LINEAR).astype(np.float32)
+        for p in (picture.y, picture.u, picture.v)
+    )
+    if not full_range:
+        y, u, v = (y - 16) * (255 / 219), (u - 128) * (255 / 224) + 128, (v - 128) * (255 / 224) + 128
+    planes = np.clip(np.round(np.dstack([y, v, u])), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YCrCb2RGB), dtype=np.uint8)

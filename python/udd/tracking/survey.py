@@ -50,9 +50,9 @@ def survey(film: Film) -> Survey:
             most = max(8, min(BURSTS, int(MEMORY / (BURST * size))))
         if picture.y.shape != (height, width):
             raise TrackError(f"{film.path}: the picture changes its size at frame {picture.index}")
-        if number % stride:
+        if number % stride or picture.damaged:
             continue
-        if place == 0:
+        if place == 0 or not bursts:
             if len(bursts) == 2 * most:  # too many: keep every second one, and look half as often from here
                 bursts = bursts[::2]
                 stride *= 2
