@@ -59,14 +59,18 @@ def evidence(discovery: Any, ax: Any = None, *, stage: int = 0, most: int = 12) 
         )
         seen.add(kind)
     ax.axvline(
-        threshold(discovery, stage), color="black", linestyle="--", linewidth=1.2, label="what chance hardly reaches"
+        threshold(discovery, stage),
+        color="black",
+        linestyle="--",
+        linewidth=1.2,
+        label="what chance hardly reaches",
     )
     ax.set_yticks(range(len(scan)), [s.candidate.title for s in scan])
     ax.set_ylim(max(len(scan), 1) - 0.4, -0.6)
     ax.set_xscale("log")
     ax.set_xlim(left=0.5)
-    ax.set_xlabel("evidence: fall of χ² if this effect were added [1]")
-    ax.legend(frameon=False, loc="lower right")
+    ax.set_xlabel("evidence: fall of χ² if this effect were added")
+    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     tidy(ax)
     ax.grid(False, axis="y")
     return ax
@@ -105,28 +109,38 @@ def errors(discovery: Any, ax: Any = None) -> Axes:
     """
     if not hasattr(discovery, "error_before"):
         raise UddError(f"a discovery holds errors, not {type(discovery).__name__}")
+    from matplotlib.ticker import LogLocator
+
     before, after = discovery.error_before, discovery.error_after
     factor, unit = (1e3, "mm") if before.unit == "m" else (1e3, "mrad")
     ax = new_axes(ax)
     lines = [(before, BEFORE, "o", "the known model")]
     if discovery.effects:
-        lines.append((after, AFTER, "s", "with the added effect" + ("s" if len(discovery.effects) > 1 else "")))
+        lines.append(
+            (after, AFTER, "s", "with the added effect" + ("s" if len(discovery.effects) > 1 else ""))
+        )
     for k, (e, colour, marker, words) in enumerate(lines):
         h = np.array(e.horizons) * (1 + 0.03 * k)
         ax.plot(h, factor * e.median, color=colour, marker=marker, linewidth=1.8, label=words)
         ax.vlines(h, factor * e.low, factor * e.high, color=colour, linewidth=3, alpha=0.4)
     last = lines[-1][0]
     ax.plot(
-        last.horizons, factor * last.floor, color=FLOOR, linestyle=":", marker=".", linewidth=1.5, label="noise floor"
+        last.horizons,
+        factor * last.floor,
+        color=FLOOR,
+        linestyle=":",
+        marker=".",
+        linewidth=1.5,
+        label="noise floor",
     )
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xticks(before.horizons, [f"{h:g}" for h in before.horizons])
     ax.minorticks_off()
     ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.set_xlabel("time since the model was let go [s]")
     ax.set_ylabel(f"median error [{unit}]")
     ax.legend(frameon=False, loc="upper left")
     tidy(ax)
     return ax
-

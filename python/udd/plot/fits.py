@@ -40,7 +40,7 @@ def residuals(
     equation : str, optional
         The state whose rate it is; by default the one with the clearest pattern.
     against : str, optional
-        ``"t"``, a state, or ``"R"``; by default the coordinate along which the pattern is clearest.
+        ``"t"``, a state, or ``"R"``; by default that of Omega, Y, Z, theta, R along which the pattern is clearest.
     colour : str
         Of the means.
 
@@ -68,7 +68,15 @@ def residuals(
     ax.plot(x, y, ".", color=MEASURED, alpha=0.35, markersize=2.5, rasterized=True)
     centre, mean, error = binned(x, y)
     ax.errorbar(
-        centre, mean, 2 * error, color=colour, marker="o", markersize=4, linewidth=1.6, capsize=2, label="mean ± 2 s.e."
+        centre,
+        mean,
+        2 * error,
+        color=colour,
+        marker="o",
+        markersize=4,
+        linewidth=1.6,
+        capsize=2,
+        label="mean ± 2 s.e.",
     )
     ax.axhline(0, color="black", linewidth=0.8)
     ax.set_xlabel(label(against))
@@ -103,9 +111,23 @@ def misfit(fit: Any, ax: Any = None, *, channel: str | None = None) -> Axes:
     ax = new_axes(ax)
     t = fit.record.t
     ax.fill_between(
-        t[there], -2 * factor * sd[there], 2 * factor * sd[there], color=AFTER, alpha=0.2, linewidth=0, label="noise, ± 2 s.d."
+        t[there],
+        -2 * factor * sd[there],
+        2 * factor * sd[there],
+        color=AFTER,
+        alpha=0.2,
+        linewidth=0,
+        label="noise, ± 2 s.d.",
     )
-    ax.plot(t, factor * fit.misfit[:, k], ".", color=MEASURED, markersize=2.5, label="measured − fitted", rasterized=len(t) > 3000)
+    ax.plot(
+        t,
+        factor * fit.misfit[:, k],
+        ".",
+        color=MEASURED,
+        markersize=2.5,
+        label="measured − fitted",
+        rasterized=len(t) > 3000,
+    )
     ax.axhline(0, color="black", linewidth=0.8)
     ax.set_xlabel(label("t"))
     ax.set_ylabel(f"{words}: measured − fitted [{unit}]")
@@ -129,8 +151,8 @@ def clearest(fit: Any, equation: str | None = None, against: str | None = None) 
     best, found = -1.0, (names[0], "t")
     for name in [equation] if equation else names:
         for place, x in coordinates(fit).items():
-            if against not in (None, place):
-                continue
+            if place != against and (against is not None or place in ("t", "beta")):
+                continue  # along time, whatever changes slowly looks like a pattern
             share = pattern(x, fit.defect[:, names.index(name)])
             if share > best:
                 best, found = share, (name, place)

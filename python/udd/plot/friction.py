@@ -49,7 +49,13 @@ def friction(result: Any, ax: Any = None, *, fastest: float | None = None) -> Ax
         ax.axvspan(low, high, color="#f2f2f2", zorder=0, label="90 % of the frames")
         error = _error(fit, omega)
         ax.fill_between(
-            omega, best - error, best + error, color=AFTER, alpha=0.25, linewidth=0, label="± 1 standard error"
+            omega,
+            best - error,
+            best + error,
+            color=AFTER,
+            alpha=0.25,
+            linewidth=0,
+            label="± 1 standard error",
         )
     ax.plot(omega, best, color=AFTER, linewidth=1.8, label="k(Ω)")
     ax.axhline(0, color=FAINT, linewidth=0.8)

@@ -50,14 +50,20 @@ def time_series(result: Any, ax: Any = None, *, coordinates: Sequence[str] | Non
     names = tuple(coordinates) if coordinates is not None else _SHOWN[kind]
     units = {AXES[n][1] for n in names if n in AXES}
     if not names or not all(n in AXES for n in names) or len(units) != 1:
-        raise UddError(f"coordinates must share a unit and be of {', '.join(STATES[kind])}, not {', '.join(names)}")
+        raise UddError(
+            f"coordinates must share a unit and be of {', '.join(STATES[kind])}, not {', '.join(names)}"
+        )
     ax = new_axes(ax)
     for motion in drawn:
         dots = motion.title == "measured"
         for name, colour in zip(names, _COLOURS, strict=False):
             what = AXES[name][0] + (f", {motion.title}" if len(drawn) > 1 else "")
-            style: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 3} if dots else {"linewidth": 1.2}
-            values = motion[name] if name in motion.columns or len(drawn) == 1 else np.full(len(motion.t), np.nan)
+            style: dict[str, Any] = (
+                {"linestyle": "none", "marker": ".", "markersize": 3} if dots else {"linewidth": 1.2}
+            )
+            values = (
+                motion[name] if name in motion.columns or len(drawn) == 1 else np.full(len(motion.t), np.nan)
+            )
             shade = MEASURED if dots and len(drawn) > 1 else colour
             ax.plot(motion.t, scale(name) * values, color=shade, label=what, **style)
     ax.set_xlabel(label("tau" if kind == "dle" else "t"))
@@ -88,7 +94,9 @@ def orbit(result: Any, ax: Any = None) -> Axes:
     across, up = {"disk": ("Y", "Z"), "pendulum": ("theta", "Omega"), "dle": ("y", "z")}[kind]
     if kind == "pendulum":
         if up not in drawn[-1].columns:
-            raise UddError("a pendulum's measurement holds no angular velocity: fit it first, then draw the fit")
+            raise UddError(
+                "a pendulum's measurement holds no angular velocity: fit it first, then draw the fit"
+            )
         drawn = drawn[-1:]
     ax = new_axes(ax)
     for motion in drawn:
@@ -116,18 +124,10 @@ def _device(ax: Axes, drawn: Sequence[Motion]) -> None:
     if radius is not None:
         reach = scale("Y") * radius
         ax.add_patch(Circle((0, 0), reach, fill=False, edgecolor=FAINT, linewidth=1.5, linestyle="--"))
-        ax.set_xlim(-1.08 * reach, 1.08 * reach)
-        ax.set_ylim(-1.08 * reach, 1.08 * reach)
-        ax.annotate(
-            "beyond this circle the disk\nleaves the wheels",
-            (0, -reach),
-            xytext=(0, 5),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize="x-small",
-            color="#666666",
-        )
+        ax.set_xlim(-1.1 * reach, 1.1 * reach)
+        ax.set_ylim(-1.22 * reach, 1.1 * reach)
+        words = "beyond this circle the disk leaves the wheels"
+        ax.text(0, -1.04 * reach, words, ha="center", va="top", fontsize="x-small", color="#666666")
     ax.set_aspect("equal", adjustable="box")
 
 

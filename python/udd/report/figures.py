@@ -14,9 +14,10 @@ from udd import plot
 from udd.errors import UddError
 from udd.measurement import Measurement
 from udd.plot import fits
-from udd.plot.style import AFTER, BEFORE, EQUATIONS, MEASURED, label, scale, tidy
+from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
 from . import runs
+from .loose import loosened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,10 +57,10 @@ def orbits(discovery: Any) -> Image:
     figure = _figure(3.6 * n, 3.8)
     axes = figure.subplots(1, n, sharex=True, sharey=True, squeeze=False)[0]
     pendulum = discovery.measurement.kind == "pendulum"
-    if pendulum:
-        plot.orbit(discovery.fit, axes[0])
-    else:
+    if not pendulum:
         plot.orbit(discovery.measurement, axes[0])
+    plot.orbit(runs.smooth(discovery.fit), axes[0])
+    axes[0].lines[-1 if pendulum else -2].set(color=MEASURED, alpha=0.4)
     axes[0].set_title("fitted to the data" if pendulum else "measured")
     for ax, (words, fit, colour) in zip(axes[1:], runs_shown, strict=True):
         run = runs.free_run(fit)
@@ -89,13 +90,21 @@ def forecast(discovery: Any) -> Image:
     ax.plot(found.t_seen, scale(name) * found.seen[:, k], ".", color=MEASURED, markersize=5, label="measured")
     ax.plot(found.t, scale(name) * found.before[:, k], color=BEFORE, linewidth=1.5, label="the known model")
     if discovery.effects:
-        ax.plot(found.t, scale(name) * found.after[:, k], color=AFTER, linewidth=1.5, label="with the added effect")
+        ax.plot(
+            found.t,
+            scale(name) * found.after[:, k],
+            color=AFTER,
+            linewidth=1.5,
+            label="with the added effect",
+        )
     ax.axvline(found.start, color="black", linewidth=0.8)
     ax.set_xlabel(label("t"))
     ax.set_ylabel(label(name))
     ax.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     tidy(ax)
-    return _svg(figure, f"{name} over time: measured, and free runs of the models from the moment they are let go")
+    return _svg(
+        figure, f"{name} over time: measured, and free runs of the models from the moment they are let go"
+    )
 
 
 def residuals(discovery: Any) -> Image:
@@ -103,28 +112,32 @@ def residuals(discovery: Any) -> Image:
     columns = [("the known model", discovery.baseline, BEFORE)]
     if discovery.effects:
         columns.append(("with the added effect", discovery.fit, AFTER))
+    columns = [(words, loosened(fit), colour) for words, fit, colour in columns]
     names = discovery.baseline.model.state_names
     figure = _figure(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.3 * len(names) + 0.3)
     axes = figure.subplots(len(names), len(columns), squeeze=False, sharey="row")
     for row, name in zip(axes, names, strict=True):
-        against = fits.clearest(discovery.baseline, name)[1]
+        against = fits.clearest(columns[0][1], name)[1]
         spread = []
         for ax, (words, fit, colour) in zip(row, columns, strict=True):
             plot.residuals(fit, ax, equation=name, against=against, colour=colour)
             y = EQUATIONS[name][2] * fit.defect[:, names.index(name)]
             _, mean, error = fits.binned(fits.coordinates(fit)[against], y)
             spread.append(max(float(np.nanquantile(np.abs(y), 0.9)), float(np.max(np.abs(mean) + 3 * error))))
-            if row is axes[0]:
-                ax.set_title(words)
         row[0].set_ylim(-1.15 * max(spread), 1.15 * max(spread))
         for ax in row[1:]:
             ax.set_ylabel("")
-    return _svg(figure, "The residual of each equation against the coordinate along which it shows the clearest pattern")
+    for ax, (words, _, _) in zip(axes[0], columns, strict=True):
+        ax.set_title(words)
+    return _svg(
+        figure,
+        "The residual of each equation against the coordinate along which it shows the clearest pattern",
+    )
 
 
 def evidence(discovery: Any, stage: int) -> Image:
     """The evidence for each candidate at one stage of the search."""
-    figure = _figure(9.0, 0.8 + 0.3 * min(12, len(discovery.scans[stage])))
+    figure = _figure(9.0, 1.1 + 0.28 * min(12, len(discovery.scans[stage])))
     plot.evidence(discovery, figure.subplots(), stage=stage)
     return _svg(figure, "Bars: the evidence for each candidate effect; dashed: what chance hardly reaches")
 
@@ -140,7 +153,9 @@ def friction(fit: Any) -> Image:
     """The friction that was found."""
     figure = _figure(6.0, 3.2)
     plot.friction(fit, figure.subplots())
-    return _svg(figure, "The fitted friction coefficient against the angular velocity, with its standard error")
+    return _svg(
+        figure, "The fitted friction coefficient against the angular velocity, with its standard error"
+    )
 
 
 def misfits(fit: Any) -> Image:
@@ -150,6 +165,7 @@ def misfits(fit: Any) -> Image:
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for ax, name in zip(axes, names, strict=True):
         plot.misfit(fit, ax, channel=name)
+        ax.set_ylabel("{} [{}]".format(*CHANNELS[name][:2]))
         if ax is not axes[-1]:
             ax.set_xlabel("")
         if ax is not axes[0]:
@@ -181,7 +197,9 @@ def _fitted(fit: Any) -> Measurement:
     """The measurement as the fit says it should have been, where it was seen."""
     measurement = fit.measurement
     rest = np.where(np.isfinite(fit.residuals), fit.residuals, 0.0)
-    return Measurement(measurement.t, measurement.values - rest, meta=measurement.meta, names=measurement.names)
+    return Measurement(
+        measurement.t, measurement.values - rest, meta=measurement.meta, names=measurement.names
+    )
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -201,6 +219,6 @@ def _embedded(figure: Figure, kind: str, alt: str, dpi: int) -> Image:
     metadata: dict[str, Any] = {"Date": None, "Creator": None} if kind == "svg" else {}
     # Without the salt, and with the date, the same result would give another file every time.
     with mpl.rc_context({"svg.hashsalt": "udd"}):
-        figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata, bbox_inches="tight")
     mime = "image/svg+xml" if kind == "svg" else f"image/{kind}"
     return Image(f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode()}", alt)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from udd import _core
 from udd.errors import IntegrationError
@@ -50,6 +52,17 @@ def free_run(fit: Any) -> Trajectory | None:
         return None
 
 
+def smooth(fit: Any) -> Any:
+    """The fitted states with a curve through them, whose slopes are the model's."""
+    t = fit.record.t
+    curve = CubicHermiteSpline(t, fit.states, fit.model.rates(t, fit.states))
+    fine = np.unique(np.concatenate([t, np.arange(t[0], t[-1], _STEP)]))
+    state = curve(fine)
+    # No curve across a gap in the record.
+    state[~np.append(fit.record.linked, True)[np.searchsorted(t, fine, side="right") - 1]] = np.nan
+    return SimpleNamespace(t=fine, state=state, model=fit.model)
+
+
 def forecast(discovery: Any) -> Forecast:
     """From the first held-out frame on."""
     fit = discovery.fit
@@ -67,5 +80,7 @@ def forecast(discovery: Any) -> Forecast:
 def _predicted(fit: Any, first: int, times: Array) -> Array:
     start = fit.record.t[first : first + 1]
     states = fit.states[first : first + 1]
-    result: Array = _core.predict(fit.model, fit.point.camera, fit.point.clock, start, states, times[None, :])[0]
+    result: Array = _core.predict(
+        fit.model, fit.point.camera, fit.point.clock, start, states, times[None, :]
+    )[0]
     return result

@@ -64,9 +64,13 @@ def _value(fit: Any, name: str, unit: str) -> str:
 
 def _shown(unit: str) -> tuple[str, float]:
     """The unit in which small things are told, and by what to multiply."""
-    return {"rad": ("mrad", 1e3), "s": ("ms", 1e3), "m": ("mm", 1e3), "s/m": ("ms/m", 1e3), "": ("", 1.0)}.get(
-        unit, (unit, 1.0)
-    )
+    return {
+        "rad": ("mrad", 1e3),
+        "s": ("ms", 1e3),
+        "m": ("mm", 1e3),
+        "s/m": ("ms/m", 1e3),
+        "": ("", 1.0),
+    }.get(unit, (unit, 1.0))
 
 
 def _meaning(name: str, discovery: Any) -> str:
@@ -115,6 +119,9 @@ def errors(discovery: Any) -> list[dict[str, str]]:
                 "floor": words.length(a[3], after.unit),
             }
         )
+    if discovery.horizon is None:
+        whole = {key: words.length(e.whole, e.unit) for key, e in (("before", before), ("after", after))}
+        rows.append({"horizon": "all of it (r.m.s.)", **whole, "floor": "–"})
     return rows
 
 

@@ -7,6 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup, escape
+
 #: From this likeness on, no length of record at one drive tells two effects apart.
 IDENTICAL = 0.999
 
@@ -20,10 +22,8 @@ _SYMBOLS = (
     (r"\beps\b", "ε"),
     (r"\bpi\b", "π"),
     (r"dOmega\b", "dΩ"),
-    (r"\^2", "²"),
-    (r"\^3", "³"),
-    (r"\bk_plain\b", "k₀(Ω)"),
-    (r"\bW_c\b", "Wc"),
+    (r"\^(\d)", r"<sup>\1</sup>"),
+    (r"\b([A-Za-z])_([a-z]+)\b", r"\1<sub>\2</sub>"),
     (r"\+-", "±"),
     (r"(?<![\w.])-(?=[\w(|.])", "−"),
     (r" - ", " − "),
@@ -35,8 +35,8 @@ MEANINGS = {
     "W": "speed at which the wheels lift the disk",
     "R": "radius of the disk",
     "g": "gravity",
-    "k0": "friction coefficient: fast rotation",
-    "k1": "friction coefficient: at rest",
+    "k0": "friction coefficient of fast rotation",
+    "k1": "friction coefficient at rest",
     "k2": "how fast friction falls with the speed of rotation",
     "length": "length of the pendulum",
     "inertia": "moment of inertia per unit mass",
@@ -55,27 +55,44 @@ MEANINGS = {
 class Headline:
     """The numbers that stand at the top."""
 
-    horizon: str
+    span: str
     before: str
     after: str
     floor: str
+    floor_at: str
     ratio: str
     interval: str
-    better: str
 
 
-def pretty(text: str) -> str:
-    """A formula as a reader writes it: Greek letters, powers, minus signs."""
+def pretty(text: str) -> Markup:
+    """A formula or a unit as a reader writes it: Greek letters, powers, indices, minus signs."""
+    result = str(escape(text))
     for pattern, symbol in _SYMBOLS:
-        text = re.sub(pattern, symbol, text)
-    return text
+        result = re.sub(pattern, symbol, result)
+    return Markup(result)  # noqa: S704  (escaped above)
+
+
+#: The equation of the known model that a slot's effect enters.
+_ENTERS = {
+    "vertical": "dZ/dT = -Y Omega + W_c",
+    "lateral": "dY/dT = Z Omega + u",
+    "torque": "I dOmega/dT = ... + torque",
+    "friction": "I dOmega/dT = ... - k Omega",
+}
+
+
+def enters(effect: Any) -> list[str]:
+    """The equations that an effect changes."""
+    return [_ENTERS[slot] for slot in effect.slots if slot in _ENTERS]
 
 
 def verdict(discovery: Any) -> str:
     """The whole result in one sentence."""
     said = " and ".join(effect_sentence(f.effect) for f in discovery.effects)
     if discovery.verdict == "nothing missing":
-        return "Nothing is missing: the known model explains this motion down to the noise of the measurement."
+        return (
+            "Nothing is missing: the known model explains this motion down to the noise of the measurement."
+        )
     if discovery.verdict == "effect identified":
         return f"{said[0].upper()}{said[1:]}."
     return f"The model lacks something. Most likely {said}; but this record does not settle its form."
@@ -88,19 +105,24 @@ def effect_sentence(effect: Any) -> str:
 
 
 def headline(discovery: Any) -> Headline:
-    """The held-out errors at the horizon on which the decision rests."""
+    """The held-out errors on which the decision rests."""
     h = discovery.horizon
-    before, after = discovery.error_before.at(h), discovery.error_after.at(h)
-    unit = discovery.error_before.unit
+    before, after = discovery.error_before, discovery.error_after
+    unit = before.unit
+    if h is None:
+        span, values = "over all of it (r.m.s.)", (before.whole, after.whole)
+        h = before.horizons[-1]
+    else:
+        span, values = f"after {h:g}\u00a0s", (before.at(h)[0], after.at(h)[0])
     value, low, high = discovery.ratio
     return Headline(
-        horizon=f"{h:g} s",
-        before=length(before[0], unit),
-        after=length(after[0], unit),
-        floor=length(after[3], unit),
+        span=span,
+        before=length(values[0], unit),
+        after=length(values[1], unit),
+        floor=length(after.at(h)[3], unit),
+        floor_at=f"{h:g}\u00a0s",
         ratio=f"{value:.2g}",
         interval=f"{low:.2g} to {high:.2g}" if math.isfinite(low) else "not known: too few blocks",
-        better=f"{1 / value:.2g}",
     )
 
 
@@ -127,25 +149,28 @@ def with_error(value: float, error: float | None) -> str:
     size = math.floor(math.log10(max(abs(value), error)))
     if size >= 5 or size <= -4:
         digits = max(size - place + 1, 0)
-        power = str(size).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-        return f"({value / 10**size:.{digits}f} ± {error / 10**size:.{digits}f}) × 10{power}".replace("-", "−")
+        text = f"({value / 10**size:.{digits}f} ± {error / 10**size:.{digits}f}) × 10"
+        return Markup(f"{text}<sup>{size}</sup>".replace("-", "−"))  # noqa: S704  (numbers only)
     digits = max(1 - place, 0)
     return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
 
 
 def probability(p: float) -> str:
     """A small probability as a person says it."""
-    if p < 1e-300:
-        return "below 10⁻³⁰⁰"
     if p < 1e-3:
-        power = str(math.floor(math.log10(p)) + 1).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-        return f"below 10{power}"
+        power = math.floor(math.log10(max(p, 1e-300))) + (1 if p > 1e-300 else 0)
+        return Markup(f"below 10<sup>−{-power}</sup>")  # noqa: S704  (a number only)
     return f"{min(p, 1.0):.2g}"
 
 
 def unit_words(unit: str) -> str:
-    """A unit as it is written: ``1/m`` becomes ``per metre``."""
+    """A unit in a sentence: ``1/m`` becomes ``per metre``."""
     return {"1/m": "per metre", "1/s": "per second", "": ""}.get(unit, pretty(unit))
+
+
+def title_of(discovery: Any, name: str) -> str:
+    """What a reader calls one of the effects that were found."""
+    return next((f.effect.title for f in discovery.effects if f.effect.name == name), name)
 
 
 def limit(other: Any) -> str:
@@ -188,5 +213,7 @@ def limits(discovery: Any) -> list[str]:
             "same way look upright: only angles between them can be seen."
         )
     else:
-        result.append("Gravity was taken as known; only the ratio of the length to the inertia sets the period.")
+        result.append(
+            "Gravity was taken as known; only the ratio of the length to the inertia sets the period."
+        )
     return result
