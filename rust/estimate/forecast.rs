@@ -8,16 +8,23 @@ use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 use crate::run::Stop;
 
-/// The state at a window's end with its covariance.
-pub type Filtered<const D: usize> = ([f64; D], SMatrix<f64, D, D>);
+/// What a window of frames says on its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Filtered<const D: usize> {
+    /// The state at the first frame.
+    pub first: [f64; D],
+    /// The state at the last frame, where a forecast starts.
+    pub last: [f64; D],
+    /// Its covariance.
+    pub covariance: SMatrix<f64, D, D>,
+}
 
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
 where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The state at the last frame of each window `(first, last)`, from the frames in the window alone
-    /// and with all parameters held.
+    /// The states that each window of frames `(first, last)` gives on its own, all parameters held.
     pub fn filter(
         &self,
         point: &Point<D>,
@@ -35,7 +42,11 @@ where
             };
             let start = Point { states: point.states[first..=last].to_vec(), ..point.clone() };
             let solution = part.solve(start, options, stop)?;
-            Ok((solution.point.states[last - first], solution.state_covariance[last - first]))
+            Ok(Filtered {
+                first: solution.point.states[0],
+                last: solution.point.states[last - first],
+                covariance: solution.state_covariance[last - first],
+            })
         };
         windows.par_iter().map(one).collect()
     }

@@ -126,12 +126,7 @@ where
                 let mut damped = system.clone();
                 damped.damp(lambda);
                 let reduced = damped.eliminate(&self.record.t)?;
-                let step = reduced
-                    .schur
-                    .clone()
-                    .lu()
-                    .solve(&reduced.gradient)
-                    .ok_or_else(|| EstimateError::Undetermined("the equations are singular".into()))?;
+                let step = invert(&reduced.schur).ok_or_else(undetermined)? * &reduced.gradient;
                 let states = reduced.states(&step);
                 let promised = promise(&system, &states, &step);
                 let mut trial = point.clone();
@@ -175,9 +170,7 @@ where
     ) -> Result<Solution<D, M>, EstimateError> {
         let linear = self.linearise(&point, &self.roles())?;
         let reduced = self.equations(&point, &linear).eliminate(&self.record.t)?;
-        let covariance = invert(&reduced.schur).ok_or_else(|| {
-            EstimateError::Undetermined("some of them can change together without changing the fit".into())
-        })?;
+        let covariance = invert(&reduced.schur).ok_or_else(undetermined)?;
         let state_covariance = reduced.state_covariance(&covariance);
         let seen_variance =
             linear.h.iter().zip(&state_covariance).map(|(h, p)| (h * p * h.transpose()).diagonal()).collect();
@@ -194,6 +187,11 @@ where
             defect: linear.defect,
         })
     }
+}
+
+/// Where a matrix of information has no inverse.
+pub(super) fn undetermined() -> EstimateError {
+    EstimateError::Undetermined("some of them can change together without changing the fit".into())
 }
 
 /// By how much the linear model says a step lowers the cost.

@@ -61,7 +61,7 @@ where
 {
     /// Linearises the record around a point with respect to the states and to `roles`.
     pub fn linearise(&self, point: &Point<D>, roles: &[Role]) -> Result<Linear<D, M>, EstimateError> {
-        self.linearise_as(&self.family, point, roles)
+        self.linearise_as(&self.family, point, roles, TimeOrigin::Record)
     }
 
     /// The same with another family, to which the point's model parameters belong.
@@ -70,10 +70,11 @@ where
         family: &F,
         point: &Point<D>,
         roles: &[Role],
+        origin: TimeOrigin,
     ) -> Result<Linear<D, M>, EstimateError> {
         let frames: Vec<_> = (0..self.record.t.len())
             .into_par_iter()
-            .map(|i| self.frame(family, point, roles, i))
+            .map(|i| self.frame((family, origin), point, roles, i))
             .collect::<Result<_, _>>()?;
         let n = frames.len();
         let mut linear = Linear {
@@ -98,7 +99,7 @@ where
     /// Frame `i` and the link that leaves it, a pass for every few parameters.
     fn frame(
         &self,
-        family: &F,
+        family: (&F, TimeOrigin),
         point: &Point<D>,
         roles: &[Role],
         i: usize,
@@ -129,7 +130,7 @@ where
 
     fn pass(
         &self,
-        family: &F,
+        (family, origin): (&F, TimeOrigin),
         point: &Point<D>,
         (roles, chunk): (&[Role], &[usize]),
         i: usize,
@@ -148,7 +149,10 @@ where
         let system = family.build(&model);
         let x: [Wide; D] = from_fn(|k| Wide::variable(point.states[i][k], k));
         let pace = 1.0 + point.clock;
-        let t = self.record.t[i] * pace;
+        let t = match origin {
+            TimeOrigin::Record => self.record.t[i] * pace,
+            TimeOrigin::Frame => 0.0,
+        };
 
         let time = Wide::constant(t);
         let rate = system.rates(time, &x, &sides_of(&system, time, &x));
@@ -166,7 +170,7 @@ where
             return Ok(());
         }
 
-        let end = self.record.t[i + 1] * pace;
+        let end = t + (self.record.t[i + 1] - self.record.t[i]) * pace;
         let there = propagate(&system, t, end, x, &self.tolerance)
             .map_err(|source| EstimateError::Integration { t: self.record.t[i], source })?;
         let time = Wide::constant(end);
@@ -223,6 +227,15 @@ where
     }
 }
 
+/// From where time counts in the model's equations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TimeOrigin {
+    /// The record's own time.
+    Record,
+    /// Every frame's time starts at zero.
+    Frame,
+}
+
 struct Frame<const D: usize, const M: usize> {
     h: SMatrix<f64, M, D>,
     g: OMatrix<f64, Const<M>, Dyn>,
@@ -237,11 +250,13 @@ fn wrap(angle: f64) -> f64 {
     angle - (angle / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }
 
-/// The covariance that belongs to a symmetric matrix of information, or the names of what it leaves
-/// undetermined.
+/// The covariance that belongs to a symmetric matrix of information; none where it is singular.
 pub(super) fn invert(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     // Scaled to a unit diagonal, so that units do not decide what counts as singular.
     let n = information.nrows();
+    if n == 0 {
+        return Some(DMatrix::zeros(0, 0));
+    }
     let scale: Vec<f64> = (0..n).map(|j| information[(j, j)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
     let inverse = nalgebra::Cholesky::new(scaled)?.inverse();

@@ -18,6 +18,7 @@ mod linearise;
 mod record;
 mod score;
 mod sensor;
+mod waves;
 
 pub use bordered::{Bordered, Eliminated};
 pub use forecast::Filtered;
@@ -26,6 +27,7 @@ pub use linearise::Linear;
 pub use record::{Free, Point, Record, Role};
 pub use score::Score;
 pub use sensor::{AngleSensor, DiskCamera, Sensor};
+pub use waves::Probe;
 
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::linearise::invert;
-use super::{EstimateError, Estimator, Point, Role, Sensor};
+use super::gauss_newton::undetermined;
+use super::linearise::{TimeOrigin, invert};
+use super::{EstimateError, Estimator, Linear, Point, Role, Sensor};
 use crate::model::Family;
 
 /// The candidates' amplitudes near zero, everything else optimal: the cost falls by
@@ -30,13 +31,22 @@ where
         point: &Point<D>,
         groups: &[(F, Vec<f64>, Vec<Role>)],
     ) -> Result<Score, EstimateError> {
-        let own = self.free.len();
         let mut linear = self.linearise(point, &self.roles())?;
         for (family, values, roles) in groups {
             let wider = Point { model: values.clone(), ..point.clone() };
-            linear = linear.beside(&self.linearise_as(family, &wider, roles)?);
+            linear = linear.beside(&self.linearise_as(family, &wider, roles, TimeOrigin::Record)?);
         }
-        let reduced = self.equations(point, &linear).eliminate(&self.record.t)?;
+        self.score_columns(point, &linear)
+    }
+
+    /// The score of the columns that follow those of the free parameters.
+    pub(super) fn score_columns(
+        &self,
+        point: &Point<D>,
+        linear: &Linear<D, M>,
+    ) -> Result<Score, EstimateError> {
+        let own = self.free.len();
+        let reduced = self.equations(point, linear).eliminate(&self.record.t)?;
         let all = reduced.schur.nrows();
         let more = all - own;
         let matrix = reduced.schur.view((0, 0), (own, own)).into_owned();
@@ -47,9 +57,7 @@ where
         if own == 0 {
             return Ok(Score { gradient, information: corner, alone });
         }
-        let covariance = invert(&matrix).ok_or_else(|| {
-            EstimateError::Undetermined("some of them can change together without changing the fit".into())
-        })?;
+        let covariance = invert(&matrix).ok_or_else(undetermined)?;
         let solved = covariance * &cross;
         Ok(Score {
             gradient: gradient - solved.tr_mul(&reduced.gradient.rows(0, own)),

@@ -10,10 +10,11 @@ use super::errors::FitError;
 use super::interrupt;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, DiskCamera, EstimateError, Estimator, Free, Options, Point, Record, Role, Sensor,
+    AngleSensor, DiskCamera, EstimateError, Estimator, Free, Options, Point, Probe, Record, Role, Sensor,
 };
 use crate::integrate::Tolerance;
-use crate::model::Family;
+use crate::model::effects::Kind;
+use crate::model::{Effect, Family, Momentum};
 
 /// Frame by frame: time, what was seen, its information, and whether the next frame is linked.
 type Data<'py> = (
@@ -180,10 +181,11 @@ fn solve<'py>(
     each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
 }
 
-/// Gradient, information, and information were the free parameters known.
-type Scored<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+/// Three arrays.
+type Three<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-/// Gradient and information of candidates' amplitudes at zero, everything else optimal.
+/// Gradient and information of candidates' amplitudes at zero, everything else optimal, and the
+/// information were the free parameters known.
 #[pyfunction]
 fn score<'py>(
     py: Python<'py>,
@@ -193,7 +195,7 @@ fn score<'py>(
     free: Vec<FreeTuple>,
     diffusion: Vec<f64>,
     candidates: Vec<(Bound<'py, PyAny>, Vec<usize>)>,
-) -> PyResult<Scored<'py>> {
+) -> PyResult<Three<'py>> {
     fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
         model: (F, Vec<f64>, C),
         py: Python<'py>,
@@ -201,7 +203,7 @@ fn score<'py>(
         free: &[FreeTuple],
         diffusion: &[f64],
         groups: &[(F, Vec<f64>, Vec<Role>)],
-    ) -> PyResult<Scored<'py>> {
+    ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
         let score = interrupt::run(py, |_| estimator.score(&point, groups))?;
         let c = score.gradient.len();
@@ -238,7 +240,40 @@ fn score<'py>(
     }
 }
 
-/// The state and its covariance at the end of each window of frames, from that window alone.
+/// The score of a drive ripple at each of many frequencies: `(f, 2)`, `(f, 2, 2)` and `(f, 2)`.
+#[pyfunction]
+fn score_ripples<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    free: Vec<FreeTuple>,
+    diffusion: Vec<f64>,
+    frequencies: Vec<f64>,
+) -> PyResult<Three<'py>> {
+    let AnyModel::Disk(family, values) = AnyModel::from_python(model)? else {
+        return Err(PyValueError::new_err("only a disk has a drive"));
+    };
+    let highest = frequencies.iter().copied().fold(0.0, f64::max);
+    let basis: Vec<f64> = (1..=3).map(|k| highest * f64::from(k) / 3.0).collect();
+    let (mut wide, mut wide_values, mut roles) = (family.clone(), values.clone(), Vec::new());
+    for &f in &basis {
+        wide.effects.push(Effect { kind: Kind::DriveRipple, momentum: Some(Momentum::Consistent) });
+        roles.extend([Role::Model(wide_values.len()), Role::Model(wide_values.len() + 1)]);
+        wide_values.extend([0.0, 0.0, f]);
+    }
+    let probe = Probe { family: wide, values: wide_values, roles, frequencies: basis };
+    let (estimator, point) = problem((family, values, DiskCamera), &data, &start, &free, &diffusion)?;
+    let scores = interrupt::run(py, |_| estimator.score_waves(&point, &probe, &frequencies))?;
+    let n = scores.len();
+    Ok((
+        array(py, [n, 2], scores.iter().flat_map(|s| s.gradient.iter().copied()))?,
+        array(py, [n, 2, 2], scores.iter().flat_map(|s| s.information.iter().copied()))?,
+        array(py, [n, 2], scores.iter().flat_map(|s| s.alone.iter().copied()))?,
+    ))
+}
+
+/// From each window of frames alone: the state at its first frame, at its last, and the covariance there.
 #[pyfunction]
 fn filter<'py>(
     py: Python<'py>,
@@ -247,23 +282,30 @@ fn filter<'py>(
     start: Start<'py>,
     diffusion: Vec<f64>,
     windows: Vec<(usize, usize)>,
-) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+) -> PyResult<Three<'py>> {
     fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
         model: (F, Vec<f64>, C),
         py: Python<'py>,
         (data, start): (&Data<'py>, &Start<'py>),
         diffusion: &[f64],
         windows: &[(usize, usize)],
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, &[], diffusion)?;
         if windows.iter().any(|&(first, last)| first >= last || last >= estimator.record.t.len()) {
             return Err(PyValueError::new_err("a window reaches beyond the record"));
         }
         let options = Options::default();
         let ends = interrupt::run(py, |stop| estimator.filter(&point, windows, &options, stop))?;
-        let (states, covariances): (Vec<_>, Vec<_>) = ends.into_iter().unzip();
-        let n = states.len();
-        Ok((array(py, [n, D], states.into_iter().flatten())?, array(py, [n, D, D], numbers(&covariances))?))
+        let n = ends.len();
+        Ok((
+            array(py, [n, D], ends.iter().flat_map(|end| end.first))?,
+            array(py, [n, D], ends.iter().flat_map(|end| end.last))?,
+            array(
+                py,
+                [n, D, D],
+                ends.iter().flat_map(|end| end.covariance.transpose().iter().copied().collect::<Vec<_>>()),
+            )?,
+        ))
     }
     each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &diffusion, &windows))
 }
@@ -321,6 +363,7 @@ fn camera_parameters(kind: &str) -> PyResult<Vec<(&'static str, &'static str)>> 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(solve, module)?)?;
     module.add_function(wrap_pyfunction!(score, module)?)?;
+    module.add_function(wrap_pyfunction!(score_ripples, module)?)?;
     module.add_function(wrap_pyfunction!(filter, module)?)?;
     module.add_function(wrap_pyfunction!(predict, module)?)?;
     module.add_function(wrap_pyfunction!(camera_parameters, module)?)

@@ -65,30 +65,22 @@ def library(model: Model) -> list[Candidate]:
     return result
 
 
-def ripples(model: Model, duration: float, step: float) -> list[Candidate]:
-    """Effects with a frequency of their own, at every frequency that a record of this length can tell apart.
+def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
+    """A drive ripple at every frequency that a record can tell apart.
+
+    From two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart.
 
     Parameters
     ----------
     model : Model
-    duration, step : float
-        Of the record and between its frames, s.
+    t : ndarray (n,)
+        Times of the record's frames, s.
     """
-    result = []
-    for spec in effects.library():
-        scanned = [p for p in spec.parameters if p.role == "frequency"]
-        if not scanned or not _suits(spec, model) or spec.name in {e.name for e in model.effects}:
-            continue
-        for f in frequencies(duration, step):
-            effect = spec.make(**{scanned[0].name: float(f)})
-            result.append(Candidate(effect, f"{spec.title} at {f:.3g} Hz"))
-    return result
-
-
-def frequencies(duration: float, step: float) -> NDArray[np.float64]:
-    """Frequencies from two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart."""
-    highest = min(0.25 / step, 6.0)
-    return np.arange(2.0 / duration, highest, 0.5 / duration)
+    if not isinstance(model, Disk) or model.W == 0 or "drive_ripple" in {e.name for e in model.effects}:
+        return []
+    duration, step = t[-1] - t[0], np.median(np.diff(t))
+    frequencies = np.arange(2.0 / duration, min(0.25 / step, 6.0), 0.5 / duration)
+    return [Candidate(effects.drive_ripple(f=float(f)), f"drive ripple at {f:.3g} Hz") for f in frequencies]
 
 
 def _suits(spec: effects.Spec, model: Model) -> bool:

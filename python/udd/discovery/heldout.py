@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,8 @@ Array = NDArray[np.float64]
 
 #: Horizons of the free runs, s; those longer than a third of the held-out part are left out.
 HORIZONS = {"disk": (0.2, 0.4, 1.0, 2.0, 4.0), "pendulum": (0.5, 1.0, 4.0, 10.0, 20.0)}
-_FILTER = 1.0  # s of data before each start, from which its state is filtered
+_FILTER = {"disk": 1.0, "pendulum": 4.0}  # s of data before each start, from which its state is filtered
 _EVERY = 0.2  # s between starts
-_DRAWS = 40  # of each start's state, for the noise floor
 _BLOCK = 4.0  # s; starts within a block are resampled together
 
 
@@ -43,6 +43,10 @@ class Errors:
         The errors; NaN where the frame was not seen.
     blocks : ndarray of int (starts,)
         Starts with the same number are resampled together.
+    run : ndarray (n,)
+        Error of one free run over all held-out frames, from where the fit ended; NaN where a frame was not seen.
+    run_blocks : ndarray of int (n,)
+        Frames with the same number are resampled together.
     """
 
     unit: str
@@ -53,6 +57,13 @@ class Errors:
     floor: Array
     samples: Array
     blocks: NDArray[np.int64]
+    run: Array
+    run_blocks: NDArray[np.int64]
+
+    @property
+    def whole(self) -> float:
+        """Root mean square error of the free run over all held-out frames."""
+        return _rms(self.run[:, None])
 
     def at(self, horizon: float) -> tuple[float, float, float, float]:
         """``(median, low, high, floor)`` at one of the horizons."""
@@ -66,7 +77,7 @@ class Errors:
             {"horizon_s": h, **{key: float(getattr(self, key)[k]) for key in keys}}
             for k, h in enumerate(self.horizons)
         ]
-        return {"unit": self.unit, "starts": len(self.samples), "errors": rows}
+        return {"unit": self.unit, "starts": len(self.samples), "errors": rows, "whole_run_rms": self.whole}
 
 
 def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Errors:
@@ -84,8 +95,8 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
         Number of the first held-out frame.
     """
     kind = fit.measurement.kind
-    windows, ends, horizons = _windows(record, first, HORIZONS[kind])
-    states, covariances = _filtered(fit, record, windows)
+    windows, ends, horizons = _windows(record, first, HORIZONS[kind], _FILTER[kind])
+    firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
     seen = record.seen[ends]
@@ -94,52 +105,54 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
     predicted = _core.predict(fit.model, camera, clock, record.t[starts], states, times)
     samples = np.where(there, _distance(kind, predicted, seen), np.nan)
 
+    floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
-    scale = np.linalg.cholesky(covariances + 1e-24 * np.eye(states.shape[1]))
-    draws = rng.standard_normal((_DRAWS, *states.shape))
-    drawn = states + np.einsum("kij,dkj->dki", scale, draws)
-    runs = _core.predict(
-        fit.model,
-        camera,
-        clock,
-        np.tile(record.t[starts], _DRAWS),
-        drawn.reshape(-1, states.shape[1]),
-        np.tile(times, (_DRAWS, 1)),
-    ).reshape(_DRAWS, *predicted.shape)
-    noise = np.where(there[..., None], fit.noise.sd(record, record.states[:, 0])[ends], 0.0)
-    faultless = runs + noise * rng.standard_normal(runs.shape)
-    floor = np.median(np.where(there, _distance(kind, faultless, predicted), np.nan), axis=0)
 
     blocks = ((record.t[starts] - record.t[first]) // _BLOCK).astype(np.int64)
-    low, high = np.array([_interval(blocks, samples[:, k : k + 1], rng) for k in range(len(horizons))]).T
+    low, high = np.array([_interval(blocks, samples[:, k : k + 1], _median, rng) for k in range(len(horizons))]).T
     return Errors(
         unit="m" if kind == "disk" else "rad",
         horizons=horizons,
         median=np.nanmedian(samples, axis=0),
         low=low,
         high=high,
-        floor=np.nanmedian(floor, axis=0),
+        floor=floor,
         samples=samples,
         blocks=blocks,
+        run=_run(fit, record, first),
+        run_blocks=((record.t[first:] - record.t[first]) // _BLOCK).astype(np.int64),
     )
 
 
 def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> tuple[float, float, float]:
-    """The ratio of the median errors, after over before, with its 95 % interval from paired blocks."""
+    """The ratio of the median errors at a horizon, after over before, with its 95 % interval from paired blocks."""
     k = before.horizons.index(horizon)
     both = np.column_stack([after.samples[:, k], before.samples[:, k]])
-    low, high = _interval(before.blocks, both, np.random.default_rng(seed))
-    return float(_statistic(both)), low, high
+    return _ratio(before.blocks, both, _median, seed)
+
+
+def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> tuple[float, float, float]:
+    """The ratio of the errors of the free run over all held-out frames, with its 95 % interval."""
+    return _ratio(before.run_blocks, np.column_stack([after.run, before.run]), _rms, seed)
+
+
+def _ratio(
+    blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], float], seed: int
+) -> tuple[float, float, float]:
+    def ratio(rows: Array) -> float:
+        return measure(rows[:, :1]) / measure(rows[:, 1:])
+
+    return (ratio(both), *_interval(blocks, both, ratio, np.random.default_rng(seed)))
 
 
 def _windows(
-    record: Record, first: int, wanted: tuple[float, ...]
+    record: Record, first: int, wanted: tuple[float, ...], window: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
     """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
     t = record.t
     step = float(np.median(np.diff(t)))
     horizons = tuple(h for h in wanted if h <= (t[-1] - t[first]) / 3 and h >= step)
-    back, every = max(round(_FILTER / step), 6), max(round(_EVERY / step), 1)
+    back, every = max(round(window / step), 6), max(round(_EVERY / step), 1)
     ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
     run = np.concatenate([[0], np.cumsum(~record.linked)])
     windows, ends = [], []
@@ -151,13 +164,57 @@ def _windows(
 
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
-    """States at the windows' ends."""
-    kind = fit.measurement.kind
+    """States at the windows' first and last frames."""
     data = (record.t, record.seen, information_for(fit, record), record.linked)
     start = (record.states, fit.point.camera, fit.point.clock)
-    middle = list(levels(kind)[1])
-    states, covariances = _core.filter(fit.model, data, start, middle, [(int(a), int(b)) for a, b in windows])
-    return states, covariances
+    middle = list(levels(fit.measurement.kind)[1])
+    first, last, _covariance = _core.filter(fit.model, data, start, middle, [(int(a), int(b)) for a, b in windows])
+    return first, last
+
+
+def _run(fit: Fit, record: Record, first: int) -> Array:
+    """Error of one free run from the last fitted frame to the record's end, frame by frame."""
+    camera, clock = fit.point.camera, fit.point.clock
+    start, times = record.t[first - 1 : first], record.t[None, first:]
+    predicted = _core.predict(fit.model, camera, clock, start, fit.states[-1:], times)[0]
+    errors = _distance(fit.measurement.kind, predicted, record.seen[first:])
+    return np.where(record.observed[first:].all(axis=1), errors, np.nan)
+
+
+def _floor(
+    fit: Fit, record: Record, windows: NDArray[np.int64], ends: NDArray[np.int64], first: Array, seed: int
+) -> Array:
+    """Median errors of the same filter and free runs on data that the model made itself, with the noise found.
+
+    ``first`` holds the states at the windows' first frames, where the made runs start.
+    """
+    rng = np.random.default_rng(seed)
+    camera, clock = fit.point.camera, fit.point.clock
+    n, length = len(windows), int(windows[0, 1] - windows[0, 0]) + 1
+    frames = np.hstack([windows[:, :1] + np.arange(length), ends])
+    made = _core.predict(fit.model, camera, clock, record.t[frames[:, 0]], first, record.t[frames])
+    sd = fit.noise.sd(record, record.states[:, 0])[frames]
+    made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
+
+    # Windows overlap: each is laid out as frames of its own, linked to no other.
+    inside = frames[:, :length].ravel()
+    own = replace(
+        record,
+        t=record.t[inside],
+        seen=made[:, :length].reshape(n * length, -1),
+        sigma=record.sigma[inside],
+        rho=record.rho[inside],
+        linked=np.tile(np.arange(length) < length - 1, n)[:-1],
+        states=record.states[inside],
+        row=record.row[inside],
+    )
+    starts = length * np.arange(n)
+    _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
+    runs = _core.predict(fit.model, camera, clock, record.t[windows[:, 1]], last, record.t[ends])
+    there = record.observed[ends].all(axis=2)
+    errors = np.where(there, _distance(fit.measurement.kind, runs, made[:, length:]), np.nan)
+    result: Array = np.nanmedian(errors, axis=0)
+    return result
 
 
 def _distance(kind: str, a: Array, b: Array) -> Array:
@@ -171,20 +228,24 @@ def _distance(kind: str, a: Array, b: Array) -> Array:
     return result
 
 
-def _statistic(columns: Array) -> float:
-    """The median of one column, or the ratio of two columns' medians."""
-    medians = np.nanmedian(columns, axis=0)
-    return float(medians[0]) if len(medians) == 1 else float(medians[0] / medians[1])
+def _median(column: Array) -> float:
+    return float(np.nanmedian(column))
 
 
-def _interval(blocks: NDArray[np.int64], columns: Array, rng: np.random.Generator) -> tuple[float, float]:
-    """95 % interval of the statistic over resampled blocks."""
-    groups = [columns[blocks == b] for b in np.unique(blocks)]
+def _rms(column: Array) -> float:
+    return float(np.sqrt(np.nanmean(column**2)))
+
+
+def _interval(
+    blocks: NDArray[np.int64], rows: Array, measure: Callable[[Array], float], rng: np.random.Generator
+) -> tuple[float, float]:
+    """95 % interval of a statistic of the rows, over resampled blocks of them."""
+    groups = [rows[blocks == b] for b in np.unique(blocks)]
     if len(groups) < 3:
         return float("nan"), float("nan")
 
     def statistic(chosen: NDArray[np.int64]) -> float:
-        return _statistic(np.concatenate([groups[i] for i in chosen]))
+        return measure(np.concatenate([groups[i] for i in chosen]))
 
     interval = bootstrap(
         (np.arange(len(groups)),),

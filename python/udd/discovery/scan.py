@@ -13,12 +13,10 @@ from scipy.stats import chi2 as chi2_distribution
 from udd import _core
 from udd.fitting import Fit
 
-from .candidates import Candidate
+from .candidates import Candidate, ripples
 
 #: A candidate is absorbed when the free parameters take this share of its information.
 _ABSORBED = 1e-4
-#: How many candidates with a frequency are scored in one solve.
-_BATCH = 24
 
 
 @dataclass(frozen=True)
@@ -99,12 +97,15 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
     return Scan(scored, gradient, information, columns, scatter)
 
 
-def scan_frequencies(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
-    """Score many candidates, a few at a time: only each one's own score is kept."""
-    result: list[Scored] = []
-    for first in range(0, len(candidates), _BATCH):
-        result += scan(fit, candidates[first : first + _BATCH]).scored
-    return result
+def scan_ripples(fit: Fit) -> list[Scored]:
+    """Score a drive ripple at every frequency that the record can tell apart; nothing for a pendulum."""
+    candidates = ripples(fit.model, fit.record.t)
+    if not candidates:
+        return []
+    frequencies = [c.effect.parameters["f"] for c in candidates]
+    scores = _core.score_ripples(*fit.problem.arguments(fit.point), frequencies)
+    scatter = max(fit.scatter, 1.0)
+    return [_score(c, *score, scatter) for c, *score in zip(candidates, *scores, strict=True)]
 
 
 def _score(
@@ -136,7 +137,7 @@ def _score(
 
 def physical(candidate: Candidate, estimate: Sequence[float], errors: Sequence[float]) -> bool:
     """Whether amplitudes lie in their range, give or take their error."""
-    ranges = [candidate.effect.ranges[p] for p in candidate.effect.amplitudes]
+    ranges = [p.range for p in candidate.effect.spec.parameters if p.role == "amplitude"]
     return all(
         low - 2 * e <= a <= high + 2 * e for a, e, (low, high) in zip(estimate, errors, ranges, strict=True)
     )

@@ -15,7 +15,7 @@ from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model
 
-from .noise import Noise, estimated, stated
+from .noise import Noise, colour, estimated, stated
 from .parameters import Free, free_parameters
 from .record import Record, record_of
 
@@ -26,9 +26,11 @@ Array = NDArray[np.float64]
 #: where the noise is estimated; at the tight end small effects show.
 SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
     "disk": ((0.1, 1e-4, 1e-4, 1e-3), (0.02, 3e-5, 3e-5, 3e-4), (3e-3, 1e-5, 1e-5, 1e-4)),
-    "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5)),
+    "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5), (1e-4, 3e-6), (1e-5, 3e-7)),
 }
 _FRAME = 0.04
+_NOISE_ROUNDS = 12
+_FOLLOWS = 0.7  # a fit whose leverage is larger follows each frame
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,15 @@ class Fit:
     def scatter(self) -> float:
         """chi2 per degree of freedom: 1 where model and noise explain the data."""
         return self.chi2 / self.dof
+
+    def inflation(self, before: Fit) -> float:
+        """By what a fall of chi2 from another fit is divided before it counts.
+
+        The scatter that remains, times how much stronger the misfits are at the frequencies where the two differ.
+        """
+        sd = self.noise.sd(self.record, self.states[:, 0])
+        misfit, signature = self.misfit / sd, (before.misfit - self.misfit) / sd
+        return max(self.scatter, 1.0) * colour(misfit, signature)
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads: parameters with errors, noise, goodness."""
@@ -244,7 +255,8 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     order = list(model.parameters)
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
     problem = replace(fitted.problem, model=model, free=fitted.problem.free + more)
-    return _tighten(fitted.measurement, problem, replace(fitted.point, model=model.parameters))
+    start = replace(fitted.point, model=model.parameters)
+    return _tighten(fitted.measurement, problem, start, levels(fitted.measurement.kind)[1:])
 
 
 def levels(kind: str) -> tuple[tuple[float, ...], ...]:
@@ -253,21 +265,43 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
 
 
 def _anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
-    """Solve from loose to tight; the noise is estimated at the loose end, where a wrong model does no harm."""
-    problem = replace(problem, diffusion=levels(measurement.kind)[0])
-    for _ in range(3):
+    """Solve from loose to tight.
+
+    The noise is estimated at the loosest level at which the misfits still show it: there a wrong model does the least
+    harm. At looser ones the states follow every frame, and noise and model error cannot be told apart.
+    """
+    schedule = levels(measurement.kind)
+    as_stated = problem.noise
+    for number, diffusion in enumerate(schedule):
+        problem = replace(problem, diffusion=diffusion, noise=as_stated)
+        shown, problem, point = _estimate_noise(measurement, problem, point)
+        if shown:
+            break
+    return _tighten(measurement, problem, point, schedule[number:])
+
+
+def _estimate_noise(measurement: Measurement, problem: Problem, point: Point) -> tuple[bool, Problem, Point]:
+    """Fit and estimate the noise in turns; whether the misfits show it, and what was found."""
+    for _ in range(_NOISE_ROUNDS):
         result = solve(measurement, problem, point)
-        point = result.point
-        problem = replace(
-            problem,
-            noise=estimated(problem.record, point.states[:, 0], result.misfit, result.misfit_variance, problem.noise),
-        )
-    return _tighten(measurement, problem, point)
+        point, before = result.point, problem.noise
+        omega = point.states[:, 0]
+        seen = problem.record.observed
+        leverage = (result.misfit_variance / before.sd(problem.record, omega) ** 2)[seen]
+        if leverage.mean() > _FOLLOWS:
+            return False, problem, point
+        noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
+        problem = replace(problem, noise=noise)
+        if before.like(noise, problem.record, omega):
+            break
+    return True, problem, point
 
 
-def _tighten(measurement: Measurement, problem: Problem, point: Point) -> Fit:
+def _tighten(
+    measurement: Measurement, problem: Problem, point: Point, schedule: Sequence[tuple[float, ...]]
+) -> Fit:
     """Solve for ever smaller errors of the model."""
-    for diffusion in levels(measurement.kind)[1:]:
+    for diffusion in schedule:
         problem = replace(problem, diffusion=diffusion)
         result = solve(measurement, problem, point)
         point = result.point

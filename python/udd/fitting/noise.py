@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
@@ -15,6 +16,8 @@ Array = NDArray[np.float64]
 
 #: A frame farther out than this share of honest frames counts less (Huber).
 _HONEST = 0.99
+#: Frequencies over which the misfits' power is averaged.
+_BAND = 17
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,12 @@ class Noise:
         result: Array = self.weight[:, None, None] * inverse * scale[:, :, None] * scale[:, None, :]
         return result
 
+    def like(self, other: Noise, record: Record, omega: Array) -> bool:
+        """Whether two noises agree to 3 % in the median."""
+        seen = record.observed
+        ratio = self.sd(record, omega)[seen] / other.sd(record, omega)[seen]
+        return bool(abs(np.median(ratio) - 1.0) < 0.03)
+
 
 def stated(record: Record) -> Noise:
     """The noise that the measurement itself states."""
@@ -75,12 +84,17 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     """
     seen = record.observed
     distance = _distance(record, misfit, before.sd(record, omega))
-    limit = np.sqrt(chi2.ppf(_HONEST, seen.sum(axis=1).clip(1)))
+    channels = seen.sum(axis=1).clip(1)
+    limit = np.sqrt(chi2.ppf(_HONEST, channels))
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
+    # The variance comes from the frames within the limit, where honest noise would show this share of its own.
+    shown = chi2.cdf(limit**2, channels + 2) / _HONEST
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
-        use = seen[:, m]
-        power = weight[use] * misfit[use, m] ** 2 + seen_variance[use, m]
+        use = seen[:, m] & (weight == 1.0)
+        # A fit follows its data: each squared misfit is smaller than the noise's by the fit's leverage.
+        leverage = seen_variance[use, m] / before.sd(record, omega)[use, m] ** 2
+        power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)
         terms = np.column_stack([record.sigma[use, m] ** 2, omega[use] ** 2])
         variance = before.sd(record, omega)[use, m] ** 2
         for _ in range(3):  # the scatter of a squared misfit grows with its own expectation
@@ -97,3 +111,23 @@ def _distance(record: Record, misfit: Array, sd: Array) -> Array:
     normal = np.where(np.isfinite(sd), misfit / np.where(np.isfinite(sd), sd, 1.0), 0.0)
     squared = np.einsum("ni,nij,nj->n", normal, np.linalg.inv(record.rho), normal)
     return np.sqrt(np.maximum(squared, 0.0))
+
+
+def colour(misfit: Array, signature: Array) -> float:
+    """How much stronger misfits are at the frequencies where an effect shows than on average, at least 1.
+
+    Misfits that go together for many frames, like those of a lens, look like an effect more easily than white noise.
+
+    Parameters
+    ----------
+    misfit, signature : ndarray (n, m)
+        The misfits of a fit with the effect, and by how much they differ from those without it, both in units of the
+        noise; NaN where nothing was seen. The worst channel counts.
+    """
+    worst = 1.0
+    for e, s in zip(np.nan_to_num(misfit).T, np.nan_to_num(signature).T, strict=True):
+        power = uniform_filter1d(np.abs(np.fft.rfft(e)) ** 2, _BAND, mode="nearest")
+        weight = np.abs(np.fft.rfft(s)) ** 2
+        if weight.sum() > 0 and power.sum() > 0:
+            worst = max(worst, float((weight @ power) / weight.sum() / power.mean()))
+    return worst

@@ -1,0 +1,70 @@
+"""Records of simulated disks as a camera would give them, with its defects: for tests and benches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import udd
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What a camera gets wrong. Lengths in m, angles in rad, times in s."""
+
+    noise: float = 5e-4
+    angle_noise: float = 7e-3
+    per_speed: float = 5e-5  # growth of the position's noise, m per rad/s
+    offset: tuple[float, float] = (1e-3, -7e-4)
+    tilt: float = 0.012
+    scale: float = 0.002
+    lag: float = 1e-3
+    clock: float = 3e-4
+    row: float = 0.01
+    exposure: float = 0.01
+    outliers: float = 0.01
+    lost: float = 0.02
+
+
+def start_between_wheels(model: udd.Disk, duration: float, rng: np.random.Generator) -> list[float]:
+    """A random start from which the disk stays between the wheels."""
+    for _ in range(400):
+        radius, angle = rng.uniform(0.01, 0.05), rng.uniform(0, 2 * np.pi)
+        state = [rng.normal(0, 2), radius * np.sin(angle), radius * np.cos(angle), rng.uniform(0, 6)]
+        if udd.simulate(model, [0.0, duration], state, rtol=1e-7, atol=1e-9).outcome == "finished":
+            return state
+    raise RuntimeError("no start stays between the wheels")
+
+
+def film(
+    model: udd.Disk,
+    rng: np.random.Generator,
+    duration: float = 60.0,
+    camera: Camera | None = None,
+    state: list[float] | None = None,
+) -> tuple[udd.Measurement, np.ndarray]:
+    """A record at 25 frames a second and the true states."""
+    camera = camera or Camera()
+    state = state or start_between_wheels(model, duration, rng)
+    t = np.arange(0, duration - 0.05, 0.04)
+    sub = 8
+    fine = ((t + 0.02)[:, None] + camera.exposure * (np.arange(sub) + 0.5 - sub / 2) / sub).ravel()
+    # A tilted camera sees a tilted world; a lagging orientation is an earlier one; a clock that is fast counts more.
+    run = udd.simulate(model, np.unique(np.concatenate([[0.0], fine])), state, rtol=1e-9, atol=1e-11).state[1:]
+    mean = run.reshape(len(t), sub, 4).mean(axis=1)
+    omega, y, z, beta = mean.T
+    late = -camera.row * z
+    y, z, beta = y + late * z * omega, z + late * (model.W - y * omega), beta + (late - camera.lag) * omega
+    c, s, size = np.cos(camera.tilt), np.sin(camera.tilt), 1 + camera.scale
+    sd = camera.noise + camera.per_speed * np.abs(omega)
+    sd_angle = camera.angle_noise + camera.per_speed / 0.065 * np.abs(omega)
+    far = np.where(rng.random(len(t)) < camera.outliers, 8.0, 1.0)
+    seen = np.column_stack(
+        [
+            size * (c * y + s * z) + camera.offset[0] + far * sd * rng.standard_normal(len(t)),
+            size * (c * z - s * y) + camera.offset[1] + far * sd * rng.standard_normal(len(t)),
+            beta + camera.tilt + far * sd_angle * rng.standard_normal(len(t)),
+        ]
+    )
+    seen[rng.random(len(t)) < camera.lost] = np.nan
+    return udd.Measurement((t + 0.02) / (1 + camera.clock), seen, meta={"W": model.W, "R": model.R}), mean
