@@ -1,7 +1,7 @@
 """Pictures of what the other functions return: a result goes in, the Axes come back.
 
-Every function takes ``ax=None``; without Axes it makes a new figure. Nothing is computed here that the results do
-not already hold, and no global matplotlib setting is changed.
+Every function takes ``ax=None``; without Axes it makes a new figure. Nothing is computed here that the
+results do not already hold, and no global matplotlib setting is changed.
 """
 
 from __future__ import annotations

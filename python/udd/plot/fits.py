@@ -30,8 +30,8 @@ def residuals(
 ) -> Axes:
     """The residual of one equation, frame by frame, with its mean along a coordinate.
 
-    It is by how much each fitted state misses what the model makes of the one before, per second. Where the model is
-    right it is noise about zero, whatever it is drawn against.
+    It is by how much each fitted state misses what the model makes of the one before, per second. Where the
+    model is right it is noise about zero, whatever it is drawn against.
 
     Parameters
     ----------
@@ -40,7 +40,8 @@ def residuals(
     equation : str, optional
         The state whose rate it is; by default the one with the clearest pattern.
     against : str, optional
-        ``"t"``, a state, or ``"R"``; by default that of Omega, Y, Z, theta, R along which the pattern is clearest.
+        ``"t"``, a state, or ``"R"``; by default that of Omega, Y, Z, theta, R along which the pattern is
+        clearest.
     colour : str
         Of the means.
 
@@ -86,7 +87,7 @@ def residuals(
 
 
 def misfit(fit: Any, ax: Any = None, *, channel: str | None = None) -> Axes:
-    """What was seen less what was fitted, against time, with the noise that was found (two standard deviations).
+    """What was seen less what was fitted, against time, with a band of two standard deviations of the noise.
 
     Parameters
     ----------

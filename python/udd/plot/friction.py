@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 def friction(result: Any, ax: Any = None, *, fastest: float | None = None) -> Axes:
     """The friction coefficient k(Omega) of a model, with a band of one standard error where it was fitted.
 
-    It is read off the model's own rates at the contact, where gravity and the drive exert no torque, so that every drag
-    that was added is in it: k = -I (dOmega/dT)/Omega.
+    It is read off the model's own rates at the contact, where gravity and the drive exert no torque, so that
+    every drag that was added is in it: k = -I (dOmega/dT)/Omega.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def friction(result: Any, ax: Any = None, *, fastest: float | None = None) -> Ax
 
 
 def coefficient(model: Any, omega: Array) -> Array:
-    """k at the given angular velocities, m^2/s; what does not change sign with Omega is no friction."""
+    """Friction coefficient, m^2/s; what does not change sign with Omega is no friction."""
     disk = model.kind == "disk"
     inertia = model.R**2 / 2 if disk else model.inertia
     state = np.zeros((2, len(omega), len(model.state_names)))

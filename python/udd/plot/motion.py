@@ -146,8 +146,8 @@ def phase_space(result: Any, ax: Any = None) -> Axes:
     Raises
     ------
     UddError
-        Of a pendulum, whose phase space is a plane (see :func:`orbit`), of a measurement, which holds no angular
-        velocity, or of Axes without a third dimension.
+        Of a pendulum, whose phase space is a plane (see :func:`orbit`), of a measurement, which holds no
+        angular velocity, or of Axes without a third dimension.
     """
     motion = only(result)
     if motion.kind == "pendulum":

@@ -119,7 +119,7 @@ def residuals(discovery: Any) -> Image:
     for row, name in zip(axes, names, strict=True):
         against = fits.clearest(columns[0][1], name)[1]
         spread = []
-        for ax, (words, fit, colour) in zip(row, columns, strict=True):
+        for ax, (_, fit, colour) in zip(row, columns, strict=True):
             plot.residuals(fit, ax, equation=name, against=against, colour=colour)
             y = EQUATIONS[name][2] * fit.defect[:, names.index(name)]
             _, mean, error = fits.binned(fits.coordinates(fit)[against], y)
@@ -188,9 +188,17 @@ def frames(discovery: Any, film: str | os.PathLike[str]) -> Image:
     axes = figure.subplots(1, _FRAMES, squeeze=False)[0]
     for ax, picture, row in zip(axes, pictures_at(film, [int(r) for r in chosen]), chosen, strict=True):
         plot.overlay(picture, geometry, int(row), ax)
+        _look_at(geometry, picture.shape, ax)
         ax.set_axis_off()
         ax.set_title(f"T = {m.t[row]:.2f} s", fontsize="medium")
     return _embedded(figure, "jpeg", "Frames of the film with the fitted disk drawn over them", dpi=130)
+
+
+def _look_at(geometry: Any, shape: tuple[int, ...], ax: Any) -> None:
+    """Show what the disk can reach, as far as the picture goes."""
+    (u, v), reach = geometry.pivot, 2.1 * geometry.radius
+    ax.set_xlim(max(u - reach, -0.5), min(u + reach, shape[1] - 0.5))
+    ax.set_ylim(min(v + reach, shape[0] - 0.5), max(v - reach, -0.5))
 
 
 def _fitted(fit: Any) -> Measurement:
@@ -216,7 +224,7 @@ def _embedded(figure: Figure, kind: str, alt: str, dpi: int) -> Image:
     import matplotlib as mpl
 
     buffer = io.BytesIO()
-    metadata: dict[str, Any] = {"Date": None, "Creator": None} if kind == "svg" else {}
+    metadata = {"Date": None, "Creator": None} if kind == "svg" else None
     # Without the salt, and with the date, the same result would give another file every time.
     with mpl.rc_context({"svg.hashsalt": "udd"}):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata, bbox_inches="tight")

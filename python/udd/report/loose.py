@@ -13,8 +13,8 @@ _FOLLOWS = 0.7  # of the noise's variance: above it the states merely follow eac
 def loosened(fit: Fit) -> Fit:
     """Solve again with a larger assumed error of the model.
 
-    A tight fit of a wrong model bends the states to obey it, and its residuals with them. Of the levels that the fit
-    went through, the loosest is taken at which the states are still smoother than the data.
+    A tight fit of a wrong model bends the states to obey it, and its residuals with them. Of the levels that
+    the fit went through, the loosest is taken at which the states are still smoother than the data.
     """
     result = fit
     for diffusion in levels(fit.measurement.kind):

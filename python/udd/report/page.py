@@ -22,7 +22,7 @@ def write(
     source: str | os.PathLike[str] | None = None,
     command: str | None = None,
 ) -> None:
-    """Write a discovery as one HTML page that stands alone: pictures first, no script, nothing from elsewhere.
+    """Write a discovery as one HTML page that stands alone: pictures first, no script, no links.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def pretty(text: str) -> Markup:
     result = str(escape(text))
     for pattern, symbol in _SYMBOLS:
         result = re.sub(pattern, symbol, result)
-    return Markup(result)  # noqa: S704  (escaped above)
+    return Markup(result)
 
 
 #: The equation of the known model that a slot's effect enters.
@@ -88,7 +88,7 @@ def enters(effect: Any) -> list[str]:
 
 def verdict(discovery: Any) -> str:
     """The whole result in one sentence."""
-    said = " and ".join(effect_sentence(f.effect) for f in discovery.effects)
+    said = " and ".join(" or ".join(_meanings(f, discovery)) for f in discovery.effects)
     if discovery.verdict == "nothing missing":
         return (
             "Nothing is missing: the known model explains this motion down to the noise of the measurement."
@@ -96,6 +96,16 @@ def verdict(discovery: Any) -> str:
     if discovery.verdict == "effect identified":
         return f"{said[0].upper()}{said[1:]}."
     return f"The model lacks something. Most likely {said}; but this record does not settle its form."
+
+
+def _meanings(found: Any, discovery: Any) -> list[str]:
+    """What was found, and what acts on the disk identically."""
+    same = [
+        a.effect
+        for a in discovery.alternatives
+        if a.likeness > IDENTICAL and a.instead_of == found.effect.name
+    ]
+    return list(dict.fromkeys(effect_sentence(e) for e in [found.effect, *same]))
 
 
 def effect_sentence(effect: Any) -> str:
@@ -150,7 +160,7 @@ def with_error(value: float, error: float | None) -> str:
     if size >= 5 or size <= -4:
         digits = max(size - place + 1, 0)
         text = f"({value / 10**size:.{digits}f} ± {error / 10**size:.{digits}f}) × 10"
-        return Markup(f"{text}<sup>{size}</sup>".replace("-", "−"))  # noqa: S704  (numbers only)
+        return Markup(f"{text}<sup>{size}</sup>".replace("-", "−"))
     digits = max(1 - place, 0)
     return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
 
@@ -159,7 +169,7 @@ def probability(p: float) -> str:
     """A small probability as a person says it."""
     if p < 1e-3:
         power = math.floor(math.log10(max(p, 1e-300))) + (1 if p > 1e-300 else 0)
-        return Markup(f"below 10<sup>−{-power}</sup>")  # noqa: S704  (a number only)
+        return Markup(f"below 10<sup>−{-power}</sup>")
     return f"{min(p, 1.0):.2g}"
 
 
@@ -177,11 +187,12 @@ def limit(other: Any) -> str:
     """Why one alternative stays open."""
     if other.likeness > IDENTICAL:
         return (
-            "At one drive speed the two act on the disk identically, and no longer record would tell them apart: "
-            "film a second drive and fit both together."
+            "At one drive speed the two act on the disk identically, and no longer record would tell them "
+            "apart: film a second drive and fit both together."
         )
     if other.nats < 0:
-        return f"It fits even a little better ({-other.nats:.1f} units of log-likelihood), but was not chosen first."
+        better = f"{-other.nats:.1f} units of log-likelihood"
+        return f"It fits even a little better ({better}), but fails another test."
     return (
         f"It fits worse by {other.nats:.1f} units of log-likelihood; only from 10 on is a form excluded. "
         "A longer record, or one at another drive, would settle it."
@@ -193,8 +204,10 @@ def short_limits(discovery: Any) -> list[str]:
     same = [a for a in discovery.alternatives if a.likeness > IDENTICAL]
     if not same:
         return []
-    names = " or ".join(dict.fromkeys(a.effect.title for a in same))
-    return [f"At this one drive speed it cannot be told from {names}: a film at a second drive would."]
+    names = " or ".join(
+        dict.fromkeys(f"{a.effect.title} ({a.effect.equation})" for a in same if a.effect.title)
+    )
+    return [f"At one drive speed it cannot be told from {names}: a film at a second drive would tell."]
 
 
 def limits(discovery: Any) -> list[str]:
@@ -203,14 +216,14 @@ def limits(discovery: Any) -> list[str]:
     result = []
     if not found:
         result.append(
-            "An effect smaller than this record can show may still be there: nothing missing means nothing that these "
-            "data demand."
+            "An effect smaller than this record can show may still be there: nothing missing means nothing "
+            "that these data demand."
         )
     result.append("Only the effects of the library were tried; the tables above name them.")
     if discovery.measurement.kind == "disk":
         result.append(
-            "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that all lean the "
-            "same way look upright: only angles between them can be seen."
+            "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that "
+            "all lean the same way look upright: only angles between them can be seen."
         )
     else:
         result.append(

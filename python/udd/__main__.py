@@ -1,0 +1,9 @@
+"""`python -m udd` is the command `udd`."""
+
+from __future__ import annotations
+
+import sys
+
+from udd.cli import main
+
+sys.exit(main())

@@ -1,0 +1,7 @@
+"""The command line `udd`. Exit codes: 0 fine, 1 bad input, 2 wrong usage, 130 on Ctrl-C."""
+
+from __future__ import annotations
+
+from .run import main
+
+__all__ = ["main"]

@@ -1,0 +1,32 @@
+"""`udd demo`: from the film that ships with the package to a page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .answer import Answer, telling, watched
+from .discover import describe
+from .options import new
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Track the sample film, find what the model lacks, and write the page that says so."
+    parser = new(commands, "demo", run, summary)
+    parser.add_argument(
+        "--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default ./demo)"
+    )
+    parser.add_argument("--null", action="store_true", help="the film of a disk that lacks nothing")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    from udd.demo import demo
+
+    with telling() as tell:
+        made = demo(args.out, null=args.null, progress=tell, bar=watched())
+    text = f"{describe(made.discovery)}\nmeasurement: {made.measurement}\nreport: {made.report}"
+    data = {"measurement": made.measurement, "report": made.report, **made.discovery.to_dict()}
+    return Answer(text, data)

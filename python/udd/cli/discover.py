@@ -1,0 +1,80 @@
+"""`udd discover`: which effect the model lacks."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import UddError
+
+from .answer import Answer, telling
+from .fit import options
+from .inputs import add_input, check_early, measurement_of, model_of
+from .options import new
+
+if TYPE_CHECKING:
+    from udd.discovery import Discovery
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = new(
+        commands, "discover", run, "Find the effect that the model lacks, from a film or a measurement."
+    )
+    add_input(parser)
+    parser.add_argument("--report", type=Path, metavar="HTML", help="page to write, pictures first")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    from udd.discovery import discover
+
+    check_early(args)
+    if args.report is not None and not args.report.parent.is_dir():
+        raise UddError(f"{args.report}: there is no folder {args.report.parent}")
+    measurement, film = measurement_of(args)
+    model = model_of(args, measurement)
+    with telling() as tell:
+        found = discover(measurement, model, progress=tell, **options(args))
+        if args.report is not None:
+            tell("writing the report")
+            command = shlex.join(["udd", *sys.argv[1:]])
+            found.report(args.report, film=film, source=args.file, command=command)
+    text, data = describe(found), {"file": args.file, **found.to_dict()}
+    if args.report is not None:
+        text += f"\nreport: {args.report}"
+        data["report"] = args.report
+    return Answer(text, data)
+
+
+def describe(found: Discovery) -> str:
+    """A discovery in a few lines, the verdict first."""
+    from udd.report import words
+
+    numbers = words.headline(found)
+    lines = [f"{found.verdict}: {words.verdict(found)}"]
+    for effect in found.effects:
+        unit = {p.name: p.unit for p in effect.effect.spec.parameters}
+        values = ", ".join(
+            " ".join(filter(None, [f"{name} = {_with_error(value, effect.errors.get(name))}", unit[name]]))
+            for name, value in effect.parameters.items()
+        )
+        lines.append(f"  {effect.title}: {effect.equation}, {values}")
+    span = numbers.span.replace("\u00a0", " ")
+    at = numbers.floor_at.replace("\u00a0", " ")
+    if found.effects:
+        lines.append(f"  held-out error {span}: {numbers.before} -> {numbers.after}")
+        lines.append(f"  ratio {numbers.ratio}, 95 % interval {numbers.interval}")
+    else:
+        lines.append(f"  held-out error {span}: {numbers.before}")
+    lines.append(f"  noise floor after {at}: {numbers.floor}")
+    for other in found.alternatives:
+        lines.append(f"  could equally be {other.title}: {other.effect.expression}. {words.limit(other)}")
+    return "\n".join(lines)
+
+
+def _with_error(value: float, error: float | None) -> str:
+    return f"{value:.5g}" if error is None else f"{value:.5g} +- {error:.2g}"

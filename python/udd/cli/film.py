@@ -1,0 +1,66 @@
+"""`udd film`: what a camera would see of a simulated run."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any
+
+from udd.errors import UddError
+
+from .answer import Answer, watched
+from .options import disk, new
+from .simulate import add_run, run_model
+
+_STEP = 0.005  # s between samples of the run, short enough for the camera
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = new(commands, "film", run, "Film a simulated run of the disk, as a camera before it would.")
+    parser.add_argument("out", type=Path, metavar="OUT.mp4", help="film to write")
+    add_run(parser)
+    parser.add_argument("--fps", type=float, default=25.0, help="frames per second (default 25)")
+    parser.add_argument(
+        "--exposure", type=float, default=0.01, help="seconds that the shutter is open (default 0.01)"
+    )
+    parser.add_argument("--size", default="550x700", help="width x height in pixels (default 550x700)")
+    parser.add_argument("--tilt", type=float, default=0.0, help="the camera's tilt [rad] (default 0)")
+    parser.add_argument("--noise", type=float, default=2.0, help="sensor noise in codes of 255 (default 2)")
+    parser.add_argument(
+        "--quality", type=float, default=20.0, help="constant rate factor, 0 best to 51 (default 20)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    from udd.film import render
+    from udd.film.encoding import checked_path, require_video
+
+    if args.W is None:
+        raise UddError("say the drive speed with --W in m/s (--W 0 where the wheels stand still)")
+    size = re.fullmatch(r"(\d+)[xX](\d+)", args.size)
+    if size is None:
+        raise UddError(f"--size must be width x height, such as 550x700, not {args.size}")
+    model = disk(args, args.W, 0.08 if args.R is None else args.R)
+    require_video()
+    checked_path(args.out)
+    trajectory = run_model(model, args, _STEP, dense=True)
+    made = render(
+        trajectory,
+        args.out,
+        fps=args.fps,
+        exposure=args.exposure,
+        size=(int(size[1]), int(size[2])),
+        tilt=args.tilt,
+        noise=args.noise,
+        quality=args.quality,
+        seed=args.seed,
+        progress=watched(),
+    )
+    left = ", until the disk leaves the wheels" if trajectory.outcome == "ejected" else ""
+    text = f"{made.path}: {len(made.t)} frames, {made.t[-1]:.2f} s{left}"
+    data = {"file": made.path, "frames": len(made.t), "outcome": trajectory.outcome, "model": repr(model)}
+    return Answer(text, data)

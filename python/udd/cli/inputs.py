@@ -1,0 +1,110 @@
+"""A measurement from a file or a film, and the model that the options and its header describe."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from udd.errors import UddError
+
+from .answer import watched
+from .options import add_disk, add_pendulum, disk, pendulum
+
+if TYPE_CHECKING:
+    from udd.measurement import Measurement
+    from udd.models import Disk, Pendulum
+
+_FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".3gp"}
+
+
+def add_input(parser: argparse.ArgumentParser) -> None:
+    """A file and what is known of the device."""
+    parser.add_argument(
+        "file", type=Path, help="a film, or a measurement (CSV or Parquet: t,Y,Z,beta or t,theta)"
+    )
+    add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
+    add_pendulum(parser)
+    parser.add_argument(
+        "--columns",
+        help='names of the columns of a file without a header, such as "t,theta,_" (_: passed over)',
+    )
+    parser.add_argument(
+        "--free", help="the model's free parameters, such as k0,W (default: k0,k1,k2,W and effects)"
+    )
+    parser.add_argument("--no-camera", action="store_true", help="take the camera as faultless")
+
+
+def is_film(path: Path) -> bool:
+    """Whether a file is a film rather than a table, by its name or else its first bytes."""
+    if path.suffix.lower() in _FILMS:
+        return True
+    try:
+        with path.open("rb") as file:
+            start = file.read(4096)
+    except OSError:
+        return False  # the reader of tables says what is wrong
+    return b"\0" in start and not start.startswith(b"PAR1")
+
+
+def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
+    """The measurement in a file, and the film if it is one."""
+    known = {"W": args.W, "R": args.R}
+    if not is_film(args.file):
+        from udd.measurement import read_measurement
+
+        return read_measurement(args.file, args.columns, **known), None
+    if args.pendulum is not None:
+        raise UddError("a film of a pendulum cannot be tracked: --pendulum takes a table with t,theta")
+    from udd.tracking import track
+
+    found = track(args.file, disk_radius=0.08 if args.R is None else args.R, progress=watched())
+    return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
+
+
+def model_of(args: argparse.Namespace, measurement: Measurement) -> Disk | Pendulum:
+    """The known model: what the command line says wins over the measurement's header."""
+    if measurement.kind == "pendulum":
+        if args.pendulum is None:
+            raise UddError(f"{args.file} is a pendulum's record: say its length in m with --pendulum LENGTH")
+        return pendulum(args)
+    if args.pendulum is not None:
+        raise UddError(f"{args.file} is a disk's record, so --pendulum does not apply")
+    W = _known(args, measurement, "W")
+    if W is None:
+        raise UddError(
+            f"the drive speed is in neither the command line nor the header of {args.file}: "
+            "say --W in m/s (--W 0 where the wheels stand still)"
+        )
+    R = _known(args, measurement, "R")
+    return disk(args, W, 0.08 if R is None else R)
+
+
+def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
+    value = getattr(args, name)
+    if value is None:
+        value = measurement.meta.get(name)
+    if value is None:
+        return None
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise UddError(f"{args.file}: {name} in the header must be a number, not {value!r}") from None
+
+
+def check_early(args: argparse.Namespace) -> None:
+    """Refuse what no film could mend, before minutes of work are spent on it."""
+    from udd.models import Disk, Pendulum
+
+    if args.pendulum is not None:
+        Pendulum(args.pendulum, inertia=args.inertia, g=args.g)
+    elif args.W is not None or is_film(args.file):
+        if args.W is None:
+            raise UddError(
+                f"the drive speed is not known: say --W in m/s with the film {args.file} "
+                "(--W 0 where the wheels stand still)"
+            )
+        Disk(args.W, R=0.08 if args.R is None else args.R, g=args.g)
+    from .options import effects
+
+    effects(args.effect)

@@ -1,0 +1,105 @@
+"""Options that several commands share, and what they say as models."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import UddError
+
+if TYPE_CHECKING:
+    from udd.effects import Effect
+    from udd.models import Disk, Pendulum
+
+
+def new(commands: Any, name: str, run: Any, summary: str) -> argparse.ArgumentParser:
+    """A command with what all have."""
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=summary, description=summary)
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON, and nothing else, to standard output"
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
+    """The disk's parameters."""
+    group = parser.add_argument_group("the disk")
+    group.add_argument("--W", type=float, metavar="M/S", help=drive)
+    group.add_argument("--R", type=float, metavar="M", help="radius [m] (default 0.08)")
+    group.add_argument("--g", type=float, default=9.81, help="gravity [m/s^2] (default 9.81)")
+    for name, unit in (("k0", "m^2/s, fast"), ("k1", "m^2/s, at rest"), ("k2", "m^2, fall with the speed")):
+        group.add_argument(f"--{name}", type=float, help=f"friction [{unit}] (default: the paper's)")
+    add_effects(parser)
+
+
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """Effects by name."""
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:P=V,...",
+        help="an effect with its parameters, such as relaxation:b=5,momentum=constraint; repeatable",
+    )
+
+
+def disk(args: argparse.Namespace, W: float, R: float) -> Disk:
+    """The disk that the options describe."""
+    from udd.models import Disk
+
+    friction = {name: getattr(args, name) for name in ("k0", "k1", "k2") if getattr(args, name) is not None}
+    return Disk(W, R=R, g=args.g, effects=effects(args.effect), **friction)
+
+
+def pendulum(args: argparse.Namespace) -> Pendulum:
+    """The pendulum that the options describe."""
+    from udd.models import Pendulum
+
+    k0 = {} if args.k0 is None else {"k0": args.k0}
+    return Pendulum(args.pendulum, inertia=args.inertia, g=args.g, effects=effects(args.effect), **k0)
+
+
+def add_pendulum(parser: argparse.ArgumentParser) -> None:
+    """A pendulum instead."""
+    group = parser.add_argument_group("a pendulum instead of the disk")
+    group.add_argument("--pendulum", type=float, metavar="LENGTH", help="pivot to centre of mass [m]")
+    group.add_argument(
+        "--inertia", type=float, help="about the pivot, per unit mass [m^2] (default LENGTH^2)"
+    )
+
+
+def effects(texts: list[str]) -> list[Effect]:
+    """Effects from ``name:p=v,...``."""
+    from udd.effects import library
+    from udd.errors import ModelError
+
+    specs = {spec.name: spec for spec in library()}
+    result = []
+    for text in texts:
+        name, _, rest = text.partition(":")
+        if name not in specs:
+            raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
+        values: dict[str, float] = {}
+        momentum = None
+        for item in filter(None, rest.split(",")):
+            key, equals, value = item.partition("=")
+            if key.strip() == "momentum":
+                momentum = value.strip()
+                continue
+            try:
+                values[key.strip()] = float(value)
+            except ValueError:
+                raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number") from None
+            if not equals:
+                raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number")
+        result.append(specs[name].make(momentum=momentum, **values))
+    return result
+
+
+def numbers(texts: list[str], what: str) -> list[float]:
+    """Numbers given apart or with commas."""
+    try:
+        return [float(item) for text in texts for item in text.split(",") if item.strip()]
+    except ValueError:
+        raise UddError(f"{what} must be numbers, not {' '.join(texts)}") from None

@@ -1,0 +1,41 @@
+"""The commands and their options."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from . import demo, discover, film, fit, lyapunov, simulate, track
+
+_COMMANDS = (demo, simulate, lyapunov, film, track, fit, discover)
+
+
+class Parser(argparse.ArgumentParser):
+    """An ArgumentParser that takes ``-1e-3`` and ``-1,2`` for values."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, allow_abbrev=False, **kwargs)
+        self._negative_number_matcher = re.compile(r"^-\.?\d")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    parser = Parser(
+        prog="udd",
+        description="The laboratory of the upward-driven disk: film it, fit it, find what the model lacks.",
+        epilog="Begin with `udd demo`. Each command has its own help: udd discover --help",
+    )
+    parser.add_argument("--version", action="version", version=f"udd {_version()}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    for command in _COMMANDS:
+        command.add(commands)
+    return parser
+
+
+def _version() -> str:
+    try:
+        return version("udd")
+    except PackageNotFoundError:
+        return "(not installed)"

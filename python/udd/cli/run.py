@@ -1,0 +1,77 @@
+"""From the arguments to the exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+from udd.errors import UddError
+
+from .answer import Answer, as_json
+from .parser import make_parser
+
+_EXTRAS = {"av": "track", "cv2": "track"}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments; by default those of the process.
+
+    Returns
+    -------
+    int
+        0 fine, 1 bad input, 130 on Ctrl-C, 141 where nobody reads the output. Wrong usage leaves by
+        ``SystemExit(2)``, as argparse does.
+    """
+    parser = make_parser()
+    args = parser.parse_args(argv)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", UserWarning)
+            warnings.showwarning = _warn
+            answer = args.run(args)
+        _print(answer, args.json)
+        sys.stdout.flush()
+    except UddError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        print("udd: stopped", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The interpreter flushes once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except ImportError as error:
+        name = (error.name or "").partition(".")[0]
+        if name not in _EXTRAS:
+            raise
+        return _fail(f'{name} is not installed, which films need: pip install "udd[{_EXTRAS[name]}]"')
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{where}{error.strerror or error}")
+    except MemoryError:
+        return _fail("there is not enough memory for this; ask for less at once")
+    return answer.code
+
+
+def _print(answer: Answer, json: bool) -> None:
+    if json:
+        print(as_json(answer.data))
+    elif answer.text:
+        print(answer.text)
+
+
+def _fail(message: str) -> int:
+    print(f"udd: error: {' '.join(message.split())}", file=sys.stderr)
+    return 1
+
+
+def _warn(message: Warning | str, *_details: Any, **_more: Any) -> None:
+    print(f"udd: warning: {' '.join(str(message).split())}", file=sys.stderr)

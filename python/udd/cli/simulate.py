@@ -1,0 +1,123 @@
+"""`udd simulate`: run a model."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import UddError
+
+from .answer import Answer
+from .options import add_disk, add_pendulum, disk, new, numbers, pendulum
+
+if TYPE_CHECKING:
+    from udd.models import Model
+    from udd.trajectory import Trajectory
+
+_START = {"disk": [0.0, 1e-3, 0.04, 0.0], "dle": [1.0, 1.0, 0.01], "pendulum": [0.0, 0.5]}
+_MOST = 10_000_000  # rows
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = new(commands, "simulate", run, "Run a model from an initial state; the table is CSV.")
+    add_run(parser)
+    parser.add_argument(
+        "--w", type=float, help="drive of the dimensionless equations (DLE) instead of the disk"
+    )
+    parser.add_argument("--B", type=float, default=0.0, help="their damping (default 0)")
+    parser.add_argument("--dt", type=float, default=0.01, help="time between rows (default 0.01)")
+    parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
+    parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
+    parser.add_argument("--out", type=Path, metavar="CSV", help="file to write; otherwise standard output")
+    add_pendulum(parser)
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """What a run of the disk takes."""
+    add_disk(parser, "drive speed [m/s]")
+    parser.add_argument("--t", type=float, default=60.0, help="length of the run (default 60)")
+    parser.add_argument(
+        "--state",
+        nargs="+",
+        metavar="X",
+        help="initial state Omega Y Z beta [rad/s m m rad]; with --w omega y z; with --pendulum Omega theta",
+    )
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    model = _model(args)
+    result = run_model(model, args, args.dt, args.rtol, args.atol)
+    names, units = model.state_names, model.state_units
+    end = ", ".join(
+        f"{n} = {v:.6g}{' ' + u if u else ''}" for n, v, u in zip(names, result.state[-1], units, strict=True)
+    )
+    ended = "the disk left the wheels" if result.outcome == "ejected" else "finished"
+    text = f"{ended} at t = {result.t[-1]:.6g}: {end}"
+    data = {
+        "model": repr(model),
+        "outcome": result.outcome,
+        "events": [{"kind": e.kind, "t": e.t, "state": e.state} for e in result.events],
+        "stats": result.stats._asdict(),
+    }
+    if args.out is not None:
+        from udd.files import write_whole
+
+        write_whole(args.out, _csv(result).encode())
+        return Answer(f"{text}\nwritten: {args.out}", {**data, "end": result.state[-1], "file": args.out})
+    if not args.json:
+        sys.stdout.write(_csv(result))
+        print(f"udd: {text}", file=sys.stderr)
+    return Answer("", {**data, "state_names": names, "t": result.t, "state": result.state})
+
+
+def run_model(
+    model: Model,
+    args: argparse.Namespace,
+    dt: float,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    dense: bool = False,
+) -> Trajectory:
+    """Run a model for ``args.t`` from ``args.state``, with a row every `dt`."""
+    import numpy as np
+
+    from udd._validate import number
+    from udd.trajectory import simulate
+
+    length, step = number("--t", args.t, above=0.0), number("--dt", dt, above=0.0)
+    rows = int(length / step + 1e-9) + 1
+    if rows > _MOST:
+        raise UddError(f"{rows} rows are too many (at most {_MOST}): a longer --dt would do")
+    start = _START[model.kind] if args.state is None else numbers(args.state, "--state")
+    return simulate(model, step * np.arange(rows), start, rtol=rtol, atol=atol, dense=dense)
+
+
+def _model(args: argparse.Namespace) -> Model:
+    from udd.models import DLE
+
+    given = [name for name in ("W", "w", "pendulum") if getattr(args, name) is not None]
+    if len(given) != 1:
+        raise UddError("say which model to run: --W (the disk), --w (the DLE) or --pendulum, one of them")
+    if given == ["w"]:
+        return DLE(args.w, args.B)
+    if given == ["pendulum"]:
+        return pendulum(args)
+    return disk(args, args.W, 0.08 if args.R is None else args.R)
+
+
+def _csv(result: Trajectory) -> str:
+    """The run in the format of a measurement, with every digit."""
+    model = result.model
+    out = io.StringIO()
+    for name, value in model.parameters.items():
+        out.write(f"# {name} = {value!r}\n")
+    out.write(f"# source = udd simulate\n# outcome = {result.outcome}\n")
+    out.write(",".join(("t", *model.state_names)) + "\n")
+    for t, row in zip(result.t.tolist(), result.state.tolist(), strict=True):
+        out.write(",".join(map(repr, (t, *row))) + "\n")
+    return out.getvalue()

@@ -1,0 +1,1 @@
+"""The sample films that ship with the package."""
