@@ -22,7 +22,7 @@ def colours_of(
     for k, mark in enumerate(look.marks):
         samples = []
         for picture, pose in zip(pictures, poses, strict=True):
-            at = pose.centre + mark.place * np.exp(1j * pose.angle)
+            at = complex(look.lens.picture(pose.centre + mark.place * np.exp(1j * pose.angle)))
             r, c = round(at.imag / 2 - 0.25), round(at.real / 2 - 0.25)
             h, w = picture.u.shape
             if 1 <= r < h - 1 and 1 <= c < w - 1 and view[2 * r, 2 * c]:
@@ -60,6 +60,7 @@ def candidates(patches: list[Blobs], look: Look, guess: Pose | None) -> list[Pos
     Every pair of blobs of different colours at about the right distance proposes a pose; the other
     blobs near their places support it. The pose is then the rigid fit to all that support it.
     """
+    patches = [Blobs(look.lens.plane(p.centre), p.area) for p in patches]
     places = np.array([m.place for m in look.marks])
     reach = float(abs(places[0]))
     found: list[tuple[float, Pose]] = []

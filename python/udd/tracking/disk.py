@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture, TrackError
-from .pose import Pose
+from .pose import Look, Pose
 
 RAYS = 180
 SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
@@ -26,9 +26,7 @@ class Outline:
     points: int
 
 
-def outline(
-    frames: Sequence[tuple[Picture, Pose]], reach: float, view: NDArray[np.bool_], light: NDArray[np.float64]
-) -> Outline:
+def outline(frames: Sequence[tuple[Picture, Pose]], look: Look, view: NDArray[np.bool_]) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
     Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
@@ -38,7 +36,7 @@ def outline(
     rays = np.exp(1j * angles)
     points, group = [], []
     for number, (picture, pose) in enumerate(frames):
-        r = _rim(light[picture.y], view, pose.centre, rays, reach)
+        r = _rim(look.light[picture.y], view, pose.centre, rays, look)
         ok = np.isfinite(r)
         points.append(r[ok] * rays[ok] * np.exp(-1j * pose.angle))
         group.append(np.full(int(ok.sum()), number))
@@ -75,14 +73,14 @@ def _rim(
     view: NDArray[np.bool_],
     centre: complex,
     rays: NDArray[np.complex128],
-    reach: float,
+    look: Look,
 ) -> NDArray[np.float64]:
     """Radius of the half-height crossing along each ray [pixels], NaN where none is clear."""
     import cv2
 
-    step = 0.5
+    step, reach = 0.5, abs(look.marks[0].place)
     radii = np.arange(SPAN[0] * reach, SPAN[1] * reach, step)
-    at = centre + radii[None, :] * rays[:, None]
+    at = look.lens.picture(centre + radii[None, :] * rays[:, None])
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
     profile = cv2.remap(
         y.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE

@@ -7,26 +7,26 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .decode import Picture
-from .find import Sight
 from .marks import MISFIT, Motion, coverage
 from .pose import Look, Pose, align
+from .survey import Moving
 
 SHARES = np.linspace(0.0, 1.0, 11)  # of the frame interval
 FASTEST = 24
 STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
 
 
-def exposure(
-    bursts: list[list[Picture]], sights: list[Sight | None], look: Look, view: NDArray[np.bool_]
-) -> float:
+def exposure(moving: Sequence[Moving], look: Look, view: NDArray[np.bool_]) -> float:
     """Exposure time [s]: what explains the fastest survey frames best; 0 if none is fast."""
-    fast = _fast(bursts, sights, abs(look.marks[0].place))[:FASTEST]
+    reach = abs(look.marks[0].place)
+    paths = [abs(m.rate) * m.interval + abs(m.turning) * m.interval * reach for m in moving]
+    order = np.argsort(-np.array(paths), kind="stable")[:FASTEST]
+    fast = [moving[k] for k in order if paths[k] > STREAK]
     if not fast:
         return 0.0
     cost = np.zeros(len(SHARES))
-    for picture, sight, motion, _ in fast:
-        each = np.array([_misfit(picture, sight, motion, share, look, view) for share in SHARES])
+    for m in fast:
+        each = np.array([_misfit(m, share, look, view) for share in SHARES])
         if np.isfinite(each).all():
             cost += each / each.min()
     if not cost.any():
@@ -36,47 +36,26 @@ def exposure(
     if 0 < k < len(SHARES) - 1:  # the vertex of the parabola through the lowest three
         a, b, c = cost[k - 1 : k + 2]
         best += float(0.5 * (a - c) / (a - 2 * b + c) * SHARES[1])
-    return best * float(np.median([dt for *_, dt in fast]))
+    return best * float(np.median([m.interval for m in fast]))
 
 
-def _fast(
-    bursts: list[list[Picture]], sights: list[Sight | None], reach: float
-) -> list[tuple[Picture, Sight, Motion, float]]:
-    found = []
-    at = iter(sights)
-    for burst in bursts:
-        here = [next(at) for _ in burst]
-        if len(burst) < 3 or here[0] is None or here[1] is None or here[2] is None:
-            continue
-        before, now, after = here[0], here[1], here[2]
-        turn = float(
-            np.angle(np.exp(1j * (after.angle - now.angle)))
-            + np.angle(np.exp(1j * (now.angle - before.angle)))
-        )
-        motion = Motion((after.centre - before.centre) / 2, turn / 2)
-        path = abs(motion.shift) + abs(motion.turn) * reach
-        if path > STREAK:
-            found.append((path, burst[1], now, motion, (burst[2].t - burst[0].t) / 2))
-    return [tuple(item[1:]) for item in sorted(found, key=lambda item: -item[0])]  # type: ignore[misc]
-
-
-def _misfit(
-    picture: Picture, sight: Sight, whole: Motion, share: float, look: Look, view: NDArray[np.bool_]
-) -> float:
+def _misfit(m: Moving, share: float, look: Look, view: NDArray[np.bool_]) -> float:
     """Sum of squares over fixed windows around the marks, so that shares compare on the same pixels."""
+    picture, whole = m.picture, Motion(m.rate * m.interval, m.turning * m.interval)
     motion = Motion(whole.shift * share, whole.turn * share)
-    pose = Pose(sight.centre, sight.angle)
+    pose = Pose(m.sight.centre, m.sight.angle)
     if align(picture.y, view, look, pose, motion, [1.0, 0.5, MISFIT], gain_slack=0.3) is None:
         return np.inf
     total = 0.0
     for mark in look.marks:
-        middle = pose.centre + mark.place * np.exp(1j * pose.angle)
+        local = look.lens.local(pose.centre + mark.place * np.exp(1j * pose.angle))
+        middle = local.picture
         reach = np.hypot(*mark.half) + 0.3 * (abs(whole.shift) + abs(whole.turn * mark.place)) + 4
         r0, r1 = max(0, int(middle.imag - reach)), min(view.shape[0], int(middle.imag + reach))
         c0, c1 = max(0, int(middle.real - reach)), min(view.shape[1], int(middle.real + reach))
         if r1 - r0 < 4 or c1 - c0 < 4:
             continue
-        cover = coverage(mark, pose.centre, pose.angle, motion, look.psf, (r0, r1, c0, c1))
+        cover = coverage(mark, pose.centre, pose.angle, motion, look.psf, (r0, r1, c0, c1), local)
         ok = view[r0:r1, c0:c1]
         rest = look.light[picture.y[r0:r1, c0:c1]] - mark.level * cover
         rest = rest[ok] - np.median(rest[ok]) if ok.any() else np.zeros(1)

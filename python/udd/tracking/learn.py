@@ -16,40 +16,60 @@ from .rigid import solve
 
 ROUNDS = 8
 MOST = 48  # frames to learn from
-WHOLE = 0.97  # share of its edges that a mark to learn from shows
+WHOLE = 0.97  # share of its edges that is in view for a mark to learn from
+HALF_SEEN = 0.5  # and that looks as expected
 
 
-Seen = tuple[Pose, list[Sighting | None]]
+Frame = tuple[Plane, Pose, Motion]
+Seen = tuple[Pose, Motion, list[Sighting | None]]
 
 
-def learn(
+def first_look(
     seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float, light: NDArray[np.float64]
 ) -> Look:
-    """Fit shape, place and contrast of the four marks to the slowest survey frames.
-
-    Poses and shapes are found in turns: poses from the present shapes, then one joint least-squares
-    step per mark for its shape with the pose of every frame left free.
-    """
+    """Four equal squares at the corners of a square: what the blobs say."""
     frames = [(p.y, Pose(s.centre, s.angle)) for p, s in seen[:MOST]]
     reach = float(np.median([s.reach for _, s in seen]))
     half = float(np.sqrt(np.median([s.area for _, s in seen]))) / 2
-    noise = _noise(seen, view, light, white)
     marks = [
         Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white, light))
         for d in BODY
     ]
-    psf, rim = 0.8, reach + 1.3 * half  # the true rim is found later, with these marks
-    for turn in range(ROUNDS):
-        look = Look(marks, psf, noise, light, rim)
+    # the true rim is found later, with these marks
+    return Look(marks, 0.8, _noise(seen, view, light, white), light, reach + 1.3 * half)
+
+
+def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds: int = ROUNDS) -> Look:
+    """Fit shape, place and contrast of the four marks to frames whose pose is roughly known.
+
+    Poses and shapes are found in turns: poses (changed in place) from the present shapes, then one
+    joint least-squares step per mark for its shape with the pose of every frame left free.
+    """
+    for turn in range(rounds):
         fits: list[Seen] = []
-        for y, pose in frames:
-            fit = align(
-                y, view, look, pose, Motion(), [0.5, 0.5, MISFIT] if turn == 0 else [MISFIT], gain_slack=1.0
-            )
+        for y, pose, motion in frames[:MOST]:
+            steps = [1.0, 0.5] if turn == 0 else [0.5 if turn < rounds // 2 else MISFIT]
+            fit = align(y, view, look, pose, motion, steps, gain_slack=1.0)
             if fit is not None:
-                fits.append((pose, fit.sightings))
+                fits.append((pose, motion, fit.sightings))
         marks, psf = _reshape(fits, look)
-    return Look(marks, psf, noise, light, rim)
+        look = replace(look, marks=marks, psf=psf)
+    return look
+
+
+def places(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_]) -> NDArray[np.complex128]:
+    """Where the marks themselves are in the picture, shape (frames, 4); NaN for those not well seen."""
+    out = np.full((len(frames), len(look.marks)), np.nan, dtype=np.complex128)
+    for row, (y, pose, motion) in zip(out, frames, strict=True):
+        fit = align(y, view, look, pose, motion, [1.6, 0.8, 0.5, 0.3], gain_slack=0.5)
+        if fit is None:
+            continue
+        for k, (mark, s) in enumerate(zip(look.marks, fit.sightings, strict=True)):
+            if s is not None and fit.used[k] and s.complete > 0.6:
+                left = complex(fit.step.leftover[k][0], fit.step.leftover[k][1])
+                at = pose.centre + mark.place * np.exp(1j * pose.angle) + left
+                row[k] = complex(look.lens.picture(at))
+    return out
 
 
 def _noise(
@@ -90,11 +110,11 @@ def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
     for k, mark in enumerate(look.marks):
         normal, right = np.zeros((4, 4)), np.zeros(4)
         gains = []
-        for pose, sightings in fits:
+        for pose, motion, sightings in fits:
             s = sightings[k]
-            if s is None or s.complete < WHOLE:
+            if s is None or s.in_view < WHOLE or s.complete < HALF_SEEN:
                 continue
-            n, r = _shape_step(mark, pose, look.psf, s)
+            n, r = _shape_step(mark, pose, motion, look, s)
             normal, right = normal + n, right + r
             gains.append(s.gain)
         if not gains:
@@ -116,14 +136,14 @@ def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
 
 
 def _shape_step(
-    mark: Mark, pose: Pose, psf: float, s: Sighting
+    mark: Mark, pose: Pose, motion: Motion, look: Look, s: Sighting
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normal equations for (turn, half sides, psf) after the local unknowns have taken what they can."""
     r0, r1, c0, c1 = s.box
-    still = Motion()
+    psf, here = look.psf, look.lens.local(pose.centre + mark.place * np.exp(1j * pose.angle))
 
     def cover(m: Mark, blur: float) -> NDArray[np.float64]:
-        return coverage(m, pose.centre, pose.angle, still, blur, s.box).ravel()
+        return coverage(m, pose.centre, pose.angle, motion, blur, s.box, here).ravel()
 
     base = cover(mark, psf)
     grad_v, grad_u = np.gradient(base.reshape(r1 - r0, c1 - c0))
@@ -148,14 +168,14 @@ def _replace_places(marks: list[Mark], fits: list[Seen]) -> list[Mark]:
     moved = []
     for k, mark in enumerate(marks):
         shifts = []
-        for pose, sightings in fits:
+        for pose, motion, sightings in fits:
             s = sightings[k]
-            if s is not None and s.complete > WHOLE:
+            if s is not None and s.in_view > WHOLE:
                 step = solve(
                     marks,
                     sightings,
                     pose.angle,
-                    np.array([float(x is not None and x.complete > WHOLE) for x in sightings]),
+                    np.array([float(x is not None and x.in_view > WHOLE) for x in sightings]),
                 )
                 if step is not None:
                     shifts.append(

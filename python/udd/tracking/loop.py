@@ -14,8 +14,8 @@ from .marks import MISFIT, Motion
 from .pose import Fit, Look, Pose, align
 
 Array = NDArray[np.float64]
-CLOSE = [0.7, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
-FAR = [1.6, 0.8, MISFIT, MISFIT, MISFIT]  # rounds from blobs, good to ten
+CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
+FAR = [2.0, 1.0, MISFIT, MISFIT, MISFIT]  # rounds from blobs, good to ten
 MOST_OFF = 2.0  # pixels by which a mark may disagree with the others before it is left out
 FLAT = 6.0  # brightness contrast of a black frame
 
@@ -109,12 +109,12 @@ def _anywhere(
     box = (0, shape[0], 0, shape[1])
     recent = bool(past) and picture.t - past[-1][0] < 0.5
     if guess is not None and recent:
-        r = 2.0 * reach
+        r, at = 2.0 * reach, complex(known.look.lens.picture(guess.centre))
         box = (
-            max(0, int(guess.centre.imag - r)),
-            min(shape[0], int(guess.centre.imag + r)),
-            max(0, int(guess.centre.real - r)),
-            min(shape[1], int(guess.centre.real + r)),
+            max(0, int(at.imag - r)),
+            min(shape[0], int(at.imag + r)),
+            max(0, int(at.real - r)),
+            min(shape[1], int(at.real + r)),
         )
         if box[1] - box[0] < reach or box[3] - box[2] < reach:
             return None

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .lens import Lens, Local
+
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+UNBENT = Local(0j, 0j, np.eye(2))
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Sighting:
 
     offset: Array
     information: Array
-    complete: float  # visible share of the mark's edges, 0 ... 1
+    complete: float  # share of the mark's edges that is seen as expected, 0 ... 1
+    in_view: float  # share of them before which nothing is known to stand
     rms: float  # residual brightness over the window
     gain: float  # contrast against that expected
     box: tuple[int, int, int, int]  # rows from, to, columns from, to
@@ -48,7 +52,13 @@ class Sighting:
 
 
 def coverage(
-    mark: Mark, centre: complex, angle: float, motion: Motion, psf: float, box: tuple[int, int, int, int]
+    mark: Mark,
+    centre: complex,
+    angle: float,
+    motion: Motion,
+    psf: float,
+    box: tuple[int, int, int, int],
+    local: Local | None = None,
 ) -> Array:
     """Share of each pixel of a window that the mark covers, averaged over the exposure.
 
@@ -58,28 +68,38 @@ def coverage(
     motion : movement over the exposure.
     psf : standard deviation of the blur of lens and pixel [pixels].
     box : rows from, to, columns from, to.
+    local : the map from the picture to the plane of the disk here; the identity if not given.
     """
     r0, r1, c0, c1 = box
-    u = np.arange(c0, c1, dtype=np.float32)
-    v = np.arange(r0, r1, dtype=np.float32)
+    local = local or UNBENT
+    u = np.arange(c0, c1, dtype=np.float32) - np.float32(local.picture.real)
+    v = np.arange(r0, r1, dtype=np.float32) - np.float32(local.picture.imag)
+    (uu, uv), (vu, vv) = local.slope
     path = abs(motion.shift + 1j * motion.turn * mark.place * np.exp(1j * angle))
     count = min(32, int(np.ceil(path / (2.0 * psf + 0.3))) + 1) if path > 0.5 else 1
     total = np.zeros((len(v), len(u)), dtype=np.float32)
     for k in range(count):
         s = (k + 0.5) / count - 0.5
         a = angle + s * motion.turn
-        m = centre + s * motion.shift + mark.place * np.exp(1j * a)
-        c, d = np.float32(np.cos(a + mark.turn)), np.float32(np.sin(a + mark.turn))
-        du, dv = u - np.float32(m.real), v - np.float32(m.imag)
-        across = _slab(np.subtract.outer(c * dv, d * du), mark.half[1], psf)
-        across *= _slab(np.add.outer(d * dv, c * du), mark.half[0], psf)
+        m = centre + s * motion.shift + mark.place * np.exp(1j * a) - local.plane
+        c, d = np.cos(a + mark.turn), np.sin(a + mark.turn)
+        across = np.add.outer(
+            np.float32(c * vv - d * uv) * v - np.float32(c * m.imag - d * m.real), np.float32(c * vu - d * uu) * u
+        )
+        along = np.add.outer(
+            np.float32(c * uv + d * vv) * v - np.float32(c * m.real + d * m.imag), np.float32(c * uu + d * vu) * u
+        )
+        across = _slab(across, mark.half[1], psf)
+        across *= _slab(along, mark.half[0], psf)
         total += across
     return np.asarray(total, dtype=np.float64) / count
 
 
 def _slab(x: NDArray[np.float32], half: float, psf: float) -> NDArray[np.float32]:
-    """Blurred indicator of |x| < half, in place of `x`; the quintic smooth step of equal variance
-    stands for the error function."""
+    """Blurred indicator of |x| < half, in place of `x`.
+
+    The quintic smooth step of equal variance stands for the error function.
+    """
     width = 2.646 * psf  # x / width has variance 1/7 under the step's derivative 15/16 (1 - x^2)^2
     np.abs(x, out=x)
     np.subtract(np.float32(half), x, out=x)
@@ -95,11 +115,18 @@ def _slab(x: NDArray[np.float32], half: float, psf: float) -> NDArray[np.float32
 
 
 def window(
-    mark: Mark, centre: complex, angle: float, motion: Motion, shape: tuple[int, int], margin: float = 5.0
+    mark: Mark,
+    centre: complex,
+    angle: float,
+    motion: Motion,
+    shape: tuple[int, int],
+    local: Local,
+    margin: float = 5.0,
 ) -> tuple[int, int, int, int]:
     """Rows and columns that hold the mark over the exposure, clipped to the picture."""
     ends = [
-        centre + s * motion.shift + mark.place * np.exp(1j * (angle + s * motion.turn)) for s in (-0.5, 0.5)
+        local.back(centre + s * motion.shift + mark.place * np.exp(1j * (angle + s * motion.turn)))
+        for s in (-0.5, 0.5)
     ]
     reach = np.hypot(*mark.half) + margin
     us, vs = [e.real for e in ends], [e.imag for e in ends]
@@ -125,6 +152,7 @@ def locate(
     psf: float,
     noise: float,
     rim: float,
+    lens: Lens,
     gain_slack: float = 0.1,
     misfit: float = MISFIT,
 ) -> Sighting | None:
@@ -135,15 +163,17 @@ def locate(
     gain, du, dv free, the gain within `gain_slack` of 1. `view` is False where something stands in
     front. Pixels that nothing of this explains (a hand, a cable) lose their weight.
     """
-    box = window(mark, centre, angle, motion, y.shape)
+    local = lens.local(centre + mark.place * np.exp(1j * angle))
+    box = window(mark, centre, angle, motion, y.shape, local)
     r0, r1, c0, c1 = box
     if r1 - r0 < 6 or c1 - c0 < 6:
         return None
-    cover = coverage(mark, centre, angle, motion, psf, box)
+    cover = coverage(mark, centre, angle, motion, psf, box, local)
     grad_v, grad_u = np.gradient(cover)
     edge2 = grad_u * grad_u + grad_v * grad_v
     total = float(edge2.sum())
-    away_u, away_v = np.arange(c0, c1) - centre.real, np.arange(r0, r1) - centre.imag
+    middle = local.back(centre)
+    away_u, away_v = np.arange(c0, c1) - middle.real, np.arange(r0, r1) - middle.imag
     inside = np.add.outer(away_v**2, away_u**2) < (rim - 0.5 * abs(motion.shift)) ** 2
     seen = (view[r0:r1, c0:c1] & inside).ravel()
     if total <= 0 or seen.sum() < 25:
@@ -166,7 +196,10 @@ def locate(
         weight = precise * np.clip(1 - z2, 0, None) ** 2
         if np.count_nonzero(weight) < 25:
             return None
-    covariance = np.linalg.inv(normal)[2:, 2:]
+    covariance = local.slope @ np.linalg.inv(normal)[2:, 2:] @ local.slope.T
     complete = float(edge2.ravel()[weight > 0.1 * precise].sum()) / total
+    in_view = float(edge2.ravel()[seen].sum()) / total
     rms = float(np.sqrt((weight * residual**2).sum() / weight.sum()))
-    return Sighting(x[2:], np.linalg.inv(covariance), complete, rms, float(x[1]), box, weight, residual)
+    return Sighting(
+        local.slope @ x[2:], np.linalg.inv(covariance), complete, in_view, rms, float(x[1]), box, weight, residual
+    )

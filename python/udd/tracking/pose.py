@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Plane
+from .lens import Lens
 from .marks import Mark, Motion, Sighting, locate
 from .rigid import Step, solve
 
@@ -24,11 +25,12 @@ class Look:
     noise: float  # of the light on a flat part of the disk
     light: NDArray[np.float64]  # amount of light for each code of the picture, (256,)
     rim: float  # distance from the centre up to which the picture shows the disk [pixels]
+    lens: Lens = Lens()  # from the picture to the plane of the disk
 
 
 @dataclass
 class Pose:
-    """The disk in the picture: its centre [pixels, u + iv] and angle [rad]."""
+    """The disk in its plane: its centre [pixels, u + iv] and angle [rad]."""
 
     centre: complex
     angle: float
@@ -59,7 +61,7 @@ def align(
     """
     fit = None
     for misfit in rounds:
-        psf = float(np.hypot(look.psf, 3 * misfit if misfit > 0.3 else 0.0))
+        psf = float(np.hypot(look.psf, 3 * max(0.0, misfit - 0.5)))
         sightings = [
             locate(
                 y,
@@ -72,6 +74,7 @@ def align(
                 psf,
                 look.noise,
                 look.rim,
+                look.lens,
                 gain_slack,
                 misfit,
             )

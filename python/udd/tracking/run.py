@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,9 @@ from .acquire import colours_of
 from .decode import Film, Picture, TrackError
 from .disk import Outline, outline
 from .exposure import at_middle, exposure
-from .find import Sight, sightings
-from .learn import learn
+from .find import BODY, Sight, sightings
+from .learn import first_look, places, refine
+from .lens import Lens, calibrate
 from .loop import Known, Tracks, follow
 from .marks import MISFIT, Motion
 from .noise import covariance
@@ -28,10 +29,11 @@ from .pivot import pivot as rolling
 from .pivot import support
 from .pose import Look, Pose, align
 from .result import Camera, metres
-from .survey import Survey, slowest, survey
+from .survey import Survey, moving, repeats_last, slowest, survey
 
 FEWEST_SIGHTS = 3  # survey frames that must show all four marks
 SHARP = 60  # slow frames from which the rim is measured
+LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 
@@ -140,22 +142,51 @@ def _prepare(
     film: Film, look_over: Survey, sights: list[Sight | None], seen: list[tuple[Picture, Sight]]
 ) -> tuple[Known, Outline]:
     view, white = visible(seen)
-    look = learn(seen, view, white, film.light)
+    look = first_look(seen, view, white, film.light)
+    look = refine(look, [(p.y, Pose(s.centre, s.angle), Motion()) for p, s in seen], view)
+    # a second time with frames whose speed is known, hence their blur
+    in_motion = moving(look_over.bursts, sights)
+    open_for = exposure(in_motion, look, view)
+    in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
+    in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
+    frames = [
+        (m.picture.y, Pose(m.sight.centre, m.sight.angle), Motion(m.rate * open_for, m.turning * open_for))
+        for m in in_motion
+    ]
+    for _ in range(LENS_ROUNDS):
+        lens = calibrate(places(look, frames, view), view.shape)
+        if lens is None:
+            break
+        look = replace(look, lens=lens)
+        for (_, pose, _), m in zip(frames, in_motion, strict=True):
+            pose.centre, pose.angle = _in_plane(lens, m.sight)
+        look = refine(look, frames, view)
+    else:
+        frames = frames[:0]
+    if len(frames) >= FEWEST_SIGHTS:
+        look = refine(look, frames, view, 2)
     sharp: list[tuple[Picture, Pose]] = []
     for picture, sight in seen[:SHARP]:
-        pose = Pose(sight.centre, sight.angle)
-        if align(picture.y, view, look, pose, Motion(), [MISFIT] * 4, gain_slack=0.3) is not None:
+        pose = Pose(*_in_plane(look.lens, sight))
+        if align(picture.y, view, look, pose, Motion(), [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
             sharp.append((picture, pose))
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
     try:
-        rim = outline(sharp, abs(look.marks[0].place), view, film.light)
+        rim = outline(sharp, look, view)
     except TrackError as error:
         raise TrackError(f"{film.path}: {error}") from None
-    open_for = exposure(look_over.bursts, sights, look, view)
     colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
     look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
     return Known(look, view, colours, open_for), rim
+
+
+def _in_plane(lens: Lens, sight: Sight) -> tuple[complex, float]:
+    """A sight in the picture as a pose in the plane of the disk."""
+    arms = BODY * sight.reach * np.exp(1j * sight.angle)
+    marks = lens.plane(sight.centre + arms)
+    turn = float(np.angle(np.vdot(arms, marks - marks.mean())))
+    return complex(marks.mean()), sight.angle + turn
 
 
 def _centred(look: Look, centre: complex) -> Look:
@@ -236,6 +267,7 @@ def _meta(
         "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
         "marks_px": [[m.place.real, m.place.imag] for m in known.look.marks],
         "psf_px": known.look.psf,
+        "lens": list(astuple(known.look.lens)[2:]),
     }
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,7 @@ BURST = 3  # consecutive frames: the middle one has a speed, hence a known blur
 BURSTS = 60
 MEMORY = 2e8  # bytes of pictures kept, whatever the length of the film
 FEWEST = 10
+NEW = 0.15  # of the marks' reach: what counts as another pose
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Survey:
 
     @property
     def pictures(self) -> list[Picture]:
+        """All of them, in order."""
         return [p for burst in self.bursts for p in burst]
 
 
@@ -69,7 +73,7 @@ def survey(film: Film) -> Survey:
 
 
 def slowest(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[tuple[Picture, Sight]]:
-    """Pictures in which the disk was found, those with the least motion to a neighbour first, repeats last."""
+    """Pictures in which the disk was found, those with the least motion first, repeats last."""
     found: list[tuple[float, Picture, Sight]] = []
     at = iter(sights)
     for burst in bursts:
@@ -83,15 +87,51 @@ def slowest(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[tup
                 if other is not None:
                     moves.append(_apart(sight, other))
             found.append((float(np.mean(moves)) if moves else np.inf, picture, sight))
-    first: list[tuple[Picture, Sight]] = []
-    again: list[tuple[Picture, Sight]] = []
-    for _, picture, sight in sorted(found, key=lambda item: item[0]):
+    ordered = sorted(found, key=lambda item: item[0])
+    return [(p, s) for _, p, s in repeats_last(ordered, [s for *_, s in ordered])]
+
+
+def repeats_last(items: list[Any], sights: list[Sight]) -> list[Any]:
+    """The same items, those that show the disk almost as an earlier one does moved to the end."""
+    first: list[int] = []
+    again: list[int] = []
+    for k, sight in enumerate(sights):
         # a disk at rest teaches nothing new
-        known = any(abs(_apart(sight, s)) < 2.0 for _, s in first)
-        (again if known else first).append((picture, sight))
-    return first + again
+        known = any(_apart(sight, sights[j]) < NEW * sight.reach for j in first)
+        (again if known else first).append(k)
+    return [items[k] for k in first + again]
 
 
 def _apart(a: Sight, b: Sight) -> float:
     turn = abs(np.angle(np.exp(1j * (a.angle - b.angle))))
     return float(abs(a.centre - b.centre) + turn * a.reach)
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A disk found in a survey frame and in its neighbours: its pose and how fast it moves."""
+
+    picture: Picture
+    sight: Sight
+    rate: complex  # pixels/s
+    turning: float  # rad/s
+    interval: float  # between frames [s]
+
+
+def moving(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[Moving]:
+    """Pictures in which the disk was found, as it was in one next to it or more."""
+    found = []
+    at = iter(sights)
+    for burst in bursts:
+        here = [(p, s) for p, s in zip(burst, [next(at) for _ in burst], strict=True) if s is not None]
+        for k, (picture, sight) in enumerate(here):
+            rates = []
+            for (p0, s0), (p1, s1) in pairwise(here[max(0, k - 1) : k + 2]):
+                if p1.index == p0.index + 1:
+                    turn = float(np.angle(np.exp(1j * (s1.angle - s0.angle)) + 0j))
+                    rates.append((s1.centre - s0.centre, turn, p1.t - p0.t))
+            if rates:
+                time = sum(r[2] for r in rates)
+                rate, turning = sum(r[0] for r in rates) / time, sum(r[1] for r in rates) / time
+                found.append(Moving(picture, sight, rate, turning, time / len(rates)))
+    return found

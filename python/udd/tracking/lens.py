@@ -1,0 +1,134 @@
+"""Tilt of the camera and curvature of its lens, from the rigidity of the disk alone."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+PRIOR = np.array([0.1, 0.15, 0.15, 0.1, 0.05])  # what cameras on a tripod have
+BETTER = 0.8  # the misfit must fall to this share, or the picture is taken as it is
+FEWEST = 12  # frames to judge by
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Map from the picture to the plane of the disk, both in pixels (u + iv).
+
+    With p the picture point from the picture's middle in units of `size`:  q = p (1 + curve |p|^2),
+    w = q / (1 + tilt_u q_u + tilt_v q_v), then u is stretched by 1 + aspect and sheared by `shear`.
+    """
+
+    middle: complex = 0j
+    size: float = 1.0
+    curve: float = 0.0
+    tilt_u: float = 0.0
+    tilt_v: float = 0.0
+    aspect: float = 0.0
+    shear: float = 0.0
+
+    @property
+    def plain(self) -> bool:
+        """Whether the map changes nothing."""
+        return not any(astuple(self)[2:])
+
+    def plane(self, picture: Complexes | complex) -> Complexes:
+        """Points of the disk's plane for points of the picture."""
+        z = np.asarray(picture, dtype=np.complex128)
+        if self.plain:
+            return z
+        p = (z - self.middle) / self.size
+        q = p * (1 + self.curve * (p.real**2 + p.imag**2))
+        w = q / (1 + self.tilt_u * q.real + self.tilt_v * q.imag)
+        return self.middle + self.size * (w.real * (1 + self.aspect) + self.shear * w.imag + 1j * w.imag)
+
+    def picture(self, plane: Complexes | complex) -> Complexes:
+        """Points of the picture for points of the disk's plane."""
+        z = np.asarray(plane, dtype=np.complex128)
+        if self.plain:
+            return z
+        w = (z - self.middle) / self.size
+        w = (w.real - self.shear * w.imag) / (1 + self.aspect) + 1j * w.imag
+        q = w / (1 - self.tilt_u * w.real - self.tilt_v * w.imag)
+        p = q
+        for _ in range(8):  # contracts by 3 curve |p|^2 a time
+            p = q / (1 + self.curve * (p.real**2 + p.imag**2))
+        return np.asarray(self.middle + self.size * p)
+
+    def local(self, plane: complex) -> Local:
+        """The map near a point of the plane."""
+        if self.plain:
+            return Local(plane, plane, np.eye(2))
+        at = complex(self.picture(plane))
+        h = 0.5
+        du = (complex(self.plane(at + h)) - complex(self.plane(at - h))) / (2 * h)
+        dv = (complex(self.plane(at + 1j * h)) - complex(self.plane(at - 1j * h))) / (2 * h)
+        return Local(at, complex(self.plane(at)), np.array([[du.real, dv.real], [du.imag, dv.imag]]))
+
+
+@dataclass(frozen=True)
+class Local:
+    """A linear map from the picture to the plane about one point."""
+
+    picture: complex
+    plane: complex
+    slope: Array  # (2, 2) d plane / d picture
+
+    def back(self, plane: complex) -> complex:
+        """The picture point of a nearby plane point."""
+        d = plane - self.plane
+        u, v = np.linalg.solve(self.slope, [d.real, d.imag])
+        return self.picture + complex(u, v)
+
+
+def calibrate(points: Complexes, shape: tuple[int, int]) -> Lens | None:
+    """Find the map under which the marks keep their distances; None if none is clearly better than none.
+
+    Parameters
+    ----------
+    points : complex, shape (frames, marks)
+        Picture positions of the marks [pixels], NaN where not seen.
+    shape : (height, width) of the picture.
+    """
+    from scipy.optimize import least_squares
+
+    points = points[np.isfinite(points).sum(axis=1) >= 3]
+    if len(points) < FEWEST:
+        return None
+    middle, size = complex(shape[1] / 2, shape[0] / 2), float(np.hypot(*shape) / 2)
+    first, seen = _layout(points), np.isfinite(points)
+
+    def rest(x: Array, with_lens: bool) -> Array:
+        lens = Lens(middle, size, *x[:5]) if with_lens else Lens()
+        off = _misfit(lens.plane(np.where(seen, points, middle)), seen, x[5:9] + 1j * x[9:13])
+        return np.concatenate([off, 0.02 * x[:5] / PRIOR, 1e-6 * (x[5:] - start[5:])])
+
+    start = np.concatenate([np.zeros(5), first.real, first.imag])
+    flat = least_squares(lambda x: rest(x, False), start, loss="soft_l1", f_scale=0.1)
+    bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
+    if bent.cost > BETTER**2 * flat.cost:
+        return None
+    return Lens(middle, size, *(float(v) for v in bent.x[:5]))
+
+
+def _layout(points: Complexes) -> Complexes:
+    """The marks' places on the disk, from the frame that shows them best."""
+    whole = points[np.isfinite(points).all(axis=1)]
+    best = whole[0] if len(whole) else points[0]
+    reach = np.nanmean(np.abs(best - np.nanmean(best)))
+    return np.asarray(reach * np.array([-1j, 1, 1j, -1]))
+
+
+def _misfit(points: Complexes, seen: NDArray[np.bool_], places: Complexes) -> Array:
+    """What is left of each frame after the best rigid motion of `places` onto it."""
+    count = seen.sum(axis=1, keepdims=True)
+    p = np.where(seen, points, 0)
+    q = np.where(seen, places[None, :], 0)
+    p0, q0 = p.sum(axis=1, keepdims=True) / count, q.sum(axis=1, keepdims=True) / count
+    p, q = np.where(seen, p - p0, 0), np.where(seen, q - q0, 0)
+    turn = (q.conj() * p).sum(axis=1, keepdims=True)
+    left = (p - q * turn / np.abs(turn))[seen]
+    return np.concatenate([left.real, left.imag])
