@@ -153,9 +153,8 @@ class Trajectory:
 
 def tolerances(rtol: float, atol: float) -> tuple[float, float]:
     """Checked tolerances."""
-    rtol, atol = number("rtol", rtol, least=0.0), number("atol", atol, least=0.0)
-    if rtol < 1e-14 and atol <= 0.0:
-        raise ModelError("one of rtol (at least 1e-14) and atol must be positive")
+    # Below rounding no step size would do.
+    rtol, atol = number("rtol", rtol, least=1e-15), number("atol", atol, above=0.0)
     return rtol, atol
 
 
@@ -194,7 +193,8 @@ def simulate(
     state0 : array_like, shape (dim,)
         The initial state.
     rtol, atol : float
-        Relative and absolute tolerance of a step's error, component by component, in the state's units.
+        Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
+        in the state's units.
     method : {"dopri5"}
         Dormand & Prince's method of order 5(4), with dense output of order 4. It lands on the surfaces
         where the law changes.

@@ -7,7 +7,7 @@ use super::dense::Dense;
 use super::landing::{Find, Target, Watch};
 use super::step::{Step, step};
 use super::tableau::STAGES;
-use super::tolerance::{Failure, Tolerance};
+use super::tolerance::{ErrorNorm, Failure, Tolerance};
 use crate::model::{MAX_SURFACES, Sides, System, sides_of};
 use crate::scalar::Scalar;
 
@@ -38,9 +38,9 @@ pub enum Ending {
 /// Between steps the law is smooth: a step ends on the first switching surface it meets, to 1e-12 of
 /// the surface function's size in the step, and the next one starts on the other side. Everything
 /// derived from a run (samples, events, tangents, exponents) is built on this loop.
-pub struct Driver<'a, M, S: Scalar, const D: usize> {
+pub struct Driver<'a, M, S: Scalar, const D: usize, E = Tolerance> {
     system: &'a M,
-    tolerance: Tolerance,
+    norm: E,
     controller: Controller,
     /// Whether the run ends on the wall.
     wall: bool,
@@ -60,14 +60,15 @@ pub struct Driver<'a, M, S: Scalar, const D: usize> {
     pub counts: Counts,
 }
 
-impl<'a, M, S, const D: usize> Driver<'a, M, S, D>
+impl<'a, M, S, const D: usize, E> Driver<'a, M, S, D, E>
 where
     S: Scalar<Real = f64, Mask = bool>,
     M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
 {
     /// Starts at time `t` and state `x`. The size and the direction of the first trial step are those
     /// of `h` where given; otherwise the size is estimated and the direction is forward.
-    pub fn new(system: &'a M, t: f64, x: [S; D], h: Option<f64>, tolerance: &Tolerance) -> Self {
+    pub fn new(system: &'a M, t: f64, x: [S; D], h: Option<f64>, norm: &E) -> Self {
         let mut sides = sides_of(system, S::lift(t), &x);
         let rate = system.rates(S::lift(t), &x, &sides);
         let direction = h.map_or(1.0, f64::signum);
@@ -75,12 +76,12 @@ where
         let mut counts = Counts { evaluations: 1, ..Counts::default() };
         let h = h.unwrap_or_else(|| {
             counts.evaluations += 1;
-            initial_step(system, (t, &x, &rate), 1.0, &sides, tolerance)
+            initial_step(system, (t, &x, &rate), 1.0, &sides, norm.state())
         });
-        let last = Step { x, stages: [rate; STAGES], error: [0.0; D] };
+        let last = Step { x, stages: [rate; STAGES] };
         Self {
             system,
-            tolerance: *tolerance,
+            norm: *norm,
             controller: Controller::default(),
             wall: false,
             t,
@@ -141,8 +142,7 @@ where
             let h = if cut { remaining } else { self.h };
             let trial = step(self.system, self.t, &self.x, &self.rate, h, &self.sides);
             self.counts.evaluations += (STAGES - 1) as u64;
-            let real = |x: &[S; D]| from_fn(|n| x[n].real());
-            let error = self.tolerance.norm(trial.error, real(&self.x), real(&trial.x));
+            let error = self.norm.of_step(&self.x, &trial, h);
             let (accepted, factor) = self.controller.judge(error);
             if !accepted {
                 self.counts.rejected += 1;

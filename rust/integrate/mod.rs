@@ -18,4 +18,4 @@ pub use dense::Dense;
 pub use driver::{Counts, Driver, Ending};
 pub use propagate::{propagate, propagate_from};
 pub use step::{Step, step};
-pub use tolerance::{Failure, Tolerance};
+pub use tolerance::{ErrorNorm, Failure, Tolerance, WithTangents};

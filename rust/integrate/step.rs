@@ -13,8 +13,6 @@ pub struct Step<S: Scalar, const D: usize> {
     pub x: [S; D],
     /// The rates at all stages; the last is the rate at the new state.
     pub stages: [[S; D]; STAGES],
-    /// The estimated error of the new state, without derivatives.
-    pub error: [S::Real; D],
 }
 
 /// Takes a step of size `h` (of either sign) from time `t` and state `x`, whose rate is `first`.
@@ -36,8 +34,27 @@ pub fn step<S: Scalar, const D: usize>(
         new = from_fn(|n| x[n] + combine(&METHOD.a[i], &stages, i, n).times(h));
         stages[i] = system.rates(S::lift(t + h.scale(METHOD.c[i])), &new, sides);
     }
-    let error = from_fn(|n| combine(&METHOD.e, &stages, STAGES, n).real() * h);
-    Step { x: new, stages, error }
+    Step { x: new, stages }
+}
+
+impl<S: Scalar, const D: usize> Step<S, D> {
+    /// The estimated error of the new state, for the size `h` of the step.
+    #[inline]
+    pub fn error(&self, h: S::Real) -> [S; D] {
+        from_fn(|n| combine(&METHOD.e, &self.stages, STAGES, n).times(h))
+    }
+
+    /// The same without derivatives.
+    #[inline]
+    pub fn real_error(&self, h: S::Real) -> [S::Real; D] {
+        from_fn(|n| {
+            let mut sum = self.stages[0][n].real().scale(METHOD.e[0]);
+            for j in 1..STAGES {
+                sum += self.stages[j][n].real().scale(METHOD.e[j]);
+            }
+            sum * h
+        })
+    }
 }
 
 /// `Σ_(j < count) weights_j k_j` for component `n`, the zero weights left out.

@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use crate::integrate::{Driver, Ending, Failure, Tolerance};
+use crate::integrate::{Driver, Ending, Failure, Tolerance, WithTangents};
 use crate::model::System;
 use crate::run::Stop;
 use crate::scalar::Dual;
@@ -34,9 +34,8 @@ pub struct Exponent {
 
 /// The largest exponent of the orbit from `x0`, the mean growth rate of a tangent vector.
 ///
-/// The tangent is the derivative part of a dual run. It is scaled back to length 1 at the end of
-/// every block; the blocks' growth rates give the mean and, from their scatter and that of merged
-/// neighbours, its standard error. Where the first half of the blocks disagrees with the second by
+/// The tangent is the derivative part of a dual run, as accurate as the state. It is scaled back to length 1 at the end of
+/// every block; the blocks' growth rates give the mean and, from their scatter, its standard error. Where the first half of the blocks disagrees with the second by
 /// more than chance allows, the run was still on its way to the attractor and the first half is
 /// dropped. Blocks are merged in pairs as the run goes on, so memory stays bounded.
 pub fn largest_exponent<M: System<Dual<f64, 1>, D>, const D: usize>(
@@ -48,7 +47,7 @@ pub fn largest_exponent<M: System<Dual<f64, 1>, D>, const D: usize>(
     // A direction that no symmetry singles out.
     let direction: [f64; D] = from_fn(|n| [1.0, -0.7, 0.5, 0.3][n % 4]);
     let start = from_fn(|n| Dual { re: x0[n], d: [direction[n]] });
-    let mut driver = Driver::new(system, 0.0, start, None, &options.tolerance).with_wall();
+    let mut driver = Driver::new(system, 0.0, start, None, &WithTangents(options.tolerance)).with_wall();
     let mut blocks = Blocks::new((options.time - options.transient) / (8 * Blocks::MOST) as f64);
     rescale(&mut driver);
 
@@ -94,7 +93,9 @@ fn length<const D: usize>(x: &[Dual<f64, 1>; D]) -> f64 {
 }
 
 /// Scales the tangent to length 1; returns the logarithm of the length it had.
-fn rescale<M: System<Dual<f64, 1>, D>, const D: usize>(driver: &mut Driver<'_, M, Dual<f64, 1>, D>) -> f64 {
+fn rescale<M: System<Dual<f64, 1>, D>, const D: usize>(
+    driver: &mut Driver<'_, M, Dual<f64, 1>, D, WithTangents>,
+) -> f64 {
     let size = length(driver.x());
     driver.set_state(driver.x().map(|v| Dual { re: v.re, d: [v.d[0] / size] }));
     size.ln()
@@ -154,22 +155,17 @@ fn merged(list: &[(f64, f64)]) -> Vec<(f64, f64)> {
     list.chunks_exact(2).map(|pair| (pair[0].0 + pair[1].0, pair[0].1 + pair[1].1)).collect()
 }
 
-/// Mean rate and its standard error: the largest of those that the blocks and the blocks merged twice
-/// and four times give, since neighbouring blocks may be correlated.
+/// Mean rate and its standard error, from the scatter of blocks as long as can be: merged while 32
+/// remain. Neighbouring short blocks are correlated, long ones hardly.
 fn mean(list: &[(f64, f64)]) -> (f64, f64) {
-    let mut error: f64 = 0.0;
     let mut level = list.to_vec();
-    for _ in 0..3 {
-        let n = level.len() as f64;
-        if n < 8.0 {
-            break;
-        }
-        let rates: Vec<f64> = level.iter().map(|(growth, time)| growth / time).collect();
-        let mean = rates.iter().sum::<f64>() / n;
-        let variance = rates.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        error = error.max((variance / n).sqrt());
+    while level.len() >= 2 * Blocks::LEAST {
         level = merged(&level);
     }
+    let n = level.len() as f64;
+    let rates = level.iter().map(|(growth, time)| growth / time);
+    let mean = rates.clone().sum::<f64>() / n;
+    let variance = rates.map(|rate| (rate - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let (growth, time) = list.iter().fold((0.0, 0.0), |(g, t), b| (g + b.0, t + b.1));
-    (growth / time, error)
+    (growth / time, (variance / n).sqrt())
 }
