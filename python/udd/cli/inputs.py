@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from udd.models import Disk, Pendulum
 
 _FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".3gp"}
+_CUT = 0.01  # share of the promised frames that may be missing
 
 
 def add_input(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +31,7 @@ def add_input(parser: argparse.ArgumentParser) -> None:
         "--columns",
         help='names of the columns of a file without a header, such as "t,theta,_" (_: passed over)',
     )
+    add_partial(parser)
     parser.add_argument(
         "--free", help="the model's free parameters, such as k0,W (default: k0,k1,k2,W and effects)"
     )
@@ -56,10 +59,31 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
         return read_measurement(args.file, args.columns, **known), None
     if args.pendulum is not None:
         raise UddError("a film of a pendulum cannot be tracked: --pendulum takes a table with t,theta")
+    found = tracked(args, 0.08 if args.R is None else args.R)
+    return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
+
+
+def add_partial(parser: argparse.ArgumentParser) -> None:
+    """What to do with a film that is cut off."""
+    parser.add_argument("--partial", action="store_true", help="use what there is of a film that is cut off")
+
+
+def tracked(args: argparse.Namespace, radius: float, pivot: tuple[float, float] | None = None) -> Measurement:
+    """Track a film; one that is cut off is refused, unless its user knows."""
     from udd.tracking import track
 
-    found = track(args.file, disk_radius=0.08 if args.R is None else args.R, progress=watched())
-    return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
+    with warnings.catch_warnings(record=True) as said:
+        found = track(args.file, disk_radius=radius, pivot=pivot, progress=watched())
+    missing = int(found.meta.get("frames_missing", 0))
+    whole = missing + len(found)
+    if missing > _CUT * whole and not args.partial:
+        raise UddError(
+            f"{args.file} is cut off: {missing} of its {whole} frames are missing "
+            "(--partial uses what there is)"
+        )
+    for warning in said:
+        warnings.warn(warning.message, stacklevel=2)
+    return found
 
 
 def model_of(args: argparse.Namespace, measurement: Measurement) -> Disk | Pendulum:

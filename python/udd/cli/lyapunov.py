@@ -94,10 +94,14 @@ def _drives(args: argparse.Namespace) -> list[float]:
 
 
 def _check(args: argparse.Namespace, drives: list[float]) -> None:
+    from udd._validate import number
     from udd.models import DLE
 
     for w in drives:
         DLE(w, args.B)
+    number("--tol", args.tol, above=0.0)
+    if args.t is not None:
+        number("--t", args.t, above=0.0)
 
 
 def _exponents(drives: list[float], args: argparse.Namespace) -> list[tuple[float, float, float]]:

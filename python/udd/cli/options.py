@@ -69,7 +69,7 @@ def add_pendulum(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def effects(texts: list[str]) -> list[Effect]:
+def effects(texts: list[str]) -> tuple[Effect, ...]:
     """Effects from ``name:p=v,...``."""
     from udd.effects import library
     from udd.errors import ModelError
@@ -94,7 +94,7 @@ def effects(texts: list[str]) -> list[Effect]:
             if not equals:
                 raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number")
         result.append(specs[name].make(momentum=momentum, **values))
-    return result
+    return tuple(result)
 
 
 def numbers(texts: list[str], what: str) -> list[float]:

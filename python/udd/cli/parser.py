@@ -16,7 +16,8 @@ class Parser(argparse.ArgumentParser):
     """An ArgumentParser that takes ``-1e-3`` and ``-1,2`` for values."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, allow_abbrev=False, **kwargs)
+        kwargs["allow_abbrev"] = False
+        super().__init__(*args, **kwargs)
         self._negative_number_matcher = re.compile(r"^-\.?\d")
 
 

@@ -36,7 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _warn
-            answer = args.run(args)
+            answer: Answer = args.run(args)
         _print(answer, args.json)
         sys.stdout.flush()
     except UddError as error:

@@ -10,14 +10,17 @@ from typing import Any
 
 from udd.errors import UddError
 
-from .answer import Answer, watched
+from .answer import Answer
+from .inputs import add_partial, tracked
 from .options import new, numbers
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     parser = new(commands, "track", run, "Measure the motion of the disk in a film; the table is CSV.")
-    parser.add_argument("film", type=Path, help="a film by a camera at rest, the four colour marks in view")
+    parser.add_argument(
+        "file", type=Path, metavar="FILM", help="a film by a camera at rest, the four colour marks in view"
+    )
     parser.add_argument("--out", type=Path, metavar="CSV", help="file to write; otherwise standard output")
     parser.add_argument(
         "--disk-radius", type=float, default=0.08, metavar="M", help="sets the scale (default 0.08)"
@@ -25,6 +28,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--pivot", metavar="U,V", help="contact in the picture [pixels]; found where not given"
     )
+    add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
 
 
@@ -33,7 +37,6 @@ def run(args: argparse.Namespace) -> Answer:
     import numpy as np
 
     from udd._validate import number
-    from udd.tracking import track
 
     if args.out is not None and not args.out.parent.is_dir():
         raise UddError(f"{args.out}: there is no folder {args.out.parent}")
@@ -44,8 +47,7 @@ def run(args: argparse.Namespace) -> Answer:
         if len(place) != 2:
             raise UddError(f"--pivot must be two numbers U,V, not {args.pivot}")
         pivot = (place[0], place[1])
-    found = track(args.film, disk_radius=args.disk_radius, pivot=pivot, progress=watched())
-    m = found.with_meta(**more)
+    m = tracked(args, args.disk_radius, pivot).with_meta(**more)
     usable = int(m.seen.sum())
     text = f"{usable} of {len(m)} frames usable, {m.duration:.2f} s"
     data: dict[str, Any] = {

@@ -7,7 +7,6 @@ demonstration is not told; in `sample_null.mp4` nothing is added to the model.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,14 +28,14 @@ SAMPLES = {
 def main(folder: Path) -> None:
     """Write both films."""
     for seed, (name, hidden) in enumerate(SAMPLES.items()):
-        effects = [s.make(momentum="constraint", **hidden[s.name]) for s in library() if s.name in hidden]
-        run = between_wheels(effects, seed)
+        effects = (s.make(momentum="constraint", **hidden[s.name]) for s in library() if s.name in hidden)
+        run = between_wheels(tuple(effects), seed)
         film = render(run, folder / name, quality=QUALITY, seed=seed, progress=sys.stderr.isatty())
         size = film.path.stat().st_size / 1e6
         print(f"{name}: {len(film.t)} frames, {size:.2f} MB, start {run.state[0].tolist()}")
 
 
-def between_wheels(effects: Sequence[Effect], seed: int) -> Trajectory:
+def between_wheels(effects: tuple[Effect, ...], seed: int) -> Trajectory:
     """A run that stays between the wheels, from the first of random starts that does."""
     random = np.random.default_rng(seed)
     model = Disk(DRIVE, effects=effects)

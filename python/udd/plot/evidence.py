@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def evidence(discovery: Any, ax: Any = None, *, stage: int = 0, most: int = 12) -> Axes:
+def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: int = 12) -> Axes:
     """The fall of chi2 that each candidate would bring, beside what it takes to be believed.
 
     Parameters
@@ -95,7 +95,7 @@ def threshold(discovery: Any, stage: int) -> float:
     return float(chi2.isf(ALPHA / looks(discovery, stage), 1))
 
 
-def errors(discovery: Any, ax: Any = None) -> Axes:
+def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     """How far the model runs away from data it has not seen: before, after, and what no model could beat.
 
     Parameters

@@ -22,7 +22,7 @@ _BINS = 24
 
 def residuals(
     fit: Any,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     equation: str | None = None,
     against: str | None = None,
@@ -86,7 +86,7 @@ def residuals(
     return ax
 
 
-def misfit(fit: Any, ax: Any = None, *, channel: str | None = None) -> Axes:
+def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> Axes:
     """What was seen less what was fitted, against time, with a band of two standard deviations of the noise.
 
     Parameters

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def friction(result: Any, ax: Any = None, *, fastest: float | None = None) -> Axes:
+def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = None) -> Axes:
     """The friction coefficient k(Omega) of a model, with a band of one standard error where it was fitted.
 
     It is read off the model's own rates at the contact, where gravity and the drive exert no torque, so that

@@ -19,7 +19,7 @@ _SHOWN = {"disk": ("Y", "Z"), "pendulum": ("theta",), "dle": ("y", "z")}
 _COLOURS = (AFTER, BEFORE, "#009e73", "#cc79a7")
 
 
-def time_series(result: Any, ax: Any = None, *, coordinates: Sequence[str] | None = None) -> Axes:
+def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[str] | None = None) -> Axes:
     """Coordinates against time; of a fit the measured ones as dots and the fitted ones as lines.
 
     Parameters
@@ -74,7 +74,7 @@ def time_series(result: Any, ax: Any = None, *, coordinates: Sequence[str] | Non
     return ax
 
 
-def orbit(result: Any, ax: Any = None) -> Axes:
+def orbit(result: Any, ax: Axes | None = None) -> Axes:
     """The path of the disk's centre in the picture's plane, with the contact and the reach of the wheels.
 
     A pendulum's path is drawn in its phase plane, the DLE's as (y, z).
@@ -131,7 +131,7 @@ def _device(ax: Axes, drawn: Sequence[Motion]) -> None:
     ax.set_aspect("equal", adjustable="box")
 
 
-def phase_space(result: Any, ax: Any = None) -> Axes:
+def phase_space(result: Any, ax: Axes | None = None) -> Axes:
     """The orbit in three dimensions: J, Y, Z of the disk with J = I Omega - W Y; omega, y, z of the DLE.
 
     Parameters

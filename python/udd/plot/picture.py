@@ -18,7 +18,7 @@ MARKS = ("#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b")
 _LINE = "#00e5ff"  # stands out on grey, black and white alike
 
 
-def overlay(image: Any, pixels: Any, frame: int, ax: Any = None) -> Axes:
+def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes:
     """A frame of the film with the disk's outline, its marks, its centre and the contact drawn over it.
 
     Parameters

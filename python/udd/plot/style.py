@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,11 +61,10 @@ def scale(name: str) -> float:
     return AXES[name][2]
 
 
-def new_axes(ax: Any = None, projection: str | None = None) -> Axes:
+def new_axes(ax: Axes | None = None, projection: str | None = None) -> Axes:
     """The Axes given, or those of a new figure."""
     if ax is not None:
-        result: Axes = ax
-        return result
+        return ax
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=(6.4, 4.4), layout="constrained")

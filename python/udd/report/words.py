@@ -110,8 +110,8 @@ def _meanings(found: Any, discovery: Any) -> list[str]:
 
 def effect_sentence(effect: Any) -> str:
     """What an effect does, as a clause."""
-    meaning = str(getattr(effect, "meaning", "") or effect.equation)
-    return meaning.rstrip(".")
+    meaning = str(effect.meaning).rstrip(".")
+    return f"there is {meaning}" if meaning.startswith(("a ", "an ", "dry ")) else meaning
 
 
 def headline(discovery: Any) -> Headline:
@@ -190,11 +190,11 @@ def limit(other: Any) -> str:
             "At one drive speed the two act on the disk identically, and no longer record would tell them "
             "apart: film a second drive and fit both together."
         )
-    if other.nats < 0:
-        better = f"{-other.nats:.1f} units of log-likelihood"
-        return f"It fits even a little better ({better}), but fails another test."
+    if other.nats < -0.1:
+        better = f"{abs(other.nats):.1f} units of log-likelihood"
+        return f"It fits even better (by {better}), but was not chosen: it fails another test."
     return (
-        f"It fits worse by {other.nats:.1f} units of log-likelihood; only from 10 on is a form excluded. "
+        f"It fits worse by {abs(other.nats):.1f} units of log-likelihood; a form is excluded from 10 on. "
         "A longer record, or one at another drive, would settle it."
     )
 
