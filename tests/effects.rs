@@ -46,7 +46,7 @@ prop_compose! {
         t in 0.0..60.0f64,
         omega in prop_oneof![-12.0..-1.8f64, -1.5..-0.1f64, 0.1..1.5f64, 1.8..12.0f64],
         radius in 0.005..0.07f64,
-        angle in 0.0..6.28f64,
+        angle in 0.0..std::f64::consts::TAU,
         beta in -20.0..20.0f64,
     ) -> (f64, [f64; 4]) {
         (t, [omega, radius * angle.sin(), radius * angle.cos(), beta])

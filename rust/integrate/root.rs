@@ -35,28 +35,23 @@ pub fn bracketed(
 mod tests {
     use super::bracketed;
 
+    /// 200 calls bisect a bracket of 50 down to rounding.
+    fn finds(f: fn(f64) -> f64, a: f64, b: f64, wanted: f64) {
+        let mut calls = 0;
+        let counted = |x| {
+            calls += 1;
+            f(x)
+        };
+        let found = bracketed(counted, (a, f(a)), (b, f(b)), 0.0);
+        assert!((found - wanted).abs() < 1e-15, "{found} for {wanted}");
+        assert!(calls <= 200, "{calls} calls");
+    }
+
     #[test]
     fn finds_simple_and_flat_zeros() {
-        let cases: [(fn(f64) -> f64, f64, f64, f64); 4] = [
-            (|x| x * x - 2.0, 0.0, 2.0, 2f64.sqrt()),
-            (|x| x.powi(9), -0.3, 1.0, 0.0),
-            (|x| (x - 0.1).tanh() * 1e-20, 0.0, 50.0, 0.1),
-            (|x| x - 0.75, 0.0, 0.75, 0.75),
-        ];
-        for (f, a, b, wanted) in cases {
-            let mut calls = 0;
-            let found = bracketed(
-                |x| {
-                    calls += 1;
-                    f(x)
-                },
-                (a, f(a)),
-                (b, f(b)),
-                0.0,
-            );
-            // 200 calls bisect a bracket of 50 down to rounding.
-            assert!((found - wanted).abs() < 1e-15, "{found} for {wanted}");
-            assert!(calls <= 200, "{calls} calls");
-        }
+        finds(|x| x * x - 2.0, 0.0, 2.0, 2f64.sqrt());
+        finds(|x| x.powi(9), -0.3, 1.0, 0.0);
+        finds(|x| (x - 0.1).tanh() * 1e-20, 0.0, 50.0, 0.1);
+        finds(|x| x - 0.75, 0.0, 0.75, 0.75);
     }
 }
