@@ -236,7 +236,7 @@ class Effect:
         names = "|".join(map(re.escape, values))
         return re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, self.equation)
 
-    def replace(self, *, momentum: str | None = None, **values: float) -> Effect:
+    def replace(self, **values: float) -> Effect:
         """The effect with other values of some parameters.
 
         Raises
@@ -249,7 +249,7 @@ class Effect:
             if name not in new:
                 raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(new)}")
             new[name] = value
-        return Effect(self.name, tuple(new.values()), momentum or self.momentum)
+        return Effect(self.name, tuple(new.values()), self.momentum)
 
     def __repr__(self) -> str:
         items = [f"{name}={value!r}" for name, value in self.parameters.items()]

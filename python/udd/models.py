@@ -80,7 +80,7 @@ class Model:
             own = {
                 name: values[key] for name in effect.parameters if (key := f"{effect.name}.{name}") in values
             }
-            effects.append(effect.replace(momentum=None, **own) if own else effect)
+            effects.append(effect.replace(**own) if own else effect)
         return self._changed({n: values[n] for n in self._plain if n in values}, tuple(effects))
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
