@@ -18,6 +18,7 @@ ROUNDS = 8
 MOST = 48  # frames to learn from
 WHOLE = 0.97  # share of its edges that is in view for a mark to learn from
 HALF_SEEN = 0.5  # and that looks as expected
+FAR_OFF = 1.0  # pixels; a mark further off its expected place says less about the layout
 
 
 Frame = tuple[Plane, Pose, Motion]
@@ -164,23 +165,39 @@ def _shape_step(
 
 
 def _replace_places(marks: list[Mark], fits: list[Seen]) -> list[Mark]:
-    """Move each mark's place on the disk to where it is on average, the disk's frame held by all of them."""
-    moved = []
-    for k, mark in enumerate(marks):
-        shifts = []
-        for pose, motion, sightings in fits:
-            s = sightings[k]
-            if s is not None and s.in_view > WHOLE:
-                step = solve(
-                    marks,
-                    sightings,
-                    pose.angle,
-                    np.array([float(x is not None and x.in_view > WHOLE) for x in sightings]),
-                )
-                if step is not None:
-                    shifts.append(
-                        complex(step.leftover[k][0], step.leftover[k][1]) * np.exp(-1j * pose.angle)
-                    )
-        shift = complex(np.median(np.real(shifts)), np.median(np.imag(shifts))) if len(shifts) > 2 else 0j
-        moved.append(replace(mark, place=mark.place + shift))
-    return moved
+    """Move the marks on the disk to where all frames together want them.
+
+    Linear least squares for the eight coordinates with the pose of every frame free (eliminated frame
+    by frame); half-hidden marks count by what they inform. The three motions of all marks together
+    are left at zero.
+    """
+    size = 2 * len(marks)
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    for pose, _, sightings in fits:
+        turn = np.array([[np.cos(pose.angle), -np.sin(pose.angle)], [np.sin(pose.angle), np.cos(pose.angle)]])
+        weight, by_pose, by_place = np.zeros((size, size)), np.zeros((size, 3)), np.zeros((size, size))
+        offset = np.zeros(size)
+        used = np.array([float(s is not None and s.complete > HALF_SEEN) for s in sightings])
+        step = solve(marks, sightings, pose.angle, used)
+        if step is None or used.sum() < 3:
+            continue
+        for k, (mark, s) in enumerate(zip(marks, sightings, strict=True)):
+            at = slice(2 * k, 2 * k + 2)
+            arm = 1j * mark.place * np.exp(1j * pose.angle)
+            by_pose[at] = [[1, 0, arm.real], [0, 1, arm.imag]]
+            by_place[at, at] = turn
+            if s is not None and used[k]:
+                away = float(np.hypot(*step.leftover[k]))
+                weight[at, at] = s.information / (1 + (away / FAR_OFF) ** 2)
+                offset[at] = s.offset
+        seen = weight @ by_pose
+        left = weight - seen @ np.linalg.solve(by_pose.T @ seen, seen.T)
+        normal += by_place.T @ left @ by_place
+        right += by_place.T @ left @ offset
+    if not normal.any():
+        return marks
+    change = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right
+    return [
+        replace(m, place=m.place + complex(du, dv))
+        for m, (du, dv) in zip(marks, change.reshape(-1, 2), strict=True)
+    ]
