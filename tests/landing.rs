@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 
+use proptest::prelude::*;
 use udd::integrate::{Driver, Ending, Failure, Tolerance, propagate};
 use udd::model::{Disk, DiskFamily, Family, Sides, System};
 use udd::scalar::{Dual, Scalar};
@@ -181,5 +182,40 @@ fn grazing_is_not_a_trap() {
         assert!(count <= 3, "height {height}: {count} crossings");
         assert!((end - (height - 0.5)).abs() < 1e-10, "height {height}: ends at {end}");
         assert!(calls < 2000, "height {height}: {calls} evaluations");
+    }
+}
+
+proptest! {
+    /// From any start, at any tolerance: every event lies on its surface, the work is bounded, and the
+    /// run agrees with a tight one.
+    #[test]
+    fn any_run_lands_and_ends(
+        w in 0.0..0.1f64,
+        omega in prop_oneof![Just(0.0), Just(KINK), Just(-KINK), -15.0..15.0f64],
+        y in prop_oneof![Just(0.0), -0.05..0.05f64],
+        z in -0.05..0.05f64,
+        digits in 4.0..12.0f64,
+    ) {
+        let disk = disk(w, false);
+        let rtol = 10f64.powf(-digits);
+        let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
+        let x0 = [omega, y, z, 0.0];
+        let mut driver = Driver::new(&disk, 0.0, x0, None, &tolerance);
+        while driver.t() < 0.5 {
+            let ending = driver.advance(0.5).unwrap();
+            let speed = driver.x()[0].abs();
+            if let Ending::Surface(j) = ending {
+                let off = [speed, speed - KINK][j].abs();
+                prop_assert!(off < 2e-12, "surface {j} missed by {off:e}");
+            }
+            // At 1e-12 a run of 0.5 s takes up to 1000 steps.
+            prop_assert!(driver.counts.evaluations < 20_000, "{:?}", driver.counts);
+        }
+        let tight = propagate(&disk, 0.0, 0.5, x0, &Tolerance { rtol: 1e-13, atol: 1e-16 }).unwrap();
+        for n in 0..4 {
+            // Errors of up to 100 steps, amplified by up to 100 over half a second.
+            let allowed = 1e4 * rtol * [15.0, 0.1, 0.1, 5.0][n];
+            prop_assert!((driver.x()[n] - tight[n]).abs() < allowed, "{:?} and {tight:?}", driver.x());
+        }
     }
 }
