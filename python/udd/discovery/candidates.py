@@ -37,6 +37,11 @@ class Candidate:
         return [names.index(name) for name in self.amplitude_names]
 
     @property
+    def parameters(self) -> int:
+        """How many numbers a fit would find: the amplitudes and, where there is one, the frequency."""
+        return sum(p.role != "shape" for p in self.effect.spec.parameters)
+
+    @property
     def amplitude_names(self) -> list[str]:
         """The amplitudes' names among a model's parameters."""
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]

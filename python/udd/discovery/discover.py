@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from scipy.stats import chi2
 
 from udd.effects import Effect
@@ -16,7 +18,7 @@ from udd.measurement import Measurement
 from udd.models import Model
 
 from .candidates import Candidate, library
-from .heldout import Errors, held_out_errors, improvement, whole_improvement
+from .heldout import Errors, cost_improvement, held_out_errors, improvement, whole_improvement
 from .scan import Scan, Scored, physical, scan, scan_ripples
 
 #: Chance that a record without any effect is said to have one, over all candidates together.
@@ -27,6 +29,7 @@ NATS = 10.0
 TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at one drive.
 SAME = 0.9999
+_SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _TRIED = 6  # of the best candidates, fitted in full
 _MOST = 3  # effects added
 _SHORTEST = 60  # frames
@@ -49,7 +52,7 @@ class Found:
     p : float
         Probability of so large a fall by chance, all candidates counted.
     ratio : tuple of float
-        Held-out error after over before, with its 95 % interval, where the effect was added.
+        Cost of the held-out frames after over before, all parameters held, with its 95 % interval.
     """
 
     effect: Effect
@@ -73,7 +76,7 @@ class Found:
             "parameters": {n: {"value": v, "se": self.errors.get(n)} for n, v in self.parameters.items()},
             "chi2": self.chi2,
             "p": self.p,
-            "held_out_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+            "held_out_cost_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
         }
 
 
@@ -198,8 +201,8 @@ def discover(
     The model is fitted to the first 60 % of the record. Every effect of the library is scored around that fit;
     the best are fitted in full. An effect is added only if so large a fall of chi2 has a chance below 0.1 % over all
     candidates together (in those 60 % for white noise, and in all data with the misfits' own colour), its amplitudes
-    are physical, and the free runs on the last 40 % get better beyond doubt: the 95 % interval of the errors' ratio
-    excludes 1, and at no horizon do they get worse. All coefficients are refitted and the search goes on; single
+    are physical, and the last 40 % are explained better beyond doubt: with all parameters held, the 95 % interval of
+    the costs' ratio excludes 1, and at no horizon do forecasts get worse. All coefficients are refitted and the search goes on; single
     effects that do not pass are tried in pairs. Forms that the data cannot tell apart are named.
 
     Parameters
@@ -298,6 +301,11 @@ class _Trial:
     def amplitudes(self) -> list[float]:
         return [self.fit.parameters[name] for name in self.names]
 
+    def criterion(self, unit: float) -> float:
+        """chi2 in a common unit with the price of a parameter (BIC): the smaller the better."""
+        price = math.log(np.isfinite(self.fit.misfit).sum())
+        return self.fit.chi2 / unit + price * sum(c.parameters for c in self.candidates)
+
     @property
     def physical(self) -> bool:
         values, errors = self.fit.parameters, self.fit.errors
@@ -333,24 +341,24 @@ class _Search:
         current = _State(base, whole, before)
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            scanned, rippled = self._score(current.part)
-            scans.append(sorted([*scanned.scored, *rippled[:3]], key=lambda s: -s.chi2))
-            found = self._single(current, scanned, rippled) or self._pair(current, scanned)
+            scanned = self._score(current.part)
+            scans.append(sorted(scanned.scored, key=lambda s: -s.chi2))
+            found = self._single(current, scanned) or self._pair(current, scanned)
             if found is None:
                 break
             step, current = found
             accepted.append(step)
         return current.part, current.whole, current.errors, accepted, scans
 
-    def _score(self, current: Fit) -> tuple[Scan, list[Scored]]:
-        scanned = scan(current, library(current.model))
+    def _score(self, current: Fit) -> Scan:
         rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
+        best = [s.candidate for s in rippled[:1]]
+        scanned = scan(current, [*library(current.model), *best])
         self._looks = len(scanned.scored) + len(rippled)
-        return scanned, rippled
+        return scanned
 
-    def _single(self, current: _State, scanned: Scan, rippled: list[Scored]) -> tuple[_Step, _State] | None:
-        pool = [*scanned.scored, *rippled[:1]]
-        passing = [s for s in pool if s.physical and not s.absorbed and s.p * self._looks < ALPHA]
+    def _single(self, current: _State, scanned: Scan) -> tuple[_Step, _State] | None:
+        passing = [s for s in scanned.scored if s.physical and not s.absorbed and s.p * self._looks < ALPHA]
         passing.sort(key=lambda s: -s.chi2)
         trials = []
         for s in passing[:_TRIED]:
@@ -380,18 +388,22 @@ class _Search:
         self, current: _State, trials: list[_Trial], scanned: Scan, looks: int
     ) -> tuple[_Step, _State] | None:
         """The best trial that passes all tests."""
-        for trial in sorted(trials, key=lambda t: t.fit.chi2):
-            after = self.errors(trial.fit)
-            ratio = self.improvement(current.errors, after)
-            if not ratio[2] < 1.0 or self._worse(current.errors, after):
-                continue
-            whole = self._try(current.whole, trial.candidates, trial.amplitudes)
+        if not trials:
+            return None
+        held = self.record.part(slice(self.first, None))
+        unit = min(trials, key=lambda t: t.fit.chi2).fit.inflation(current.part)
+        for trial in sorted(trials, key=lambda t: t.criterion(unit)):
+            ratio = cost_improvement(current.part, trial.fit, held)
+            whole = self._try(current.whole, trial.candidates, trial.amplitudes) if ratio[2] < 1.0 else None
             if whole is None:
                 continue
             fall = (current.whole.chi2 - whole.fit.chi2) / whole.fit.inflation(current.whole)
             p = min(float(chi2.sf(fall, len(trial.amplitudes))) * looks, 1.0)
-            if p < ALPHA:
-                others = self._alternatives(trial, trials, scanned, trial.fit.inflation(current.part))
+            if p >= ALPHA:
+                continue
+            after = self.errors(trial.fit)
+            if not self._worse(current.errors, after):
+                others = self._alternatives(trial, trials, scanned, unit)
                 return _Step(trial.candidates, fall, p, ratio, others), _State(trial.fit, whole.fit, after)
         return None
 
@@ -400,12 +412,13 @@ class _Search:
         return before.unit == "m" and any(improvement(before, after, h)[1] > 1.0 for h in before.horizons)
 
     def _alternatives(
-        self, chosen: _Trial, trials: list[_Trial], scanned: Scan, scatter: float
+        self, chosen: _Trial, trials: list[_Trial], scanned: Scan, unit: float
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
+        best = chosen.criterion(unit)
         result = []
         for trial in trials:
-            nats = (trial.fit.chi2 - chosen.fit.chi2) / scatter / 2
+            nats = (trial.criterion(unit) - best) / 2
             if trial is chosen or nats > NATS or len(trial.candidates) != len(chosen.candidates):
                 continue
             for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
@@ -413,6 +426,8 @@ class _Search:
                     continue
                 known = mine in listed and other in listed
                 likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
+                if likeness > _SUPERSET and other.parameters > mine.parameters:
+                    continue  # the chosen form with something more that the data do not ask for
                 effect = other.effect.replace(
                     **{p: trial.fit.parameters[f"{other.effect.name}.{p}"] for p in other.effect.amplitudes}
                 )

@@ -239,7 +239,7 @@ def fit_record(
 def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
-    The noise stays as it was estimated, so that the two fits' chi2 compare.
+    The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its line.
 
     Parameters
     ----------
@@ -250,10 +250,14 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
         Where their amplitudes start, in order.
     """
     names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
+    t = fitted.record.t
+    line = 0.5 / float(t[-1] - t[0])
+    waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e in effects for p in e.spec.parameters if p.role == "frequency"]
     model = fitted.model.with_effects((*fitted.model.effects, *effects))
     model = model.with_parameters(dict(zip(names, amplitudes, strict=True)))
     order = list(model.parameters)
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
+    more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
     problem = replace(fitted.problem, model=model, free=fitted.problem.free + more)
     start = replace(fitted.point, model=model.parameters)
     return _tighten(fitted.measurement, problem, start, levels(fitted.measurement.kind)[1:])
@@ -306,6 +310,35 @@ def _tighten(
         result = solve(measurement, problem, point)
         point = result.point
     return result
+
+
+def held_cost(fitted: Fit, record: Record) -> Array:
+    """Cost of every frame of another record, with all parameters held and the states free.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Its parameters, camera and noise are held.
+    record : Record
+
+    Returns
+    -------
+    cost : ndarray (n,)
+        Squared misfit of a frame in units of the noise, with the squared defect of the link that leaves it in units of
+        the model's assumed error.
+    """
+    problem = replace(fitted.problem, record=record, free=(), model=fitted.model)
+    problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
+    start = replace(fitted.point, states=record.states)
+    end = _tighten(fitted.measurement, problem, start, levels(fitted.measurement.kind))
+    information = problem.noise.information(record, end.states[:, 0])
+    misfit = np.nan_to_num(end.misfit)
+    cost = np.einsum("ni,nij,nj->n", misfit, information, misfit)
+    # A defect is kept per second; its variance over a link of length dt is diffusion^2 dt.
+    dt = np.diff(record.t)[:, None]
+    links = np.nan_to_num(end.defect) ** 2 * dt / np.array(end.problem.diffusion) ** 2
+    cost[:-1] += links.sum(axis=1)
+    return cost
 
 
 def information_for(fitted: Fit, record: Record) -> Array:

@@ -1,0 +1,32 @@
+//! Gravity and drive that are not parallel: an angle `a` between them.
+//!
+//! A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
+//! are one and the same: the world turned by `a`.
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// Gravity and drive that are not parallel: an angle `a` between them.
+pub struct Tilt;
+
+impl Law for Tilt {
+    const SPEC: Spec = Spec {
+        name: "tilt",
+        title: "tilt between gravity and drive",
+        equation: "torque = a g Z",
+        meaning: "the wheels do not drive the disk straight up against gravity (only the angle between the two can be known)",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[EffectParameter {
+            name: "a",
+            unit: "rad",
+            default: 0.0,
+            range: (-0.5, 0.5),
+            role: Role::Amplitude,
+        }],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        slots.torque += p[0] * at.g * at.z;
+    }
+}
