@@ -11,12 +11,19 @@ from numpy.typing import NDArray
 from .acquire import candidates, classify
 from .decode import Picture
 from .marks import MISFIT, Motion
+from .pivot import Contact
 from .pose import Fit, Look, Pose, align
 
 Array = NDArray[np.float64]
 CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
 FAR = [2.0, 1.0, MISFIT, MISFIT, MISFIT]  # rounds from blobs, good to ten
 MOST_OFF = 2.0  # pixels by which a mark may disagree with the others before it is left out
+STREAK_OFF = 0.05  # more for a streak, per pixel of its length
+FRESH = 0.15  # s: how long the last pose tells where to look
+MOST_TRIED = 3  # starting poses
+FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
+STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
+BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
 FLAT = 6.0  # brightness contrast of a black frame
 
 
@@ -43,72 +50,105 @@ class Known:
     view: NDArray[np.bool_]
     colours: Array
     exposure: float
+    white: float  # brightness code of the bare disk
+    contact: Contact | None
+
+
+@dataclass(frozen=True)
+class Held:
+    """A frame in which the disk was held."""
+
+    t: float
+    pose: Pose
+    rate: float  # of turning [rad/s]
 
 
 def follow(pictures: Iterable[Picture], known: Known, tick: Callable[[int], None] = lambda _: None) -> Tracks:
     """Track the disk through `pictures`; one row per picture, flagged where the disk is not held."""
     tracks = Tracks([], [], [], [], [], [], [], [], [])
-    past: list[tuple[float, Pose]] = []
+    past: list[Held] = []
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
-        flag, fit, pose, streak = _one(picture, known, past, last)
+        flag, fit, pose, motion = _one(picture, known, past, last)
         last = picture.y
-        _append(tracks, picture.t, flag, fit, pose, streak)
+        _append(tracks, picture.t, flag, fit, pose, _streak(motion, known.look))
         if fit is not None:
-            past = [*past[-2:], (picture.t, pose)]
+            rate = motion.turn / known.exposure if known.exposure > 0 else 0.0
+            past = [*past[-2:], Held(picture.t, pose, rate)]
         tick(picture.index)
     return tracks
 
 
 def _one(
-    picture: Picture, known: Known, past: list[tuple[float, Pose]], last: NDArray[np.uint8] | None
-) -> tuple[str, Fit | None, Pose, float]:
+    picture: Picture, known: Known, past: list[Held], last: NDArray[np.uint8] | None
+) -> tuple[str, Fit | None, Pose, Motion]:
     nowhere = Pose(complex(np.nan, np.nan), np.nan)
     if picture.damaged:
-        return "damaged: the frame does not decode whole", None, nowhere, 0.0
+        return "damaged: the frame does not decode whole", None, nowhere, Motion()
     if float(picture.y[::8, ::8].std()) < FLAT:
-        return "black: the frame shows nothing", None, nowhere, 0.0
-    guess = predict(past, picture.t)
-    if last is not None and guess is not None and _repeats(picture.y, last, guess, past[-1][1], known.look):
-        return "dup: the frame repeats the one before", None, nowhere, 0.0
-    motion = _motion(past, guess, picture.t, known.exposure)
-    if guess is not None:
+        return "black: the frame shows nothing", None, nowhere, Motion()
+    guess = predict(past, picture.t, known.contact)
+    if last is not None and guess is not None and _repeats(picture.y, last, guess, past[-1].pose, known.look):
+        return "dup: the frame repeats the one before", None, nowhere, Motion()
+    if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
+        motion = _motion(past, guess, picture.t, known)
         fit = _hold(picture, known, pose, motion, CLOSE)
         if fit is not None:
-            better = _motion(past, pose, picture.t, known.exposure)
+            better = _motion(past, pose, picture.t, known)
             if abs(_streak(better, known.look) - _streak(motion, known.look)) > 0.3:
                 motion = better
                 fit = _hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
-            return "", fit, pose, _streak(motion, known.look)
+            return "", fit, pose, motion
     best = _anywhere(picture, known, guess, past)
     if best is None:
-        return "lost: fewer than two marks agree", None, nowhere, 0.0
+        return "lost: fewer than two marks agree", None, nowhere, Motion()
     fit, pose, motion = best
-    return "", fit, pose, _streak(motion, known.look)
+    return "", fit, pose, motion
 
 
 def _hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
-    """Align and check; a mark that disagrees with two or more others is left out."""
+    """Align and check; a mark that disagrees with three others is left out."""
+    most_off = MOST_OFF + STREAK_OFF * _streak(motion, known.look)
+    start = Pose(pose.centre, pose.angle)
     fit = align(picture.y, known.view, known.look, pose, motion, rounds)
-    if fit is None or fit.moved > 0.5 or not _agree(fit):
+    if fit is not None and fit.used.sum() == 4 and _worst(fit)[1] > most_off:
+        pose.centre, pose.angle = start.centre, start.angle
+        fit = align(picture.y, known.view, known.look, pose, motion, rounds, without=_worst(fit)[0])
+    if fit is None or fit.moved > 0.5 + 0.1 * most_off or _worst(fit)[1] > most_off:
         return None
-    return fit
+    return fit if _on_the_disk(picture, known, pose) else None
 
 
-def _agree(fit: Fit) -> bool:
-    off = np.hypot(*fit.step.leftover[fit.used].T)
-    return bool(np.all(off < MOST_OFF))
+def _worst(fit: Fit) -> tuple[int, float]:
+    off = np.where(fit.used, np.hypot(*fit.step.leftover.T), 0.0)
+    k = int(np.argmax(off))
+    return k, float(off[k])
 
 
-def _anywhere(
-    picture: Picture, known: Known, guess: Pose | None, past: list[tuple[float, Pose]]
-) -> tuple[Fit, Pose, Motion] | None:
+def _on_the_disk(picture: Picture, known: Known, pose: Pose) -> bool:
+    """Whether the disk is where the marks say: bare and bright inside the square of the marks."""
+    look = known.look
+    inner = 0.7 * (abs(look.marks[0].place) - np.hypot(*look.marks[0].half))
+    points = look.lens.picture(pose.centre + inner * BARE)
+    r, c = np.round(points.imag).astype(int), np.round(points.real).astype(int)
+    height, width = picture.y.shape
+    ok = (r >= 0) & (r < height) & (c >= 0) & (c < width)
+    r, c = r[ok], c[ok]
+    clear = known.view[r, c]
+    if clear.sum() < 5:
+        return True
+    level = picture.y[r[clear], c[clear]].astype(float)
+    return bool(np.mean(np.abs(level - known.white) < 0.2 * known.white) > 0.7)
+
+
+def _anywhere(picture: Picture, known: Known, guess: Pose | None, past: list[Held]) -> tuple[Fit, Pose, Motion] | None:
+    """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
     shape = picture.y.shape
     reach = abs(known.look.marks[0].place)
     box = (0, shape[0], 0, shape[1])
-    recent = bool(past) and picture.t - past[-1][0] < 0.5
-    if guess is not None and recent:
+    fresh = guess is not None and picture.t - past[-1].t < FRESH
+    if guess is not None and fresh:
         r, at = 2.0 * reach, complex(known.look.lens.picture(guess.centre))
         box = (
             max(0, int(at.imag - r)),
@@ -120,47 +160,72 @@ def _anywhere(
             return None
     patches = classify(picture, known.colours, known.view, box)
     best: tuple[float, Fit, Pose, Motion] | None = None
-    for pose in candidates(patches, known.look, guess if recent else None)[:6]:
+    for start in candidates(patches, known.look, guess if fresh else None)[:MOST_TRIED]:
         if guess is not None:
-            pose.angle += 2 * np.pi * round((guess.angle - pose.angle) / (2 * np.pi))
-        motion = _motion(past, pose if recent else None, picture.t, known.exposure)
-        fit = _hold(picture, known, pose, motion, FAR)
-        if fit is not None:
-            score = float(
-                np.nansum([s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s])
-            )
-            if best is None or score > best[0]:
-                best = (score, fit, pose, motion)
+            start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
+        for motion in _motions(past, start, picture.t, known, fresh):
+            pose = Pose(start.centre, start.angle)
+            fit = _hold(picture, known, pose, motion, FAR)
+            if fit is not None:
+                score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
+                if best is None or score > best[0]:
+                    best = (score, fit, pose, motion)
+        if best is not None:
+            break
     return None if best is None else best[1:]
 
 
-def predict(past: list[tuple[float, Pose]], t: float) -> Pose | None:
-    """Extrapolate through the last poses: a parabola through three, a line through two."""
+def _motions(past: list[Held], pose: Pose, t: float, known: Known, fresh: bool) -> list[Motion]:
+    if fresh:
+        return [_motion(past, pose, t, known)]
+    if known.exposure <= 0:
+        return [Motion()]
+    step = 2 * STREAK_STEP / (abs(known.look.marks[0].place) * known.exposure)
+    count = int(np.ceil(FASTEST / step))
+    rates = step * np.arange(-count, count + 1)
+    return [
+        Motion((known.contact.velocity(pose.centre, r) if known.contact else 0j) * known.exposure, r * known.exposure)
+        for r in rates
+    ]
+
+
+def predict(past: list[Held], t: float, contact: Contact | None) -> Pose | None:
+    """Where the disk will be: its angle by extrapolation, its centre by turning about the contact."""
     if not past:
         return None
-    recent = [p for p in past if t - p[0] < 0.5] or past[-1:]
-    times = np.array([p[0] - t for p in recent])
-    value = np.array([[p.centre.real, p.centre.imag, p.angle] for _, p in recent])
+    last = past[-1]
+    dt = t - last.t
+    recent = [h for h in past if t - h.t < 0.5] or [last]
+    if len(recent) == 3 and dt > 1.6 * (last.t - recent[-2].t):
+        recent = recent[-2:]  # a parabola does not reach across a gap
+    times = np.array([h.t - t for h in recent])
     weights = np.array([np.prod([-b / (a - b) for b in times if b != a]) for a in times])  # Lagrange at 0
-    u, v, angle = weights @ value
-    return Pose(complex(u, v), float(angle))
+    if len(recent) == 1:
+        angle = last.pose.angle + last.rate * min(dt, 0.5)
+    else:
+        angle = float(weights @ np.array([h.pose.angle for h in recent]))
+    if contact is not None:
+        return Pose(contact.carry(last.pose.centre, angle - last.pose.angle, dt), angle)
+    return Pose(complex(weights @ np.array([h.pose.centre for h in recent])), angle)
 
 
-def _motion(past: list[tuple[float, Pose]], pose: Pose | None, t: float, exposure: float) -> Motion:
+def _motion(past: list[Held], pose: Pose, t: float, known: Known) -> Motion:
     """Movement during the exposure, from the derivative at `t` of the curve through the last poses."""
-    if pose is None or not past or exposure <= 0:
+    points = [h for h in past[-2:] if t - h.t < 0.5]
+    if not points or known.exposure <= 0:
         return Motion()
-    points = [p for p in past[-2:] if t - p[0] < 0.5]
-    if not points:
-        return Motion()
-    t1, p1 = points[-1]
+    t1, p1 = points[-1].t, points[-1].pose
     shift, turn = (pose.centre - p1.centre) / (t - t1), (pose.angle - p1.angle) / (t - t1)
     if len(points) == 2:
-        t0, p0 = points[0]
+        t0, p0 = points[0].t, points[0].pose
         s0, a0 = (p1.centre - p0.centre) / (t1 - t0), (p1.angle - p0.angle) / (t1 - t0)
         lean = (t - t1) / (t - t0)
         shift, turn = shift + (shift - s0) * lean, turn + (turn - a0) * lean
-    return Motion(shift * exposure, turn * exposure)
+    else:
+        turn = 2 * turn - points[-1].rate  # the mean rate over the step, and the rate at its beginning
+    if known.contact is not None:
+        shift = known.contact.velocity(pose.centre, turn)
+    return Motion(shift * known.exposure, turn * known.exposure)
 
 
 def _streak(motion: Motion, look: Look) -> float:

@@ -69,6 +69,45 @@ def pivot(
     return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms)
 
 
+@dataclass(frozen=True)
+class Contact:
+    """A rough contact point, good enough to foresee the next frame [pixels, pixels/s]."""
+
+    place: complex
+    drive: complex
+
+    def carry(self, centre: complex, turn: float, dt: float) -> complex:
+        """Where the disk's centre is after it turned by `turn` [rad] in `dt` [s] at a steady rate."""
+        spin = np.exp(1j * turn)
+        share = (spin - 1) / (1j * turn) if abs(turn) > 1e-6 else 1.0
+        return complex(self.place + (centre - self.place) * spin + self.drive * dt * share)
+
+    def velocity(self, centre: complex, rate: float) -> complex:
+        """Velocity of the centre when the disk turns at `rate` [rad/s]."""
+        return self.drive + 1j * rate * (centre - self.place)
+
+
+def rough_contact(
+    before: NDArray[np.complex128], after: NDArray[np.complex128], turn: Array, dt: Array, reach: float
+) -> Contact | None:
+    """The contact from pairs of neighbouring frames, each an exact finite motion at a steady rate."""
+    if len(before) < 4:
+        return None
+    spin = np.exp(1j * turn)
+    small = np.abs(turn) < 1e-6
+    share = np.where(small, 1.0, (spin - 1) / (1j * np.where(small, 1.0, turn)))
+    design, value = np.column_stack([1 - spin, dt * share]), after - before * spin
+    if np.sqrt((np.abs(1 - spin) ** 2).sum()) < 0.3:  # hardly any turning: a pixel's error would move it far
+        return None
+    weight = np.ones(len(value))
+    x = np.zeros(2, dtype=complex)
+    for _ in range(15):
+        x = np.linalg.lstsq(design * weight[:, None], value * weight, rcond=None)[0]
+        rest = np.abs(value - design @ x)
+        weight = 1 / (1 + (rest / (2 * np.median(rest) + 1e-3 * reach)) ** 2)
+    return Contact(complex(x[0]), complex(x[1]))
+
+
 def _windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Index ranges of unbroken good frames, cut to at most `WINDOW` seconds."""
     if len(t) < 2:

@@ -13,6 +13,7 @@ from .marks import Mark, Motion, Sighting, locate
 from .rigid import Step, solve
 
 LEAST = 0.15  # share of a mark's edges below which it is not used
+STREAKY = 0.01  # share of a streak's length by which its ends are not where they should be
 SETTLED = 0.04  # pixels; Gauss-Newton's next correction would be far smaller
 
 
@@ -54,14 +55,18 @@ def align(
     motion: Motion,
     rounds: list[float],
     gain_slack: float = 0.1,
+    without: int | None = None,
 ) -> Fit | None:
     """Move `pose` onto a picture by Gauss-Newton steps; None if fewer than two marks hold it.
 
-    Each round has its misfit tolerance [pixels]; a large one reaches further.
+    Each round has its misfit tolerance [pixels]; a large one reaches further. The mark `without` is
+    left out.
     """
     fit = None
-    for misfit in rounds:
-        psf = float(np.hypot(look.psf, 3 * max(0.0, misfit - 0.5)))
+    path = abs(motion.shift) + abs(motion.turn * look.marks[0].place)
+    for each in rounds:
+        misfit = float(np.hypot(each, STREAKY * path))
+        psf = float(np.hypot(look.psf, 3 * max(0.0, each - 0.5)))
         sightings = [
             locate(
                 y,
@@ -81,6 +86,8 @@ def align(
             for m in look.marks
         ]
         used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])
+        if without is not None:
+            used[without] = False
         step = solve(look.marks, sightings, pose.angle, used.astype(float))
         if step is None or used.sum() < 2:
             return None
@@ -88,6 +95,6 @@ def align(
         pose.angle += float(step.change[2])
         moved = float(np.hypot(np.hypot(*step.change[:2]), step.change[2] * abs(look.marks[0].place)))
         fit = Fit(step, sightings, used, moved)
-        if moved < SETTLED and misfit == rounds[-1]:
+        if moved < SETTLED and each == rounds[-1]:
             break
     return fit

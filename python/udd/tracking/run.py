@@ -25,11 +25,11 @@ from .loop import Known, Tracks, follow
 from .marks import MISFIT, Motion
 from .noise import covariance
 from .occluder import visible
+from .pivot import Contact, rough_contact, support
 from .pivot import pivot as rolling
-from .pivot import support
 from .pose import Look, Pose, align
 from .result import Camera, metres
-from .survey import Survey, moving, repeats_last, slowest, survey
+from .survey import Moving, Survey, moving, repeats_last, slowest, survey
 
 FEWEST_SIGHTS = 3  # survey frames that must show all four marks
 SHARP = 60  # slow frames from which the rim is measured
@@ -178,7 +178,12 @@ def _prepare(
         raise TrackError(f"{film.path}: {error}") from None
     colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
     look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
-    return Known(look, view, colours, open_for), rim
+    return Known(look, view, colours, open_for, white, _contact(in_motion, look)), rim
+
+
+def _contact(in_motion: list[Moving], look: Look) -> Contact | None:
+    before, after, turn, dt = (np.array(x) for x in zip(*(m.step for m in in_motion), strict=True)) if in_motion else [np.empty(0)] * 4
+    return rough_contact(look.lens.plane(before), look.lens.plane(after), turn, dt, abs(look.marks[0].place))
 
 
 def _in_plane(lens: Lens, sight: Sight) -> tuple[complex, float]:

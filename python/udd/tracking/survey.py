@@ -116,6 +116,7 @@ class Moving:
     rate: complex  # pixels/s
     turning: float  # rad/s
     interval: float  # between frames [s]
+    step: tuple[complex, complex, float, float]  # centre before, after [pixels], turn [rad], time [s]
 
 
 def moving(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[Moving]:
@@ -129,9 +130,9 @@ def moving(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[Movi
             for (p0, s0), (p1, s1) in pairwise(here[max(0, k - 1) : k + 2]):
                 if p1.index == p0.index + 1:
                     turn = float(np.angle(np.exp(1j * (s1.angle - s0.angle)) + 0j))
-                    rates.append((s1.centre - s0.centre, turn, p1.t - p0.t))
+                    rates.append((s0.centre, s1.centre, turn, p1.t - p0.t))
             if rates:
-                time = sum(r[2] for r in rates)
-                rate, turning = sum(r[0] for r in rates) / time, sum(r[1] for r in rates) / time
-                found.append(Moving(picture, sight, rate, turning, time / len(rates)))
+                time = sum(r[3] for r in rates)
+                rate, turning = sum(r[1] - r[0] for r in rates) / time, sum(r[2] for r in rates) / time
+                found.append(Moving(picture, sight, rate, turning, time / len(rates), rates[-1]))
     return found
