@@ -56,7 +56,7 @@ format: .venv/.deps ## format the Rust and the Python code
 	$(BIN)/ruff format
 
 dist: .venv/.deps ## build the wheel and the source distribution into dist/
-	$(BIN)/maturin build --release --locked --sdist --out dist
+	$(BIN)/maturin build --release --locked --strip --sdist --out dist
 
 lock: .venv/.deps ## write requirements.lock anew, with today's versions
 	rm -rf .venv/lock
