@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import io
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,10 +67,10 @@ def run(args: argparse.Namespace) -> Answer:
     if args.out is not None:
         from udd.files import write_whole
 
-        write_whole(args.out, _csv(result).encode())
+        write_whole(args.out, "".join(_csv(result)).encode())
         return Answer(f"{text}\nwritten: {args.out}", {**data, "end": result.state[-1], "file": args.out})
     if not args.json:
-        sys.stdout.write(_csv(result))
+        sys.stdout.writelines(_csv(result))
         print(f"udd: {text}", file=sys.stderr)
     return Answer("", {**data, "state_names": names, "t": result.t, "state": result.state})
 
@@ -110,14 +110,12 @@ def _model(args: argparse.Namespace) -> Model:
     return disk(args, args.W, 0.08 if args.R is None else args.R)
 
 
-def _csv(result: Trajectory) -> str:
-    """The run in the format of a measurement, with every digit."""
+def _csv(result: Trajectory) -> Iterator[str]:
+    """The run in the format of a measurement, line by line, with every digit."""
     model = result.model
-    out = io.StringIO()
     for name, value in model.parameters.items():
-        out.write(f"# {name} = {value!r}\n")
-    out.write(f"# source = udd simulate\n# outcome = {result.outcome}\n")
-    out.write(",".join(("t", *model.state_names)) + "\n")
+        yield f"# {name} = {value!r}\n"
+    yield f"# source = udd simulate\n# outcome = {result.outcome}\n"
+    yield ",".join(("t", *model.state_names)) + "\n"
     for t, row in zip(result.t.tolist(), result.state.tolist(), strict=True):
-        out.write(",".join(map(repr, (t, *row))) + "\n")
-    return out.getvalue()
+        yield ",".join(map(repr, (t, *row))) + "\n"

@@ -141,6 +141,6 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.set_xlabel("time since the model was let go [s]")
     ax.set_ylabel(f"median error [{unit}]")
-    ax.legend(frameon=False, loc="upper left")
+    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     tidy(ax)
     return ax

@@ -97,7 +97,8 @@ def forecast(discovery: Any) -> Image:
             linewidth=1.5,
             label="with the added effect",
         )
-    ax.axvline(found.start, color="black", linewidth=0.8)
+    if found.start >= found.t_seen[0]:
+        ax.axvline(found.start, color="black", linewidth=0.8)
     ax.set_xlabel(label("t"))
     ax.set_ylabel(label(name))
     ax.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))

@@ -84,4 +84,4 @@ def _version() -> str:
     try:
         return version("udd")
     except PackageNotFoundError:
-        return "not installed"
+        return "(of unknown version)"

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 _STEP = 0.01  # s
 _BEFORE = 1.0  # s of data shown before the start
-_LONGEST = {"disk": 3.0, "pendulum": 12.0}  # s
+_SHOWN = {"disk": 3.0, "pendulum": 12.0}  # s
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,20 @@ def smooth(fit: Any) -> Any:
 
 
 def forecast(discovery: Any) -> Forecast:
-    """From the first held-out frame on."""
-    fit = discovery.fit
+    """From the first held-out frame on: a disk's first seconds, a pendulum's last ones of the whole run."""
+    fit, m = discovery.fit, discovery.measurement
     t = fit.record.t
     first = min(int(np.searchsorted(t, discovery.split)), len(t) - 2)
-    end = min(t[first] + _LONGEST[discovery.measurement.kind], t[-1])
+    if m.kind == "disk":
+        shown_from, end = t[first] - _BEFORE, min(t[first] + _SHOWN["disk"], t[-1])
+    else:
+        shown_from, end = max(t[-1] - _SHOWN["pendulum"], t[first]), t[-1]
     times = np.arange(t[first] + _STEP, end, _STEP)
-    m = discovery.measurement
-    shown = m.slice(t[first] - _BEFORE, end)
-    seen = np.where(shown.seen[:, None], shown.values, np.nan)
     before, after = (_predicted(f, first, times) for f in (discovery.baseline, fit))
-    return Forecast(float(t[first]), shown.t, seen, times, before, after)
+    shown = m.slice(shown_from, end)
+    seen = np.where(shown.seen[:, None], shown.values, np.nan)
+    late = times >= shown_from
+    return Forecast(float(t[first]), shown.t, seen, times[late], before[late], after[late])
 
 
 def _predicted(fit: Any, first: int, times: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from udd import _core
 
@@ -76,6 +77,8 @@ def _shown(unit: str) -> tuple[str, float]:
 def _meaning(name: str, discovery: Any) -> str:
     effect, dot, parameter = name.partition(".")
     if not dot:
+        if name == "k0" and discovery.measurement.kind == "pendulum":
+            return "viscous friction"
         return words.MEANINGS.get(name, name)
     found = next((f for f in discovery.effects if f.effect.name == effect), None)
     return f"{found.title if found else effect}: {words.pretty(parameter)}"
@@ -144,8 +147,8 @@ def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str
                 "chi2": "–" if s.absorbed else f"{s.chi2:.1f}",
                 "estimate": "–"
                 if s.absorbed
-                else ", ".join(
-                    f"{words.pretty(p)} = {words.with_error(v, e)}"
+                else Markup(", ").join(
+                    Markup("{} = {}").format(words.pretty(p), words.with_error(v, e))
                     for p, v, e in zip(s.candidate.effect.amplitudes, s.amplitudes, s.errors, strict=True)
                 ),
                 "said": "found"

@@ -88,7 +88,7 @@ def enters(effect: Any) -> list[str]:
 
 def verdict(discovery: Any) -> str:
     """The whole result in one sentence."""
-    said = " and ".join(" or ".join(_meanings(f, discovery)) for f in discovery.effects)
+    said = "; and ".join("; or ".join(_meanings(f, discovery)) for f in discovery.effects)
     if discovery.verdict == "nothing missing":
         return (
             "Nothing is missing: the known model explains this motion down to the noise of the measurement."
@@ -195,7 +195,7 @@ def limit(other: Any) -> str:
         return f"It fits even better (by {better}), but was not chosen: it fails another test."
     return (
         f"It fits worse by {abs(other.nats):.1f} units of log-likelihood; a form is excluded from 10 on. "
-        "A longer record, or one at another drive, would settle it."
+        "A longer record, or one of a wider range of motion, would settle it."
     )
 
 

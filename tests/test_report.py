@@ -1,0 +1,174 @@
+"""The page stands alone, says what was found in words, and is written whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import discovered
+import udd
+from udd.errors import UddError
+from udd.report import words
+
+_VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """What is on a page: its tags, nested as they are, and its text."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.feed(source)
+        assert not self.open, f"never closed: {self.open}"
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in _VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> was never opened"
+        assert self.open.pop() == tag, f"</{tag}> closes something else"
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        return " ".join("".join(self.text).split())
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attrs for name, attrs in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("pages")
+    results = {"disk": discovered.disk(), "nothing": discovered.nothing(), "pendulum": discovered.pendulum()}
+    for name, found in results.items():
+        found.report(folder / f"{name}.html", command=f"udd discover {name}.csv <&>")
+    return {name: (folder / f"{name}.html").read_text(encoding="utf-8") for name in results}
+
+
+@pytest.mark.parametrize("name", ["disk", "nothing", "pendulum"])
+def test_the_page_stands_alone(pages: dict[str, str], name: str) -> None:
+    source = pages[name]
+    page = Page(source)
+    assert not page.all("script") + page.all("link") + page.all("iframe")
+    for tag, attrs in page.tags:
+        for key in ("src", "href", "srcset", "data", "poster"):
+            assert (attrs.get(key) or "data:").startswith("data:"), (tag, key)
+    style = re.search(r"<style>(.*?)</style>", source, re.S)
+    assert style is not None
+    assert "url(" not in style[1]
+    assert "@import" not in style[1]
+    assert len(source) < 6e6  # a page that mail takes
+
+
+@pytest.mark.parametrize("name", ["disk", "nothing", "pendulum"])
+def test_the_page_can_be_read_aloud(pages: dict[str, str], name: str) -> None:
+    page = Page(pages[name])
+    assert page.all("html") == [{"lang": "en"}]
+    assert len(page.all("h1")) == len(page.all("main")) == len(page.all("title")) == 1
+    assert all(image.get("alt") for image in page.all("img"))
+    assert len({image["src"] for image in page.all("img")}) == len(page.all("img")) >= 7
+    assert len(page.all("figcaption")) == len(page.all("figure"))
+    assert "<&>" in page.words  # what came from outside is text, not markup
+
+
+def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:
+    found, text = discovered.disk(), Page(pages["disk"]).words
+    (effect,) = found.effects
+    assert effect.effect.meaning[1:] in text
+    assert words.with_error(effect.parameters["b"], effect.errors["b"]) in text
+    for h in found.error_before.horizons:
+        assert words.length(found.error_after.at(h)[0], "m") in text
+    assert "It could equally be slip c Z" in text
+    assert "film a second drive" in text
+    assert "camera turned clockwise" in text
+    assert udd.effects.relaxation().title in text
+
+
+def test_nothing_missing_is_said(pages: dict[str, str]) -> None:
+    text = Page(pages["nothing"]).words
+    assert "Nothing is missing" in text
+    assert "nothing missing means nothing that these data demand" in text
+    assert "with the effect" not in text
+
+
+def test_a_pendulum_has_its_page(pages: dict[str, str]) -> None:
+    text = Page(pages["pendulum"]).words
+    assert "The air resists with the square of the speed" in text
+    assert "What the model of the pendulum lacks" in text
+    assert "mrad" in text
+
+
+def test_the_same_result_gives_the_same_page(pages: dict[str, str], tmp_path: Path) -> None:
+    discovered.nothing().report(tmp_path / "again.html", command="udd discover nothing.csv <&>")
+    assert (tmp_path / "again.html").read_text(encoding="utf-8") == pages["nothing"]
+
+
+def test_the_input_is_named_with_its_checksum(tmp_path: Path) -> None:
+    data = tmp_path / "swing.csv"
+    data.write_text("t,theta\n0,1\n")
+    discovered.pendulum().report(tmp_path / "page.html", source=data)
+    text = Page((tmp_path / "page.html").read_text(encoding="utf-8")).words
+    assert "swing.csv" in text
+    assert hashlib.sha256(data.read_bytes()).hexdigest() in text
+
+
+def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    found = discovered.pendulum()
+    with pytest.raises(UddError, match="there is no folder"):
+        found.report(tmp_path / "absent" / "page.html")
+    with pytest.raises(UddError, match="is a folder"):
+        found.report(tmp_path)
+    with pytest.raises(UddError, match="cannot be read"):
+        found.report(tmp_path / "page.html", source=tmp_path / "absent.csv")
+    with pytest.raises(UddError, match="not tracked in a film"):
+        found.report(tmp_path / "page.html", film=tmp_path / "absent.mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "said"),
+    [
+        (5.0312, 0.12, "5.03 ± 0.12"),
+        (-5.0312, 1.2, "−5.0 ± 1.2"),
+        (0.042, 0.000076, "0.042000 ± 0.000076"),
+        (12345.6, 700.0, "12346 ± 700"),
+        (4.8e-4, 3.4e-4, "(4.8 ± 3.4) × 10<sup>−4</sup>"),
+        (0.08, None, "0.08"),
+        (1.5, float("nan"), "1.5"),
+    ],
+)
+def test_values_carry_two_digits_of_their_error(value: float, error: float | None, said: str) -> None:
+    assert str(words.with_error(value, error)) == said
+
+
+@pytest.mark.parametrize(
+    ("formula", "said"),
+    [
+        ("torque = -c Omega^3", "torque = −c Ω<sup>3</sup>"),
+        ("W_c = W - b W Z", "W<sub>c</sub> = W − b W Z"),
+        ("torque = -kappa beta + c", "torque = −κ β + c"),
+        ("1 < 2", "1 &lt; 2"),
+        ("dOmega/dT", "dΩ/dT"),
+    ],
+)
+def test_formulas_are_written_as_people_do(formula: str, said: str) -> None:
+    assert str(words.pretty(formula)) == said
+
+
+def test_small_chances() -> None:
+    assert words.probability(0.25) == "0.25"
+    assert words.probability(3e-7) == "below 10<sup>−6</sup>"
+    assert words.probability(0.0) == "below 10<sup>−300</sup>"
