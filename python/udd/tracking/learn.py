@@ -18,6 +18,7 @@ ROUNDS = 8
 MOST = 48  # frames to learn from
 WHOLE = 0.97  # share of its edges that is in view for a mark to learn from
 HALF_SEEN = 0.5  # and that looks as expected
+STEADY = 0.005  # pixels; shapes that change less have settled
 FAR_OFF = 1.0  # pixels; a mark further off its expected place says less about the layout
 
 
@@ -54,7 +55,10 @@ def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds:
             if fit is not None:
                 fits.append((pose, motion, fit.sightings))
         marks, psf = _reshape(fits, look)
+        change = max(abs(m.place - n.place) + abs(m.half[0] - n.half[0]) for m, n in zip(marks, look.marks, strict=True))
         look = replace(look, marks=marks, psf=psf)
+        if change < STEADY and turn > rounds // 2:
+            break
     return look
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 PRIOR = np.array([0.1, 0.15, 0.15, 0.1, 0.05])  # what cameras on a tripod have
+SAME = np.eye(2)
 BETTER = 0.8  # the misfit must fall to this share, or the picture is taken as it is
 FEWEST = 12  # frames to judge by
 
@@ -33,7 +34,7 @@ class Lens:
     @property
     def plain(self) -> bool:
         """Whether the map changes nothing."""
-        return not any(astuple(self)[2:])
+        return not (self.curve or self.tilt_u or self.tilt_v or self.aspect or self.shear)
 
     def plane(self, picture: Complexes | complex) -> Complexes:
         """Points of the disk's plane for points of the picture."""
@@ -61,7 +62,7 @@ class Lens:
     def local(self, plane: complex) -> Local:
         """The map near a point of the plane."""
         if self.plain:
-            return Local(plane, plane, np.eye(2))
+            return Local(0j, 0j, SAME)
         at = complex(self.picture(plane))
         h = 0.5
         du = (complex(self.plane(at + h)) - complex(self.plane(at - h))) / (2 * h)
@@ -80,6 +81,8 @@ class Local:
     def back(self, plane: complex) -> complex:
         """The picture point of a nearby plane point."""
         d = plane - self.plane
+        if self.slope is SAME:
+            return self.picture + d
         u, v = np.linalg.solve(self.slope, [d.real, d.imag])
         return self.picture + complex(u, v)
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .lens import Lens, Local
+from .lens import SAME, Lens, Local
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-UNBENT = Local(0j, 0j, np.eye(2))
+UNBENT = Local(0j, 0j, SAME)
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def track_in_detail(
     )
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     camera = _camera(tracks, known, rim, radius, pivot)
-    spread = covariance(tracks, abs(known.look.marks[0].place))
+    spread = covariance(tracks)
     values, sigma, rho = metres(tracks, spread, camera)
     meta = _meta(film, look_over, tracks, known, rim, camera, radius)
     measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
