@@ -131,13 +131,13 @@ proptest! {
         let values = [PAPER.as_slice(), &[4.0]].concat();
         let (record, _) = film(&family, &values, 2, 3);
         let mut roles: Vec<Role> = (0..7).map(Role::Model).collect();
-        roles.extend((0..6).map(Role::Camera));
+        roles.extend((0..8).map(Role::Camera));
         roles.push(Role::Clock);
         let mut estimator = problem(family, record, Vec::new());
         // Tight, so that the differences see the flow and not the integrator.
         estimator.tolerance = Tolerance { rtol: 1e-13, atol: 1e-14 };
         let states = vec![[omega, y, z, beta], [omega, y, z, beta]];
-        let point = Point { states, model: values, camera: vec![y0, 1e-3, tilt, 5e-3, lag, row], clock: 1e-3 };
+        let point = Point { states, model: values, camera: vec![y0, 1e-3, tilt, 5e-3, 1e-3, -5e-4, lag, row], clock: 1e-3 };
         let linear = estimator.linearise(&point, &roles).unwrap();
 
         let step = |scale: f64| 1e-5 * scale.abs().max(1e-2);
@@ -148,8 +148,7 @@ proptest! {
             *down.get_mut(role) -= h;
             let (e_up, r_up) = estimator.residuals(&up).unwrap();
             let (e_down, r_down) = estimator.residuals(&down).unwrap();
-            // The residuals fall where h and Phi rise. The Omega equation sees W in the camera's row time,
-            // a product of two small numbers that the camera's own columns leave out.
+            // The residuals fall where h and Phi rise.
             let g = (e_down[0] - e_up[0]) / (2.0 * h);
             let b = (r_down[0] - r_up[0]) / (2.0 * h);
             for k in 0..4 {
@@ -194,7 +193,7 @@ fn a_chaotic_record_gives_its_parameters_back() {
         .collect();
     let mut model = truth.clone();
     roles.iter().for_each(|&j| model[j] *= 0.75);
-    let mut point = Point { states, model, camera: vec![0.0; 6], clock: 0.0 };
+    let mut point = Point { states, model, camera: vec![0.0; 8], clock: 0.0 };
     let mut last = None;
     for level in [[0.1, 1e-4, 1e-4, 1e-3], [0.02, 3e-5, 3e-5, 3e-4], [3e-3, 1e-5, 1e-5, 1e-4]] {
         estimator.diffusion = level.map(|q: f64| q / 0.04f64.sqrt());
@@ -225,7 +224,7 @@ fn the_score_foretells_the_fit() {
     let free: Vec<Free> = [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
     let stop = Stop::new();
     let plain = problem(family(&[]), record.clone(), free.clone());
-    let start = Point { states, model: PAPER.to_vec(), camera: vec![0.0; 6], clock: 0.0 };
+    let start = Point { states, model: PAPER.to_vec(), camera: vec![0.0; 8], clock: 0.0 };
     let fitted = plain.solve(start, &Options::default(), &stop).unwrap();
     let mut values = fitted.point.model.clone();
     values.push(0.0);

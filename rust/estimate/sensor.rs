@@ -16,27 +16,40 @@ pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
 /// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
 ///
 /// ```text
-/// (Y, Z)_seen = (1 + scale) Rot(tilt) (Y, Z) + (y0, z0),   beta_seen = beta + tilt - lag Omega
+/// (Y, Z)_seen = (1 + scale) Rot(tilt) [(Y, Z) + Rot(beta) (right, up)] + (y0, z0)
+/// beta_seen = beta + tilt - lag Omega
 /// ```
 ///
 /// `y0, z0` is where the pivot really is in the measurement's coordinates, `tilt` turns the picture
-/// clockwise, `lag` is how much later than the position the orientation is seen, and with a rolling
+/// clockwise, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
+/// (marks are glued by hand), `lag` is how much later than the position the orientation is seen, and with a rolling
 /// shutter a point at height `Z` is exposed at `t - row Z`.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskCamera;
 
 impl Sensor<4, 3> for DiskCamera {
-    const PARAMETERS: &'static [(&'static str, &'static str)] =
-        &[("y0", "m"), ("z0", "m"), ("tilt", "rad"), ("scale", ""), ("lag", "s"), ("row", "s/m")];
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[
+        ("y0", "m"),
+        ("z0", "m"),
+        ("tilt", "rad"),
+        ("scale", ""),
+        ("right", "m"),
+        ("up", "m"),
+        ("lag", "s"),
+        ("row", "s/m"),
+    ];
     const ANGLE: [bool; 3] = [false, false, true];
 
     #[inline]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
-        let &[y0, z0, tilt, scale, lag, row] = camera.first_chunk().expect("six camera parameters");
+        let &[y0, z0, tilt, scale, right, up, lag, row] =
+            camera.first_chunk().expect("eight camera parameters");
         let late = -(row * x[2]);
-        let y = x[1] + late * rate[1];
-        let z = x[2] + late * rate[2];
-        let beta = x[3] + (late - lag) * rate[3];
+        let beta = x[3] + late * rate[3];
+        let (sin, cos) = (beta.sin(), beta.cos());
+        let y = x[1] + late * rate[1] + right * cos + up * sin;
+        let z = x[2] + late * rate[2] + up * cos - right * sin;
+        let beta = beta - lag * rate[3];
         let (sin, cos) = (tilt.sin(), tilt.cos());
         let size = S::one() + scale;
         [size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0, beta + tilt]

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from udd.effects import Effect
 from udd.errors import FitError
-from udd.fitting import Fit, Record, extend, fit_record, record_of
+from udd.fitting import Fit, Record, extend, fit_record, loosened, record_of
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -30,6 +30,8 @@ TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at one drive.
 SAME = 0.9999
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
+_SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
+_UNEXPLAINED = 2.0  # chi2 per degree of freedom above which a model does not explain its data, whatever lacks
 _TRIED = 6  # of the best candidates, fitted in full
 _MOST = 3  # effects added
 _SHORTEST = 60  # frames
@@ -203,7 +205,9 @@ def discover(
     candidates together (in those 60 % for white noise, and in all data with the misfits' own colour), its amplitudes
     are physical, and the last 40 % are explained better beyond doubt: with all parameters held, the 95 % interval of
     the costs' ratio excludes 1, and at no horizon do forecasts get worse. All coefficients are refitted and the search goes on; single
-    effects that do not pass are tried in pairs. Forms that the data cannot tell apart are named.
+    effects that do not pass are tried in pairs. Forms that the data cannot tell apart are named. Where no effect passes
+    but the model does not explain the data (chi2 per degree of freedom above 2), an effect is present that the library
+    does not hold.
 
     Parameters
     ----------
@@ -242,9 +246,11 @@ def discover(
     found = [f for step in accepted for f in _describe(step, final)]
     others = [a for step in accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    verdict = "nothing missing"
     if found:
         verdict = "effect present, form not identified" if doubtful else "effect identified"
+    else:
+        unexplained = baseline.scatter > _UNEXPLAINED
+        verdict = "effect present, form not identified" if unexplained else "nothing missing"
     return Discovery(
         verdict=verdict,
         baseline=baseline,
@@ -350,7 +356,8 @@ class _Search:
             accepted.append(step)
         return current.part, current.whole, current.errors, accepted, scans
 
-    def _score(self, current: Fit) -> Scan:
+    def _score(self, fitted: Fit) -> Scan:
+        current = loosened(fitted, _SCATTER)
         rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
         best = [s.candidate for s in rippled[:1]]
         scanned = scan(current, [*library(current.model), *best])

@@ -12,7 +12,6 @@ from scipy.stats import bootstrap
 
 from udd import _core
 from udd.fitting import Fit, Record, held_cost, information_for
-from udd.fitting.fit import levels
 
 Array = NDArray[np.float64]
 
@@ -178,7 +177,8 @@ def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Arr
     """States at the windows' first and last frames."""
     data = (record.t, record.seen, information_for(fit, record), record.linked)
     start = (record.states, fit.point.camera, fit.point.clock)
-    middle = list(levels(fit.measurement.kind)[1])
+    schedule = fit.problem.schedule
+    middle = list(schedule[max(len(schedule) - 2, 0)])
     first, last, _covariance = _core.filter(fit.model, data, start, middle, [(int(a), int(b)) for a, b in windows])
     return first, last
 

@@ -85,10 +85,12 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     seen = record.observed
     distance = _distance(record, misfit, before.sd(record, omega))
     channels = seen.sum(axis=1).clip(1)
-    limit = np.sqrt(chi2.ppf(_HONEST, channels))
+    # What is far out is judged by the typical frame: the noise may be stated wrongly.
+    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi2.ppf(0.5, channels))
+    limit = np.sqrt(chi2.ppf(_HONEST, channels)) * np.maximum(typical, 1.0)
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
     # The variance comes from the frames within the limit, where honest noise would show this share of its own.
-    shown = chi2.cdf(limit**2, channels + 2) / _HONEST
+    shown = chi2.cdf(chi2.ppf(_HONEST, channels), channels + 2) / _HONEST
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
         use = seen[:, m] & (weight == 1.0)

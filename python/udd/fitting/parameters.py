@@ -12,10 +12,10 @@ from udd.errors import FitError
 from udd.models import Disk, Model, Pendulum
 
 #: What is known of a camera beforehand, as standard deviations around zero: a pivot found to a few
-#: millimetres, a picture upright to 2 degrees and scaled to 1 %, an orientation that lags the position by
+#: millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose centre is off by a millimetre, an orientation that lags the position by
 #: milliseconds, a shutter that may roll (a frame's time over a picture 0.4 m high), a clock good to 0.3 %.
 CAMERA = {
-    "disk": {"y0": 5e-3, "z0": 5e-3, "tilt": 0.035, "scale": 0.01, "lag": 0.01, "row": 0.05},
+    "disk": {"y0": 5e-3, "z0": 5e-3, "tilt": 0.035, "scale": 0.01, "right": 1e-3, "up": 1e-3, "lag": 0.01, "row": 0.05},
     "pendulum": {"theta0": 0.1},
 }
 CLOCK = 3e-3

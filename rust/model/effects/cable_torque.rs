@@ -13,7 +13,22 @@ impl Law for CableTorque {
         meaning: "something elastic winds up as the disk turns and pulls it back",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "kappa", unit: "m^2/s^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }, EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[
+            EffectParameter {
+                name: "kappa",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (0.0, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+            EffectParameter {
+                name: "c",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (f64::NEG_INFINITY, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+        ],
     };
 
     #[inline(always)]

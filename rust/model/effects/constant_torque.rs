@@ -13,7 +13,13 @@ impl Law for ConstantTorque {
         meaning: "something turns the disk always the same way",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "m^2/s^2",
+            default: 0.0,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

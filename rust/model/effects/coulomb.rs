@@ -13,7 +13,22 @@ impl Law for Coulomb {
         meaning: "dry friction whose size does not depend on the speed",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }, EffectParameter { name: "eps", unit: "rad/s", default: 0.05, range: (1e-4, 1.0), role: Role::Shape(&[0.05]) }],
+        parameters: &[
+            EffectParameter {
+                name: "c",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (0.0, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+            EffectParameter {
+                name: "eps",
+                unit: "rad/s",
+                default: 0.05,
+                range: (1e-4, 1.0),
+                role: Role::Shape(&[0.05]),
+            },
+        ],
     };
 
     #[inline(always)]

@@ -13,7 +13,13 @@ impl Law for CubicDrag {
         meaning: "a resistance that grows with the cube of the speed",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "c", unit: "m^2 s", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "m^2 s",
+            default: 0.0,
+            range: (0.0, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -13,7 +13,13 @@ impl Law for DriveDrift {
         meaning: "the drive slows down or speeds up over the record, as on an emptying battery",
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
-        parameters: &[EffectParameter { name: "a", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "a",
+            unit: "1/s",
+            default: 0.0,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -13,7 +13,17 @@ impl Law for DriveRipple {
         meaning: "the motor or its gears make the drive speed vary at a steady frequency",
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
-        parameters: &[EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "f", unit: "Hz", default: 1.0, range: (0.01, 12.0), role: Role::Frequency }],
+        parameters: &[
+            EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
+            EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
+            EffectParameter {
+                name: "f",
+                unit: "Hz",
+                default: 1.0,
+                range: (0.01, 12.0),
+                role: Role::Frequency,
+            },
+        ],
     };
 
     #[inline(always)]

@@ -13,7 +13,22 @@ impl Law for EccentricMass {
         meaning: "the disk carries more mass on one side, which gravity turns down",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "a", unit: "m^2/s^2", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }, EffectParameter { name: "b", unit: "m^2/s^2", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[
+            EffectParameter {
+                name: "a",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (f64::NEG_INFINITY, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+            EffectParameter {
+                name: "b",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (f64::NEG_INFINITY, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+        ],
     };
 
     #[inline(always)]

@@ -13,7 +13,13 @@ impl Law for LateralSlip {
         meaning: "the disk slips sideways in the contact, towards its centre line",
         slots: &[Slot::Lateral],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter { name: "c", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "1/s",
+            default: 0.0,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

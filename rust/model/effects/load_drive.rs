@@ -13,7 +13,13 @@ impl Law for LoadDrive {
         meaning: "the motor slows when the disk pulls harder on the wheels",
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
-        parameters: &[EffectParameter { name: "a", unit: "", default: 0.0, range: (0.0, 10.0), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "a",
+            unit: "",
+            default: 0.0,
+            range: (0.0, 10.0),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -232,6 +232,7 @@ library! {
     drive_drift::DriveDrift,
     tilt::Tilt,
     eccentric_mass::EccentricMass,
+    uneven_disk::UnevenDisk,
     cable_torque::CableTorque,
     constant_torque::ConstantTorque,
     radial_friction::RadialFriction,

@@ -13,7 +13,13 @@ impl Law for QuadraticDrag {
         meaning: "the air resists with the square of the speed",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "c", unit: "m^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "m^2",
+            default: 0.0,
+            range: (0.0, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

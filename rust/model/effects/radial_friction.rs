@@ -13,7 +13,13 @@ impl Law for RadialFriction {
         meaning: "the contact rubs more the farther the disk's centre is from it",
         slots: &[Slot::Friction],
         momenta: &[],
-        parameters: &[EffectParameter { name: "c", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "1/s",
+            default: 0.0,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -13,7 +13,13 @@ impl Law for RadialSlip {
         meaning: "the disk slips along the line from contact to centre, pulled by gravity's component along it",
         slots: &[Slot::Lateral, Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter { name: "c", unit: "m/s", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "m/s",
+            default: 0.0,
+            range: (0.0, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -13,7 +13,13 @@ impl Law for Relaxation {
         meaning: "the wheels lift the disk less when its centre is above them, in proportion to the drive",
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter { name: "b", unit: "1/m", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "b",
+            unit: "1/m",
+            default: 0.0,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -13,7 +13,13 @@ impl Law for Slip {
         meaning: "the disk slips between the wheels, down when its centre is above them",
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter { name: "c", unit: "1/s", default: 0.0, range: (f64::NEG_INFINITY, f64::INFINITY), role: Role::Amplitude }],
+        parameters: &[EffectParameter {
+            name: "c",
+            unit: "1/s",
+            default: 0.0,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            role: Role::Amplitude,
+        }],
     };
 
     #[inline(always)]

@@ -13,7 +13,29 @@ impl Law for Stribeck {
         meaning: "dry friction that is strongest near rest and fades as the contact slides faster",
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter { name: "c", unit: "m^2/s^2", default: 0.0, range: (0.0, f64::INFINITY), role: Role::Amplitude }, EffectParameter { name: "fade", unit: "rad/s", default: 1.0, range: (0.05, 20.0), role: Role::Shape(&[0.3, 1.0, 3.0]) }, EffectParameter { name: "eps", unit: "rad/s", default: 0.05, range: (1e-4, 1.0), role: Role::Shape(&[0.05]) }],
+        parameters: &[
+            EffectParameter {
+                name: "c",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (0.0, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+            EffectParameter {
+                name: "fade",
+                unit: "rad/s",
+                default: 1.0,
+                range: (0.05, 20.0),
+                role: Role::Shape(&[0.3, 1.0, 3.0]),
+            },
+            EffectParameter {
+                name: "eps",
+                unit: "rad/s",
+                default: 0.05,
+                range: (1e-4, 1.0),
+                role: Role::Shape(&[0.05]),
+            },
+        ],
     };
 
     #[inline(always)]

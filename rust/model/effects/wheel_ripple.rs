@@ -13,7 +13,17 @@ impl Law for WheelRipple {
         meaning: "the drive wheel is out of round, so that its speed varies once per turn",
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
-        parameters: &[EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude }, EffectParameter { name: "r", unit: "m", default: 0.03, range: (1e-3, 0.3), role: Role::Shape(&[0.03]) }],
+        parameters: &[
+            EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
+            EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
+            EffectParameter {
+                name: "r",
+                unit: "m",
+                default: 0.03,
+                range: (1e-3, 0.3),
+                role: Role::Shape(&[0.03]),
+            },
+        ],
     };
 
     #[inline(always)]

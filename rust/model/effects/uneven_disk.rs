@@ -1,0 +1,49 @@
+//! A disk that is not the same all round: a torque that repeats `n` times per turn.
+//!
+//! A warped disk, for example, is squeezed twice per turn by the wheels that hold it. The first
+//! harmonic is an [eccentric mass](super::EccentricMass).
+
+use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+
+/// A disk that is not the same all round: a torque that repeats `n` times per turn.
+pub struct UnevenDisk;
+
+impl Law for UnevenDisk {
+    const SPEC: Spec = Spec {
+        name: "uneven_disk",
+        title: "uneven disk",
+        equation: "torque = a sin(n beta) + b cos(n beta)",
+        meaning: "the disk is warped or uneven, so that the wheels push it towards preferred orientations",
+        slots: &[Slot::Torque],
+        momenta: &[],
+        parameters: &[
+            EffectParameter {
+                name: "a",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (f64::NEG_INFINITY, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+            EffectParameter {
+                name: "b",
+                unit: "m^2/s^2",
+                default: 0.0,
+                range: (f64::NEG_INFINITY, f64::INFINITY),
+                role: Role::Amplitude,
+            },
+            EffectParameter {
+                name: "n",
+                unit: "",
+                default: 2.0,
+                range: (2.0, 12.0),
+                role: Role::Shape(&[2.0, 3.0, 4.0]),
+            },
+        ],
+    };
+
+    #[inline(always)]
+    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+        let angle = p[2] * at.beta;
+        slots.torque += p[0] * angle.sin() + p[1] * angle.cos();
+    }
+}
