@@ -50,7 +50,7 @@ def rolling(
         turn = omega[k] * h
         zeta = zeta * np.exp(-1j * turn) + 1j * drive * h * np.exp(-0.5j * turn)
         beta += turn
-    return Motion(t, out)
+    return Motion(np.asarray(t, dtype=np.float64), out)
 
 
 def light(rgb: Iterable[float]) -> NDArray[np.float32]:

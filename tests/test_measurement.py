@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from udd.measurement import Measurement, MeasurementError, read_measurement
 
 REAL = Path(__file__).parents[2] / "shared" / "data" / "real"

@@ -54,7 +54,7 @@ def read_measurement(
     columns: str | Sequence[str] | None = None,
     **meta: Any,
 ) -> Measurement:
-    """Read a measured motion of a disk or of a pendulum.
+    r"""Read a measured motion of a disk or of a pendulum.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ def read_measurement(
     --------
     >>> import pathlib, tempfile
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "swing.txt"
-    >>> _ = file.write_text("my swing\\ntime angle\\n" + "".join(f"{i/25} {0.3*(-1)**i}\\n" for i in range(12)))
+    >>> rows = "".join(f"{i / 25} {0.3 * (-1)**i}\n" for i in range(12))
+    >>> _ = file.write_text("my swing\ntime angle\n" + rows)
     >>> read_measurement(file).kind
     'pendulum'
     """

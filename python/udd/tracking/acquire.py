@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .decode import Picture
 from .find import COLOURS, Blobs, blobs
-from .pose import Look, Pose
+from .look import Look, Pose
 
 NEAR = 0.22  # of the marks' reach: how far a blob may lie from the mark it stands for
 

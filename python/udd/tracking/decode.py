@@ -104,7 +104,7 @@ class Film:
                     continue
                 for frame in frames:
                     broken = bool(frame.is_corrupt or packet.is_corrupt)
-                    # frames are coded as changes: after a broken one all are wrong up to the next whole picture
+                    # frames are coded as changes: after a broken one all are wrong up to the next whole one
                     damaged = broken or (damaged and not frame.key_frame)
                     if frame.pts is None or frame.time_base is None:
                         t = index / self.fps
@@ -128,4 +128,4 @@ def _picture(frame: Any, index: int, t: float, damaged: bool) -> Picture:
     turns = round((frame.rotation or 0) / 90) % 4  # phones note how they were held
     if turns:
         planes = [np.ascontiguousarray(np.rot90(p, turns)) for p in planes]
-    return Picture(index, t, *planes, damaged=damaged)
+    return Picture(index, t, planes[0], planes[1], planes[2], damaged)

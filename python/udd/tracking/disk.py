@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture, TrackError
-from .pose import Look, Pose
+from .look import Look, Pose
 
 RAYS = 180
 SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .marks import MISFIT, Motion, coverage
-from .pose import Look, Pose, align
+from .look import Look, Motion, Pose
+from .marks import MISFIT, coverage
+from .pose import align
 from .survey import Moving
 
 SHARES = np.linspace(0.0, 1.0, 9)  # of the frame interval

@@ -57,7 +57,7 @@ def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
     order = order[area[order] >= least]
     xy = centre[1:count][order]
     # a half-resolution sample i covers the full pixels 2i and 2i + 1, whose middle is 2i + 1/2
-    return Blobs(2 * (xy[:, 0] + 1j * xy[:, 1]) + (0.5 + 0.5j), 4.0 * area[order])
+    return Blobs(np.asarray(2 * (xy[:, 0] + 1j * xy[:, 1]) + (0.5 + 0.5j)), np.asarray(4.0 * area[order]))
 
 
 def coloured(picture: Picture) -> list[Blobs]:

@@ -1,4 +1,4 @@
-"""Learning the marks from the film: their true places on the disk, sizes, orientation, contrast, sharpness."""
+"""Learning the marks from the film: their places on the disk, sizes, orientation, contrast, sharpness."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from .decode import Picture, Plane
 from .find import BODY, Sight
-from .marks import MISFIT, Mark, Motion, Sighting, coverage
-from .pose import Look, Pose, align
+from .look import Look, Mark, Motion, Pose
+from .marks import MISFIT, Sighting, coverage
+from .pose import align
 from .rigid import solve
 
 ROUNDS = 8
@@ -55,7 +56,10 @@ def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds:
             if fit is not None:
                 fits.append((pose, motion, fit.sightings))
         marks, psf = _reshape(fits, look)
-        change = max(abs(m.place - n.place) + abs(m.half[0] - n.half[0]) for m, n in zip(marks, look.marks, strict=True))
+        change = max(
+            abs(m.place - n.place) + abs(m.half[0] - n.half[0])
+            for m, n in zip(marks, look.marks, strict=True)
+        )
         look = replace(look, marks=marks, psf=psf)
         if change < STEADY and turn > rounds // 2:
             break

@@ -43,8 +43,9 @@ class Lens:
             return z
         p = (z - self.middle) / self.size
         q = p * (1 + self.curve * (p.real**2 + p.imag**2))
-        w = q / (1 + self.tilt_u * q.real + self.tilt_v * q.imag)
-        return self.middle + self.size * (w.real * (1 + self.aspect) + self.shear * w.imag + 1j * w.imag)
+        w: Complexes = q / (1 + self.tilt_u * q.real + self.tilt_v * q.imag)
+        at = self.middle + self.size * (w.real * (1 + self.aspect) + self.shear * w.imag + 1j * w.imag)
+        return np.asarray(at, dtype=np.complex128)
 
     def picture(self, plane: Complexes | complex) -> Complexes:
         """Points of the picture for points of the disk's plane."""
@@ -85,6 +86,9 @@ class Local:
             return self.picture + d
         u, v = np.linalg.solve(self.slope, [d.real, d.imag])
         return self.picture + complex(u, v)
+
+
+PLAIN = Lens()
 
 
 def calibrate(points: Complexes, shape: tuple[int, int]) -> Lens | None:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from .acquire import candidates, classify
 from .decode import Picture
-from .marks import MISFIT, Motion
+from .look import Look, Motion, Pose
+from .marks import MISFIT
 from .pivot import Contact
-from .pose import Fit, Look, Pose, align
+from .pose import Fit, align
 
 Array = NDArray[np.float64]
 CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
@@ -63,7 +64,9 @@ class Held:
     rate: float  # of turning [rad/s]
 
 
-def follow(pictures: Iterable[Picture], known: Known, tick: Callable[[int], None] = lambda _: None) -> Tracks:
+def follow(
+    pictures: Iterable[Picture], known: Known, tick: Callable[[int], object] = lambda _: None
+) -> Tracks:
     """Track the disk through `pictures`; one row per picture, flagged where the disk is not held."""
     tracks = Tracks([], [], [], [], [], [], [], [], [])
     past: list[Held] = []
@@ -142,7 +145,9 @@ def _on_the_disk(picture: Picture, known: Known, pose: Pose) -> bool:
     return bool(np.mean(np.abs(level - known.white) < 0.2 * known.white) > 0.7)
 
 
-def _anywhere(picture: Picture, known: Known, guess: Pose | None, past: list[Held]) -> tuple[Fit, Pose, Motion] | None:
+def _anywhere(
+    picture: Picture, known: Known, guess: Pose | None, past: list[Held]
+) -> tuple[Fit, Pose, Motion] | None:
     """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
     shape = picture.y.shape
     reach = abs(known.look.marks[0].place)
@@ -184,7 +189,10 @@ def _motions(past: list[Held], pose: Pose, t: float, known: Known, fresh: bool) 
     count = int(np.ceil(FASTEST / step))
     rates = step * np.arange(-count, count + 1)
     return [
-        Motion((known.contact.velocity(pose.centre, r) if known.contact else 0j) * known.exposure, r * known.exposure)
+        Motion(
+            (known.contact.velocity(pose.centre, r) if known.contact else 0j) * known.exposure,
+            r * known.exposure,
+        )
         for r in rates
     ]
 

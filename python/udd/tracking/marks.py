@@ -7,29 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .lens import SAME, Lens, Local
+from .lens import SAME, Local
+from .look import Look, Mark, Motion, Pose
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 UNBENT = Local(0j, 0j, SAME)
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A rectangular mark in the body frame of the disk (pixels; u + iv at beta = 0)."""
-
-    place: complex  # centre
-    half: tuple[float, float]  # half side lengths
-    turn: float  # orientation of its first side against the body frame [rad]
-    level: float  # brightness minus that of the disk
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How the disk moves during the exposure: displacement [pixels] and turn [rad] over the whole of it."""
-
-    shift: complex = 0j
-    turn: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -84,10 +67,12 @@ def coverage(
         m = centre + s * motion.shift + mark.place * np.exp(1j * a) - local.plane
         c, d = np.cos(a + mark.turn), np.sin(a + mark.turn)
         across = np.add.outer(
-            np.float32(c * vv - d * uv) * v - np.float32(c * m.imag - d * m.real), np.float32(c * vu - d * uu) * u
+            np.float32(c * vv - d * uv) * v - np.float32(c * m.imag - d * m.real),
+            np.float32(c * vu - d * uu) * u,
         )
         along = np.add.outer(
-            np.float32(c * uv + d * vv) * v - np.float32(c * m.real + d * m.imag), np.float32(c * uu + d * vu) * u
+            np.float32(c * uv + d * vv) * v - np.float32(c * m.real + d * m.imag),
+            np.float32(c * uu + d * vu) * u,
         )
         across = _slab(across, mark.half[1], psf)
         across *= _slab(along, mark.half[0], psf)
@@ -143,26 +128,25 @@ MISFIT = 0.12  # pixels by which edges of real marks, lenses and codecs differ f
 
 def locate(
     y: NDArray[np.uint8],
-    light: NDArray[np.float64],
     view: Bools,
+    look: Look,
     mark: Mark,
-    centre: complex,
-    angle: float,
+    pose: Pose,
     motion: Motion,
-    psf: float,
-    noise: float,
-    rim: float,
-    lens: Lens,
+    *,
+    psf: float | None = None,
     gain_slack: float = 0.1,
     misfit: float = MISFIT,
 ) -> Sighting | None:
     """Offset of a mark from its expected place by least squares on the visible pixels.
 
-    `light` turns the codes of the picture into amounts of light (256 entries), in which blur adds up; `rim` is the
-    distance from the centre [pixels] up to which the disk is. The picture in the window is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
+    The light in the window is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
     gain, du, dv free, the gain within `gain_slack` of 1. `view` is False where something stands in
-    front. Pixels that nothing of this explains (a hand, a cable) lose their weight.
+    front; pixels that nothing of this explains (a hand, a cable) lose their weight. `psf` overrides
+    the film's own sharpness; edges count as known to `misfit` pixels.
     """
+    centre, angle, rim, lens = pose.centre, pose.angle, look.rim, look.lens
+    psf = look.psf if psf is None else psf
     local = lens.local(centre + mark.place * np.exp(1j * angle))
     box = window(mark, centre, angle, motion, y.shape, local)
     r0, r1, c0, c1 = box
@@ -178,12 +162,12 @@ def locate(
     seen = (view[r0:r1, c0:c1] & inside).ravel()
     if total <= 0 or seen.sum() < 25:
         return None
-    patch = light[y[r0:r1, c0:c1]].ravel()
+    patch = look.light[y[r0:r1, c0:c1]].ravel()
     level = mark.level
     columns = np.stack(
         [np.ones(cover.size), level * cover.ravel(), -level * grad_u.ravel(), -level * grad_v.ravel()]
     )
-    precise = seen / (noise**2 + (misfit * level) ** 2 * edge2.ravel())
+    precise = seen / (look.noise**2 + (misfit * level) ** 2 * edge2.ravel())
     weight = precise
     prior = np.diag([1e-12, gain_slack**-2, 1e-12, 1e-12])
     x = np.zeros(4)
@@ -196,10 +180,18 @@ def locate(
         weight = precise * np.clip(1 - z2, 0, None) ** 2
         if np.count_nonzero(weight) < 25:
             return None
-    covariance = local.slope @ np.linalg.inv(normal)[2:, 2:] @ local.slope.T
+    covariance: Array = local.slope @ np.linalg.inv(normal)[2:, 2:] @ local.slope.T
     complete = float(edge2.ravel()[weight > 0.1 * precise].sum()) / total
     in_view = float(edge2.ravel()[seen].sum()) / total
     rms = float(np.sqrt((weight * residual**2).sum() / weight.sum()))
     return Sighting(
-        local.slope @ x[2:], np.linalg.inv(covariance), complete, in_view, rms, float(x[1]), box, weight, residual
+        local.slope @ x[2:],
+        np.asarray(np.linalg.inv(covariance), dtype=np.float64),
+        complete,
+        in_view,
+        rms,
+        float(x[1]),
+        box,
+        weight,
+        residual,
     )

@@ -36,7 +36,8 @@ def pivot(
         c exp(-i angle)  =  const + p exp(-i angle) + d * integral exp(-i angle) dt,
 
     linear in p and d, without any derivative of the data. Each window has its own constant. `reach`
-    (the marks' distance from the centre [pixels]) is the size of the disk to compare with. The drive may have any direction here, so that a tilted camera does not move the contact.
+    (the marks' distance from the centre [pixels]) is the size of the disk to compare with. The drive
+    may have any direction here, so that a tilted camera does not move the contact.
     """
     rows: list[NDArray[np.complex128]] = []
     values: list[NDArray[np.complex128]] = []
@@ -128,7 +129,7 @@ def _windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def support(view: NDArray[np.bool_]) -> complex | None:
-    """A guess at the contact from what stands before the disk: the wheel's axle, the widest part near its top."""
+    """A guess at the contact from what stands before the disk: the wheel's axle, widest near the top."""
     rows = np.flatnonzero((~view).any(axis=1))
     if len(rows) < 10:
         return None

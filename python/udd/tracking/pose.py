@@ -8,33 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Plane
-from .lens import Lens
-from .marks import Mark, Motion, Sighting, locate
+from .look import Look, Motion, Pose
+from .marks import Sighting, locate
 from .rigid import Step, solve
 
 LEAST = 0.15  # share of a mark's edges below which it is not used
 STREAKY = 0.01  # share of a streak's length by which its ends are not where they should be
 SETTLED = 0.04  # pixels; Gauss-Newton's next correction would be far smaller
-
-
-@dataclass(frozen=True)
-class Look:
-    """How the marked disk looks in this film."""
-
-    marks: list[Mark]
-    psf: float  # blur of lens and pixels, standard deviation [pixels]
-    noise: float  # of the light on a flat part of the disk
-    light: NDArray[np.float64]  # amount of light for each code of the picture, (256,)
-    rim: float  # distance from the centre up to which the picture shows the disk [pixels]
-    lens: Lens = Lens()  # from the picture to the plane of the disk
-
-
-@dataclass
-class Pose:
-    """The disk in its plane: its centre [pixels, u + iv] and angle [rad]."""
-
-    centre: complex
-    angle: float
 
 
 @dataclass(frozen=True)
@@ -68,21 +48,7 @@ def align(
         misfit = float(np.hypot(each, STREAKY * path))
         psf = float(np.hypot(look.psf, 3 * max(0.0, each - 0.5)))
         sightings = [
-            locate(
-                y,
-                look.light,
-                view,
-                m,
-                pose.centre,
-                pose.angle,
-                motion,
-                psf,
-                look.noise,
-                look.rim,
-                look.lens,
-                gain_slack,
-                misfit,
-            )
+            locate(y, view, look, m, pose, motion, psf=psf, gain_slack=gain_slack, misfit=misfit)
             for m in look.marks
         ]
         used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
 
+from .lens import PLAIN, Lens
 from .loop import Tracks
 
 Array = NDArray[np.float64]
+LONG = 1.0  # s: over a longer gap the rate may have done anything
 
 
 @dataclass(frozen=True)
@@ -28,11 +31,12 @@ class Camera:
 
 @dataclass(frozen=True)
 class Pixels:
-    """Where to draw the fitted disk in the picture (pixels: u to the right, v down)."""
+    """Where to draw the fitted disk in the picture (pixels: u to the right, v down; NaN where not seen)."""
 
     centre: Array  # (n, 2)
     angle: Array  # (n,) beta [rad]
     marks: Array  # (n, 4, 2): red, orange, blue, green
+    rim: Array  # (n, 73, 2): a closed line; a circle but for tilt and lens
     radius: float
     pivot: Array  # (2,)
     scale: float  # pixels per metre
@@ -52,12 +56,21 @@ def pixels(m: Measurement) -> Pixels:
         The measurement does not come from a film.
     """
     scale = float(m.meta["px_per_m"])
-    pivot = np.array([float(m.meta["pivot_u"]), float(m.meta["pivot_v"])])
-    centre = pivot + scale * np.column_stack([m["Y"], -m["Z"]])
-    places = np.array(m.meta["marks_px"], dtype=float)
-    z = (places[:, 0] + 1j * places[:, 1])[None, :] * np.exp(1j * m["beta"])[:, None]
-    marks = centre[:, None, :] + np.stack([z.real, z.imag], axis=-1)
-    return Pixels(centre, m["beta"], marks, scale * float(m.meta["R"]), pivot, scale)
+    pivot = complex(float(m.meta["pivot_u"]), float(m.meta["pivot_v"]))
+    bent = [float(x) for x in m.meta["lens"]]
+    lens = Lens(complex(bent[0], bent[1]), *bent[2:]) if bent else PLAIN
+    places = np.array(m.meta["marks_px"], dtype=float) @ [1, 1j]
+    radius = scale * float(m.meta["R"])
+    ring = radius * np.exp(2j * np.pi * np.arange(73) / 72)
+    centre = pivot + scale * (m["Y"] - 1j * m["Z"])
+    marks = centre[:, None] + places * np.exp(1j * m["beta"])[:, None]
+
+    def show(z: Any) -> Array:
+        at = lens.picture(z)
+        return np.stack([at.real, at.imag], axis=-1)
+
+    rim = show(centre[:, None] + ring)
+    return Pixels(show(centre), m["beta"], show(marks), rim, radius, show(np.array(pivot)), scale)
 
 
 def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array, Array]:
@@ -70,3 +83,27 @@ def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     sigma = np.sqrt(np.einsum("nii->ni", c))
     rho = np.stack([c[:, a, b] / (sigma[:, a] * sigma[:, b]) for a, b in ((0, 1), (0, 2), (1, 2))], axis=1)
     return values, sigma, np.clip(rho, -0.999999, 0.999999)
+
+
+def recount(t: Array, angle: Array) -> tuple[Array, int]:
+    """Whole turns across gaps, from the rates of turning on both sides; how many gaps leave doubt.
+
+    A frame shows the angle but for whole turns. Across a gap the mean of the rates before and after
+    decides; where they differ by so much that it could be off by half a turn, the gap is doubtful.
+    """
+    angle, doubtful = angle.copy(), 0
+    seen = np.flatnonzero(np.isfinite(angle))
+    if len(seen) < 4:
+        return angle, doubtful
+    usual = float(np.median(np.diff(t)))
+    for k in range(1, len(seen) - 2):
+        i, j = seen[k], seen[k + 1]
+        gap = t[j] - t[i]
+        if gap < 3.5 * usual:
+            continue
+        before = (angle[i] - angle[seen[k - 1]]) / (t[i] - t[seen[k - 1]])
+        after = (angle[seen[k + 2]] - angle[j]) / (t[seen[k + 2]] - t[j])
+        expected = 0.5 * (before + after) * gap
+        angle[j:] += 2 * np.pi * np.round((expected - (angle[j] - angle[i])) / (2 * np.pi))
+        doubtful += bool(abs(after - before) * gap / 4 > np.pi / 2 or gap > LONG)
+    return angle, doubtful

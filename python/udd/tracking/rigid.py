@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .marks import Mark, Sighting
+from .look import Mark
+from .marks import Sighting
 
 Array = NDArray[np.float64]
 
@@ -22,7 +24,9 @@ class Step:
     chi2: Array  # (marks,): squared misfit in units of unit noise
 
 
-def solve(marks: list[Mark], sightings: list[Sighting | None], angle: float, weights: Array) -> Step | None:
+def solve(
+    marks: Sequence[Mark], sightings: Sequence[Sighting | None], angle: float, weights: Array
+) -> Step | None:
     """Least-squares pose correction (du, dv, dbeta) from the marks seen, or None if it is not determined."""
     normal, right = np.zeros((3, 3)), np.zeros(3)
     arms = [1j * m.place * np.exp(1j * angle) for m in marks]
@@ -36,7 +40,7 @@ def solve(marks: list[Mark], sightings: list[Sighting | None], angle: float, wei
     eigen = np.linalg.eigvalsh(scale @ normal @ scale)
     if eigen[0] <= 1e-4 * max(eigen[-1], 1e-12):
         return None
-    change = np.linalg.solve(normal, right)
+    change = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
     leftover, chi2 = np.full((len(marks), 2), np.nan), np.full(len(marks), np.nan)
     for k, (m, s) in enumerate(zip(maps, sightings, strict=True)):
         if s is not None:

@@ -14,27 +14,22 @@ from numpy.typing import NDArray
 
 from udd.measurement import DISK, Measurement, check_length
 
-from .acquire import colours_of
 from .decode import Film, Picture, TrackError
-from .disk import Outline, outline
-from .exposure import at_middle, exposure
-from .find import BODY, Sight, sightings
-from .learn import first_look, places, refine
-from .lens import Lens, calibrate
+from .disk import Outline
+from .exposure import at_middle
+from .find import sightings
+from .lens import Lens
 from .loop import Known, Tracks, follow
-from .marks import MISFIT, Motion
 from .noise import covariance
-from .occluder import visible
-from .pivot import Contact, rough_contact, support
 from .pivot import pivot as rolling
-from .pose import Look, Pose, align
-from .result import Camera, metres
-from .survey import Moving, Survey, moving, repeats_last, slowest, survey
+from .pivot import support
+from .prepare import prepare
+from .result import Camera, metres, recount
+from .survey import Survey, slowest, survey
 
 FEWEST_SIGHTS = 3  # survey frames that must show all four marks
-SHARP = 60  # slow frames from which the rim is measured
-LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
-RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
+VAGUE = 0.005  # of the disk's radius: a position known no better is not given
+VAGUE_SAYS = "vague: too blurred or hidden to be placed"
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 
 
@@ -120,88 +115,26 @@ def track_in_detail(
             f"{film.path}: no disk with marks in red, orange, blue and green (clockwise) was found: "
             f"{len(seen)} of {len(look_over.pictures)} frames looked at show all four"
         )
-    known, rim = _prepare(film, look_over, sights, seen)
+    known, rim = prepare(film, look_over, sights, seen)
     tracks = _follow(film, known, look_over.frames, progress)
     centre, angle = at_middle(
         np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure
     )
+    angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     camera = _camera(tracks, known, rim, radius, pivot)
-    spread = covariance(tracks)
-    values, sigma, rho = metres(tracks, spread, camera)
-    meta = _meta(film, look_over, tracks, known, rim, camera, radius)
+    values, sigma, rho = metres(tracks, covariance(tracks), camera)
+    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > VAGUE * radius
+    for table in (values, sigma, rho):
+        table[vague] = np.nan
+    tracks.flag = [VAGUE_SAYS if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
+    meta = _meta(film, look_over, tracks, known, camera, radius, doubtful)
     measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
     try:
         check_length(measurement)
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}") from None
     return Tracking(measurement, tracks, known, camera, rim)
-
-
-def _prepare(
-    film: Film, look_over: Survey, sights: list[Sight | None], seen: list[tuple[Picture, Sight]]
-) -> tuple[Known, Outline]:
-    view, white = visible(seen)
-    look = first_look(seen, view, white, film.light)
-    look = refine(look, [(p.y, Pose(s.centre, s.angle), Motion()) for p, s in seen], view)
-    # a second time with frames whose speed is known, hence their blur
-    in_motion = moving(look_over.bursts, sights)
-    open_for = exposure(in_motion, look, view)
-    in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
-    in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
-    frames = [
-        (m.picture.y, Pose(m.sight.centre, m.sight.angle), Motion(m.rate * open_for, m.turning * open_for))
-        for m in in_motion
-    ]
-    for _ in range(LENS_ROUNDS):
-        lens = calibrate(places(look, frames, view), view.shape)
-        if lens is None:
-            break
-        look = replace(look, lens=lens)
-        for (_, pose, _), m in zip(frames, in_motion, strict=True):
-            pose.centre, pose.angle = _in_plane(lens, m.sight)
-        look = refine(look, frames, view)
-    else:
-        frames = frames[:0]
-    if len(frames) >= FEWEST_SIGHTS:
-        look = refine(look, frames, view, 2)
-    sharp: list[tuple[Picture, Pose]] = []
-    for picture, sight in seen[:SHARP]:
-        pose = Pose(*_in_plane(look.lens, sight))
-        if align(picture.y, view, look, pose, Motion(), [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
-            sharp.append((picture, pose))
-    if not sharp:
-        raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
-    try:
-        rim = outline(sharp, look, view)
-    except TrackError as error:
-        raise TrackError(f"{film.path}: {error}") from None
-    colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
-    look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
-    return Known(look, view, colours, open_for, white, _contact(in_motion, look)), rim
-
-
-def _contact(in_motion: list[Moving], look: Look) -> Contact | None:
-    before, after, turn, dt = (np.array(x) for x in zip(*(m.step for m in in_motion), strict=True)) if in_motion else [np.empty(0)] * 4
-    return rough_contact(look.lens.plane(before), look.lens.plane(after), turn, dt, abs(look.marks[0].place))
-
-
-def _in_plane(lens: Lens, sight: Sight) -> tuple[complex, float]:
-    """A sight in the picture as a pose in the plane of the disk."""
-    arms = BODY * sight.reach * np.exp(1j * sight.angle)
-    marks = lens.plane(sight.centre + arms)
-    turn = float(np.angle(np.vdot(arms, marks - marks.mean())))
-    return complex(marks.mean()), sight.angle + turn
-
-
-def _centred(look: Look, centre: complex) -> Look:
-    """Marks as seen from the disk's own centre, red exactly at beta."""
-    red = look.marks[0].place - centre
-    turn = red / abs(red) * 1j
-    marks = [
-        replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
-    ]
-    return replace(look, marks=marks)
 
 
 def _follow(film: Film, known: Known, frames: int, progress: bool) -> Tracks:
@@ -220,18 +153,20 @@ def _camera(
     angle, centre = np.array(tracks.angle), np.array(tracks.centre)
     good = np.isfinite(angle)
     found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
-    drive = complex(np.nan, np.nan) if found is None else np.conj(found.drive) / scale
-    common = {"scale": scale, "scale_sigma": rim.sigma / radius, "drive": drive}
+    drive = complex(np.nan, np.nan) if found is None else complex(np.conj(found.drive) / scale)
+
+    def camera(place: complex, sigma: float, origin: str) -> Camera:
+        return Camera(scale, rim.sigma / radius, place, sigma, origin, drive)
+
     if given is not None:
         place = complex(float(given[0]), float(given[1]))
         if not np.isfinite(place):
             raise TrackError(f"pivot must be two finite numbers, not {given!r}")
-        return Camera(pivot=place, pivot_sigma=0.0, pivot_from="given", **common)
+        return camera(complex(known.look.lens.plane(place)), 0.0, "given")
     if found is not None:
-        sigma = float(np.sqrt(found.covariance[0, 0])) / scale
-        return Camera(pivot=found.place, pivot_sigma=sigma, pivot_from="rolling constraint", **common)
-    place_or_none = support(known.view)
-    if place_or_none is None:
+        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / scale, "rolling constraint")
+    guess = support(known.view)
+    if guess is None:
         raise TrackError(
             "the motion does not tell where the contact point is (the disk hardly turns, or turns steadily) "
             "and no support is seen: give pivot=(u, v) in pixels"
@@ -241,17 +176,18 @@ def _camera(
         f"{CLOSE_ENOUGH:.0f} mm",
         stacklevel=4,
     )
-    return Camera(pivot=place_or_none, pivot_sigma=CLOSE_ENOUGH * 1e-3, pivot_from="support", **common)
+    return camera(complex(known.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
 
 
 def _meta(
-    film: Film, look_over: Survey, tracks: Tracks, known: Known, rim: Outline, camera: Camera, radius: float
+    film: Film, look_over: Survey, tracks: Tracks, known: Known, camera: Camera, radius: float, doubtful: int
 ) -> dict[str, Any]:
     lost = sum(flag != "" for flag in tracks.flag)
     missing = max(0, film.promised - len(tracks.t))
     if missing or film.broken:
         warnings.warn(
-            f"{film.path}: {missing or film.broken} frames are missing or do not decode; the film may be cut off",
+            f"{film.path}: {missing or film.broken} frames are missing or do not decode; "
+            "the film may be cut off",
             stacklevel=4,
         )
     return {
@@ -261,6 +197,7 @@ def _meta(
         "frames": len(tracks.t),
         "frames_missing": missing,
         "frames_lost": lost,
+        "turns_doubtful": doubtful,
         "exposure": known.exposure,
         "px_per_m": camera.scale,
         "px_per_m_sigma": camera.scale_sigma,
@@ -272,8 +209,12 @@ def _meta(
         "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
         "marks_px": [[m.place.real, m.place.imag] for m in known.look.marks],
         "psf_px": known.look.psf,
-        "lens": list(astuple(known.look.lens)[2:]),
+        "lens": _numbers(known.look.lens),
     }
+
+
+def _numbers(lens: Lens) -> list[float]:
+    return [] if lens.plain else [lens.middle.real, lens.middle.imag, *astuple(lens)[1:]]
 
 
 def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[NDArray[np.uint8]]:
