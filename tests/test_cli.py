@@ -365,7 +365,7 @@ def test_the_demonstration(null: bool, tmp_path: Path, capsys: pytest.CaptureFix
     if null:
         assert found["verdict"] == "nothing missing"
         return
-    # The film was made with b = 6 /m. At one drive a slip c Z with c = b W acts identically: either name is right.
+    # The film was made with b = 6 /m. At one drive a slip c Z with c = b W acts identically: both are right.
     assert [e["name"] for e in effects] in (["relaxation"], ["slip"])
     ((_, amplitude),) = effects[0]["parameters"].items()
     b = amplitude["value"] / (1 if effects[0]["name"] == "relaxation" else 0.042)

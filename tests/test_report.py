@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import discovered
 import udd
+from udd import _core
 from udd.errors import UddError
 from udd.report import words
 
@@ -104,6 +106,15 @@ def test_nothing_missing_is_said(pages: dict[str, str]) -> None:
     assert "with the effect" not in text
 
 
+def test_a_model_that_does_not_explain_is_not_called_complete() -> None:
+    calm = discovered.nothing()
+    assert "Nothing is missing" in words.verdict(calm)
+    wrong = replace(calm, error_before=discovered.disk().error_before)
+    assert "does not explain this motion" in words.verdict(wrong)
+    lost = replace(calm, verdict="effect present, form not identified")
+    assert "no effect of the library explains" in words.verdict(lost)
+
+
 def test_a_pendulum_has_its_page(pages: dict[str, str]) -> None:
     text = Page(pages["pendulum"]).words
     assert "The air resists with the square of the speed" in text
@@ -166,6 +177,13 @@ def test_values_carry_two_digits_of_their_error(value: float, error: float | Non
 )
 def test_formulas_are_written_as_people_do(formula: str, said: str) -> None:
     assert str(words.pretty(formula)) == said
+
+
+def test_every_parameter_is_explained() -> None:
+    models = [udd.Disk(0.04), udd.Pendulum(0.5)]
+    names = [n for model in models for n in model.parameters]
+    names += [n for kind in ("disk", "pendulum") for n, _unit in _core.camera_parameters(kind)] + ["clock"]
+    assert set(names) - set(words.MEANINGS) == set()
 
 
 def test_small_chances() -> None:

@@ -45,18 +45,16 @@ def run(args: argparse.Namespace) -> Answer:
     if not args.json:
         print(_HEAD, flush=True)
     with tqdm(total=len(drives), unit="w", disable=not watched() or len(drives) <= size, leave=False) as bar:
-        for k in range(0, len(drives), size):
-            try:
+        try:
+            for k in range(0, len(drives), size):
                 found = _exponents(drives[k : k + size], args)
-            except KeyboardInterrupt:
-                stopped = True
-                break
-            rows += found
-            bar.update(len(found))
-            if not args.json:
-                bar.clear()
-                for row in found:
-                    print(",".join(f"{x:.10g}" for x in row), flush=True)
+                rows += found
+                bar.update(len(found))
+                if not args.json:
+                    bar.clear()
+                    print("\n".join(",".join(f"{x:.10g}" for x in row) for row in found), flush=True)
+        except KeyboardInterrupt:
+            stopped = True
     missed = sum(row[2] > args.tol for row in rows)
     if missed:
         warnings.warn(

@@ -19,20 +19,21 @@ def parameters(discovery: Any) -> list[dict[str, str]]:
 
 def camera(discovery: Any) -> list[dict[str, str]]:
     """What the camera got wrong, likewise."""
-    return _rows(discovery, lambda name: name not in discovery.fit.model.parameters)
+    return _rows(discovery, lambda name: name not in discovery.fit.model.parameters, share=("%", 100.0))
 
 
-def _rows(discovery: Any, wanted: Any) -> list[dict[str, str]]:
+def _rows(discovery: Any, wanted: Any, share: tuple[str, float] = ("", 1.0)) -> list[dict[str, str]]:
     known = units(discovery.fit)
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
+        unit, factor = _shown(known[name]) if known[name] else share
         rows.append(
             {
                 "name": words.pretty(name.split(".")[-1]),
                 "meaning": _meaning(name, discovery),
-                "before": _value(discovery.baseline, name, known[name]),
-                "after": _value(discovery.fit, name, known[name]),
-                "unit": words.pretty(_shown(known[name])[0]),
+                "before": _value(discovery.baseline, name, factor),
+                "after": _value(discovery.fit, name, factor),
+                "unit": words.pretty(unit),
             }
         )
     return rows
@@ -56,10 +57,9 @@ def fixed(discovery: Any) -> list[dict[str, str]]:
     return rows
 
 
-def _value(fit: Any, name: str, unit: str) -> str:
+def _value(fit: Any, name: str, factor: float) -> str:
     if name not in fit.parameters:
         return "–"
-    factor = _shown(unit)[1]
     return words.with_error(factor * fit.parameters[name], factor * fit.errors[name])
 
 
@@ -70,7 +70,6 @@ def _shown(unit: str) -> tuple[str, float]:
         "s": ("ms", 1e3),
         "m": ("mm", 1e3),
         "s/m": ("ms/m", 1e3),
-        "": ("", 1.0),
     }.get(unit, (unit, 1.0))
 
 

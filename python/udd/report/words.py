@@ -44,6 +44,8 @@ MEANINGS = {
     "z0": "contact, above where it was taken to be",
     "tilt": "camera turned clockwise",
     "scale": "picture larger than taken to be",
+    "right": "centre of the marks, right of the disk's own (red mark on top)",
+    "up": "centre of the marks, above the disk's own (red mark on top)",
     "lag": "orientation seen later than position",
     "row": "rolling shutter: time per height in the picture",
     "clock": "recorded time runs fast",
@@ -89,6 +91,13 @@ def enters(effect: Any) -> list[str]:
 def verdict(discovery: Any) -> str:
     """The whole result in one sentence."""
     said = "; and ".join("; or ".join(_meanings(f, discovery)) for f in discovery.effects)
+    if not discovery.effects and discovery.verdict != "nothing missing":
+        return "The model lacks something, but no effect of the library explains what."
+    if discovery.verdict == "nothing missing" and not at_the_floor(discovery):
+        return (
+            "Nothing that the library holds is missing beyond doubt; yet the known model does not explain "
+            "this motion down to the noise of the measurement."
+        )
     if discovery.verdict == "nothing missing":
         return (
             "Nothing is missing: the known model explains this motion down to the noise of the measurement."
@@ -96,6 +105,14 @@ def verdict(discovery: Any) -> str:
     if discovery.verdict == "effect identified":
         return f"{said[0].upper()}{said[1:]}."
     return f"The model lacks something. Most likely {said}; but this record does not settle its form."
+
+
+def at_the_floor(discovery: Any) -> bool:
+    """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
+    e = discovery.error_before
+    h = discovery.horizon if discovery.horizon is not None else e.horizons[-1]
+    median, low, _high, floor = e.at(h)
+    return bool((low if math.isfinite(low) else median) <= 1.5 * floor)
 
 
 def _meanings(found: Any, discovery: Any) -> list[str]:
@@ -212,9 +229,8 @@ def short_limits(discovery: Any) -> list[str]:
 
 def limits(discovery: Any) -> list[str]:
     """What holds for every such page."""
-    found = len(discovery.effects) > 0
     result = []
-    if not found:
+    if discovery.verdict == "nothing missing":
         result.append(
             "An effect smaller than this record can show may still be there: nothing missing means nothing "
             "that these data demand."
