@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 import udd
 
 
@@ -48,9 +49,12 @@ def film(
     t = np.arange(0, duration - 0.05, 0.04)
     sub = 8
     fine = ((t + 0.02)[:, None] + camera.exposure * (np.arange(sub) + 0.5 - sub / 2) / sub).ravel()
-    # A tilted camera sees a tilted world; a lagging orientation is an earlier one; a clock that is fast counts more.
+    # A tilted camera sees a tilted world; a lagging orientation is an earlier one; a clock that is fast
+    # counts more.
     times = np.concatenate([[0.0], fine])
-    run = udd.simulate(model, times, state or start_between_wheels(model, duration, rng), rtol=1e-9, atol=1e-11)
+    run = udd.simulate(
+        model, times, state or start_between_wheels(model, duration, rng), rtol=1e-9, atol=1e-11
+    )
     if run.outcome != "finished":  # chaos: the start was tried with a looser tolerance
         return film(model, rng, duration, camera)
     mean = run.state[1:].reshape(len(t), sub, 4).mean(axis=1)

@@ -127,7 +127,7 @@ def test_a_fit_may_leave_the_physical_range() -> None:
         (lambda: udd.DLE(1.0).replace(W=2.0), "no 'W'"),
         (lambda: udd.Pendulum(0.0), "length must be above 0"),
         (lambda: udd.Pendulum(0.5, inertia=-1.0), "inertia must be above 0"),
-        (lambda: udd.Pendulum(0.5, effects=[effects.slip()]), "torque or friction only, not slip"),
+        (lambda: udd.Pendulum(0.5, effects=[effects.slip()]), "slip acts on a disk, not on a pendulum"),
         (lambda: effects.relaxation(b=math.nan), "b of relaxation must be finite"),
         (lambda: effects.relaxation(c=1.0), "no parameter 'c'"),
         (lambda: effects.relaxation(momentum="none"), "momentum of relaxation must be"),

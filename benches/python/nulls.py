@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+
 import udd
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
@@ -45,7 +46,8 @@ def main() -> None:
         names = ", ".join(f.title for f in found.effects) or "-"
         print(
             f"{k:3d}  W = {drive:.4f}  {found.verdict}: {names}; best candidate {best.candidate.title} "
-            f"chi2 {best.chi2:.1f}; chi2/dof {found.baseline.scatter:.2f}; {time.perf_counter() - begin:.1f} s",
+            f"chi2 {best.chi2:.1f}; chi2/dof {found.baseline.scatter:.2f}; "
+            f"{time.perf_counter() - begin:.1f} s",
             flush=True,
         )
     print(f"{wrong} of {arguments.records} records without an effect were said to have one")

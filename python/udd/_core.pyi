@@ -1,6 +1,6 @@
 """The compiled core. Internal: use the functions of `udd`."""
 
-from typing import TypedDict, final
+from typing import TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ class _Effect(TypedDict):
     title: str
     equation: str
     meaning: str
+    bodies: list[str]
     slots: list[str]
     momenta: list[str]
     parameters: list[_Parameter]
@@ -35,6 +36,26 @@ class _Run(TypedDict):
     outcome: str
     counts: tuple[int, int, int]
     dense: Dense | None
+
+class _Solution(TypedDict):
+    states: _Floats
+    model: list[float]
+    camera: _Floats
+    clock: float
+    covariance: _Floats
+    state_covariance: _Floats
+    misfit: _Floats
+    seen_variance: _Floats
+    defect: _Floats
+    cost: tuple[float, float, float]
+    converged: bool
+    iterations: int
+
+# Times, what was seen, its information, and whether the next frame is linked; the states, the camera's
+# parameters and the clock's error; role, index, prior mean and standard deviation of each free parameter.
+_Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_]]
+_Start: TypeAlias = tuple[_Floats, _Floats, float]
+_Free: TypeAlias = list[tuple[str, int, float, float]]
 
 @final
 class Dense:
@@ -65,3 +86,24 @@ def lyapunov(
     rtol: float,
     atol: float,
 ) -> tuple[_Floats, _Floats, NDArray[np.bool_]]: ...
+def solve(
+    model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], iterations: int
+) -> _Solution: ...
+def score(
+    model: Model,
+    data: _Data,
+    start: _Start,
+    free: _Free,
+    diffusion: list[float],
+    candidates: list[tuple[Model, list[int]]],
+) -> tuple[_Floats, _Floats, _Floats]: ...
+def score_ripples(
+    model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], frequencies: list[float]
+) -> tuple[_Floats, _Floats, _Floats]: ...
+def filter(
+    model: Model, data: _Data, start: _Start, diffusion: list[float], windows: list[tuple[int, int]]
+) -> tuple[_Floats, _Floats, _Floats]: ...
+def predict(
+    model: Model, camera: _Floats, clock: float, t0: _Floats, states: _Floats, times: _Floats
+) -> _Floats: ...
+def camera_parameters(kind: str) -> list[tuple[str, str]]: ...

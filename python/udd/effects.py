@@ -79,6 +79,8 @@ class Spec:
         Its constructor's name in this module.
     title, equation, meaning : str
         What a reader calls it, its formula, and what it would mean physically.
+    bodies : tuple of str
+        What it can act on: ``"disk"``, ``"pendulum"``.
     slots : tuple of str
         Where it enters the equations: ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``.
     momenta : tuple of str
@@ -93,6 +95,7 @@ class Spec:
     title: str
     equation: str
     meaning: str
+    bodies: tuple[str, ...]
     slots: tuple[str, ...]
     momenta: tuple[str, ...]
     parameters: tuple[Parameter, ...]
@@ -124,7 +127,8 @@ def _specs() -> Mapping[str, Spec]:
         )
         name = entry["name"]
         texts = entry["title"], entry["equation"], entry["meaning"]
-        specs[name] = Spec(name, *texts, tuple(entry["slots"]), tuple(entry["momenta"]), parameters)
+        lists = tuple(entry["bodies"]), tuple(entry["slots"]), tuple(entry["momenta"])
+        specs[name] = Spec(name, *texts, *lists, parameters)
     return MappingProxyType(specs)
 
 

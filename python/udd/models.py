@@ -111,9 +111,9 @@ class Model:
         for effect in result:
             if not isinstance(effect, Effect):
                 raise ModelError(f"effects must be made by udd.effects, not {effect!r}")
-            if self.kind == "pendulum" and effect.momentum is not None:
+            if self.kind not in effect.spec.bodies:
                 raise ModelError(
-                    f"a pendulum takes effects through torque or friction only, not {effect.name}"
+                    f"the effect {effect.name} acts on a {' or '.join(effect.spec.bodies)}, not on a {self.kind}"
                 )
         names = [effect.name for effect in result]
         for name in names:

@@ -2,12 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, OMatrix};
+use nalgebra::{Const, DMatrix, Dyn, OMatrix};
 use rayon::prelude::*;
 
 use super::linearise::TimeOrigin;
 use super::{EstimateError, Estimator, Linear, Point, Role, Score, Sensor};
 use crate::model::Family;
+
+type Rows<const R: usize> = OMatrix<f64, Const<R>, Dyn>;
 
 /// How many frequencies are scored in one solve.
 const BATCH: usize = 24;
@@ -74,21 +76,31 @@ where
         clock: f64,
     ) -> Linear<D, M> {
         let mut linear = responses.clone();
-        let columns = 2 * frequencies.len();
         for i in 0..self.record.t.len() {
-            linear.g[i] = OMatrix::<f64, nalgebra::Const<M>, nalgebra::Dyn>::zeros(columns);
-            linear.b[i] = OMatrix::<f64, nalgebra::Const<D>, nalgebra::Dyn>::zeros(columns);
-            for (k, (f, share)) in frequencies.iter().zip(shares).enumerate() {
-                let (sin, cos) = (TAU * f * self.record.t[i] * (1.0 + clock)).sin_cos();
-                let local = &responses.b[i] * share;
-                // cos(phase + local) and sin(phase + local)
-                let (c, s) = (local.column(0), local.column(1));
-                linear.b[i].set_column(2 * k, &(c * cos - s * sin));
-                linear.b[i].set_column(2 * k + 1, &(c * sin + s * cos));
-            }
+            let phases = frequencies.iter().map(|f| TAU * f * self.record.t[i] * (1.0 + clock));
+            linear.g[i] = combined(&responses.g[i], shares, phases.clone());
+            linear.b[i] = combined(&responses.b[i], shares, phases);
         }
         linear
     }
+}
+
+/// Two columns per wave, its `cos` and `sin`, from the responses to the probe's waves.
+fn combined<const R: usize>(
+    responses: &Rows<R>,
+    shares: &[DMatrix<f64>],
+    phases: impl Iterator<Item = f64>,
+) -> Rows<R> {
+    let mut columns = Rows::<R>::zeros(2 * shares.len());
+    for (k, (share, phase)) in shares.iter().zip(phases).enumerate() {
+        let local = responses * share;
+        let (c, s) = (local.column(0), local.column(1));
+        let (sin, cos) = phase.sin_cos();
+        // cos(phase + local) and sin(phase + local)
+        columns.set_column(2 * k, &(c * cos - s * sin));
+        columns.set_column(2 * k + 1, &(c * sin + s * cos));
+    }
+    columns
 }
 
 /// How `cos` and `sin` of each frequency are made of those of the basis, on `[0, longest]`: least squares

@@ -3,9 +3,9 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::model::effects::{EffectParameter, Kind, Momentum, Role, Slot};
+use crate::model::effects::{Body, EffectParameter, Kind, Momentum, Role, Slot};
 
-/// Every effect: a list of dicts with the keys name, title, equation, meaning, slots, momenta and
+/// Every effect: a list of dicts with the keys name, title, equation, meaning, bodies, slots, momenta and
 /// parameters; each parameter is a dict with the keys name, unit, default, range, role and scan.
 #[pyfunction]
 fn effect_library(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
@@ -17,6 +17,7 @@ fn effect_library(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("title", spec.title)?;
         entry.set_item("equation", spec.equation)?;
         entry.set_item("meaning", spec.meaning)?;
+        entry.set_item("bodies", spec.bodies.iter().map(|&body: &Body| body.name()).collect::<Vec<_>>())?;
         entry.set_item("slots", spec.slots.iter().map(|&slot: &Slot| slot.name()).collect::<Vec<_>>())?;
         entry.set_item("momenta", spec.momenta.iter().map(|&m: &Momentum| m.name()).collect::<Vec<_>>())?;
         let parameters = spec.parameters.iter().map(|p| parameter(py, p)).collect::<PyResult<Vec<_>>>()?;

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::errors::ModelError;
-use crate::model::effects::{Kind, Slot};
+use crate::model::effects::{Body, Kind, Slot};
 use crate::model::{DiskFamily, DleFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of};
 
 /// Any model with its parameter values, in the order of its family's parameters.
@@ -46,10 +46,11 @@ impl AnyModel {
             "dle" => AnyModel::Dle(DleFamily, values),
             "disk" => AnyModel::Disk(DiskFamily { effects, edge }, values),
             "pendulum" => {
-                if let Some(other) = effects.iter().find(|effect| effect.momentum.is_some()) {
+                if let Some(other) =
+                    effects.iter().find(|effect| !effect.kind.spec().bodies.contains(&Body::Pendulum))
+                {
                     let name = other.kind.spec().name;
-                    let message =
-                        format!("a pendulum takes effects through torque or friction only, not {name}");
+                    let message = format!("the effect {name} acts on a disk, not on a pendulum");
                     return Err(ModelError::new_err(message));
                 }
                 AnyModel::Pendulum(PendulumFamily { effects }, values)

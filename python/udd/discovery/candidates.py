@@ -54,7 +54,7 @@ def library(model: Model) -> list[Candidate]:
     """
     result = []
     for spec in effects.library():
-        if spec.name in {e.name for e in model.effects} or not _suits(spec, model):
+        if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:
             continue
         if any(p.role == "frequency" for p in spec.parameters):
             continue
@@ -87,7 +87,3 @@ def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     frequencies = np.arange(2.0 / duration, min(0.25 / step, 6.0), 0.5 / duration)
     return [Candidate(effects.drive_ripple(f=float(f)), f"drive ripple at {f:.3g} Hz") for f in frequencies]
 
-
-def _suits(spec: effects.Spec, model: Model) -> bool:
-    """A pendulum's pivot does not move: only torques and friction can act on it."""
-    return isinstance(model, Disk) or set(spec.slots) <= {"torque", "friction"}

@@ -1,4 +1,4 @@
-"""The loop's second half: which effect does the model lack?"""
+"""The loop's second half: which effect the model lacks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ ALPHA = 1e-3
 NATS = 10.0
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
-#: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at one drive.
+#: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
+#: one drive.
 SAME = 0.9999
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
@@ -135,8 +136,8 @@ class Discovery:
     error_before, error_after : Errors
         The same held-out errors, of models fitted without the held-out data; the noise floor beside them.
     ratio : tuple of float
-        Held-out error after over before, with its 95 % interval: of the disk at :func:`comparison_horizon`, of a
-        pendulum over the whole held-out part.
+        Held-out error after over before, with its 95 % interval: of the disk at :func:`comparison_horizon`,
+        of a pendulum over the whole held-out part.
     scans : list of list of Scored
         What the score said of every candidate, for each round of the search, the best first.
     measurement : Measurement
@@ -200,14 +201,15 @@ def discover(
 ) -> Discovery:
     """Find the effect that a model lacks.
 
-    The model is fitted to the first 60 % of the record. Every effect of the library is scored around that fit;
-    the best are fitted in full. An effect is added only if so large a fall of chi2 has a chance below 0.1 % over all
-    candidates together (in those 60 % for white noise, and in all data with the misfits' own colour), its amplitudes
-    are physical, and the last 40 % are explained better beyond doubt: with all parameters held, the 95 % interval of
-    the costs' ratio excludes 1, and at no horizon do forecasts get worse. All coefficients are refitted and the search goes on; single
-    effects that do not pass are tried in pairs. Forms that the data cannot tell apart are named. Where no effect passes
-    but the model does not explain the data (chi2 per degree of freedom above 2), an effect is present that the library
-    does not hold.
+    The model is fitted to the first 60 % of the record. Every effect of the library is scored around that
+    fit; the best are fitted in full. An effect is added only if so large a fall of chi2 has a chance below
+    0.1 % over all candidates together (in those 60 % for white noise, and in all data with the misfits' own
+    colour), its amplitudes are physical, and the last 40 % are explained better beyond doubt: with all
+    parameters held, the 95 % interval of the costs' ratio excludes 1, and at no horizon do forecasts get
+    worse. All coefficients are refitted and the search goes on; single effects that do not pass are tried in
+    pairs. Forms that the data cannot tell apart are named. Where no effect passes but the model does not
+    explain the data (chi2 per degree of freedom above 2), an effect is present that the library does not
+    hold.
 
     Parameters
     ----------
@@ -227,6 +229,19 @@ def discover(
     ------
     FitError
         The record is too short, or the model cannot be fitted to it.
+
+    Examples
+    --------
+    A pendulum that the air resists with the square of its speed; the model knows viscous friction only.
+
+    >>> import numpy as np, udd
+    >>> t = np.arange(0, 60, 0.05)
+    >>> truth = udd.Pendulum(1.0, k0=0.01, effects=[udd.effects.quadratic_drag(c=0.05)])
+    >>> theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
+    >>> noise = 2e-3 * np.random.default_rng(0).standard_normal(len(t))
+    >>> found = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.03))
+    >>> [effect.title for effect in found.effects]
+    ['quadratic drag']
     """
     tell = progress or (lambda _text: None)
     free = None if free is None else list(free)
@@ -285,7 +300,7 @@ class _Step:
 
 @dataclass(frozen=True)
 class _State:
-    """Where the search stands: fits of the first part and of all data, and the first one's held-out errors."""
+    """Where the search stands: fits of the first part and of all data, and held-out errors."""
 
     part: Fit
     whole: Fit
@@ -331,8 +346,9 @@ class _Search:
         return held_out_errors(fitted, self.record, self.first)
 
     def improvement(self, before: Errors, after: Errors) -> tuple[float, float, float]:
-        """Held-out error after over before: of the disk, which is chaotic, after a second (or the longest horizon
-        there is); of a pendulum, over the whole held-out part.
+        """Held-out error after over before.
+
+        Of the disk, which is chaotic, at the horizon of comparison; of a pendulum over the whole run.
         """
         if before.unit == "rad":
             return whole_improvement(before, after)
@@ -341,7 +357,7 @@ class _Search:
     def run(
         self, base: Fit, whole: Fit, before: Errors
     ) -> tuple[Fit, Fit, Errors, list[_Step], list[list[Scored]]]:
-        """Add effects until none passes; fits of the first part and of all data, held-out errors, what was done."""
+        """Add effects until none passes; fits of the first part and of all data, errors, what was done."""
         accepted: list[_Step] = []
         scans: list[list[Scored]] = []
         current = _State(base, whole, before)
@@ -357,12 +373,19 @@ class _Search:
         return current.part, current.whole, current.errors, accepted, scans
 
     def _score(self, fitted: Fit) -> Scan:
-        current = loosened(fitted, _SCATTER)
-        rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
-        best = [s.candidate for s in rippled[:1]]
-        scanned = scan(current, [*library(current.model), *best])
-        self._looks = len(scanned.scored) + len(rippled)
-        return scanned
+        """Score every candidate around the fit and, where it does not explain the data, around a looser one.
+
+        A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show where it is
+        held tightly. The scan with the stronger candidate counts.
+        """
+        scans = []
+        self._looks = 0
+        for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
+            rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
+            best = [s.candidate for s in rippled[:1]]
+            scans.append(scan(current, [*library(current.model), *best]))
+            self._looks += len(scans[-1].scored) + len(rippled)
+        return max(scans, key=lambda s: max((c.chi2 for c in s.scored if c.physical), default=0.0))
 
     def _single(self, current: _State, scanned: Scan) -> tuple[_Step, _State] | None:
         passing = [s for s in scanned.scored if s.physical and not s.absorbed and s.p * self._looks < ALPHA]
@@ -378,7 +401,8 @@ class _Search:
         trials = []
         for a, b, fall in best[:_TRIED]:
             columns = len(a.amplitudes) + len(b.amplitudes)
-            if chi2.sf(fall, columns) * len(best) >= ALPHA or a.candidate.effect.name == b.candidate.effect.name:
+            same = a.candidate.effect.name == b.candidate.effect.name
+            if same or chi2.sf(fall, columns) * len(best) >= ALPHA:
                 continue
             self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
             trials.append(self._try(current.part, [a.candidate, b.candidate], [0.0] * columns))

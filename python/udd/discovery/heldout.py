@@ -44,7 +44,8 @@ class Errors:
     blocks : ndarray of int (starts,)
         Starts with the same number are resampled together.
     run : ndarray (n,)
-        Error of one free run over all held-out frames, from where the fit ended; NaN where a frame was not seen.
+        Error of one free run over all held-out frames, from where the fit ended; NaN where a frame was not
+        seen.
     run_blocks : ndarray of int (n,)
         Frames with the same number are resampled together.
     """
@@ -83,7 +84,8 @@ class Errors:
 def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Errors:
     """Errors of a fitted model on the frames of `record` from `first` on.
 
-    Each free run starts from a state that is filtered from the second of data before it; absolute time is kept.
+    Each free run starts from a state that is filtered from the second of data before it; absolute time is
+    kept.
 
     Parameters
     ----------
@@ -109,7 +111,8 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
     rng = np.random.default_rng(seed)
 
     blocks = ((record.t[starts] - record.t[first]) // _BLOCK).astype(np.int64)
-    low, high = np.array([_interval(blocks, samples[:, k : k + 1], _median, rng) for k in range(len(horizons))]).T
+    columns = [samples[:, k : k + 1] for k in range(len(horizons))]
+    low, high = np.array([_interval(blocks, column, _median, rng) for column in columns]).T
     return Errors(
         unit="m" if kind == "disk" else "rad",
         horizons=horizons,
@@ -125,7 +128,7 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
 
 
 def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> tuple[float, float, float]:
-    """The ratio of the median errors at a horizon, after over before, with its 95 % interval from paired blocks."""
+    """The ratio of the median errors at a horizon, after over before, with its 95 % interval."""
     k = before.horizons.index(horizon)
     both = np.column_stack([after.samples[:, k], before.samples[:, k]])
     return _ratio(before.blocks, both, _median, seed)
@@ -179,7 +182,8 @@ def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Arr
     start = (record.states, fit.point.camera, fit.point.clock)
     schedule = fit.problem.schedule
     middle = list(schedule[max(len(schedule) - 2, 0)])
-    first, last, _covariance = _core.filter(fit.model, data, start, middle, [(int(a), int(b)) for a, b in windows])
+    pairs = [(int(a), int(b)) for a, b in windows]
+    first, last, _covariance = _core.filter(fit.model, data, start, middle, pairs)
     return first, last
 
 
@@ -195,7 +199,7 @@ def _run(fit: Fit, record: Record, first: int) -> Array:
 def _floor(
     fit: Fit, record: Record, windows: NDArray[np.int64], ends: NDArray[np.int64], first: Array, seed: int
 ) -> Array:
-    """Median errors of the same filter and free runs on data that the model made itself, with the noise found.
+    """Median errors of the same free runs on data that the model made itself, with the noise found.
 
     ``first`` holds the states at the windows' first frames, where the made runs start.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +67,8 @@ class Scan:
             if np.linalg.cond(_unit(block)) > 1e6:
                 continue
             g = self.gradient[columns]
-            result.append((self.scored[i], self.scored[j], float(g @ np.linalg.solve(block, g)) / self.scatter))
+            fall = float(g @ np.linalg.solve(block, g)) / self.scatter
+            result.append((self.scored[i], self.scored[j], fall))
         return sorted(result, key=lambda pair: -pair[2])
 
     def likeness(self, i: int, j: int) -> float:
@@ -105,7 +106,7 @@ def scan_ripples(fit: Fit) -> list[Scored]:
     frequencies = [c.effect.parameters["f"] for c in candidates]
     scores = _core.score_ripples(*fit.problem.arguments(fit.point), frequencies)
     scatter = max(fit.scatter, 1.0)
-    return [_score(c, *score, scatter) for c, *score in zip(candidates, *scores, strict=True)]
+    return [_score(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
 
 
 def _score(
@@ -135,7 +136,7 @@ def _score(
     )
 
 
-def physical(candidate: Candidate, estimate: Sequence[float], errors: Sequence[float]) -> bool:
+def physical(candidate: Candidate, estimate: Iterable[float], errors: Iterable[float]) -> bool:
     """Whether amplitudes lie in their range, give or take their error."""
     ranges = [p.range for p in candidate.effect.spec.parameters if p.role == "amplitude"]
     return all(

@@ -21,10 +21,10 @@ from .record import Record, record_of
 
 Array = NDArray[np.float64]
 
-#: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]`` in
-#: rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data, which is
-#: where the noise is estimated; at the tight end small effects show. A disk of LEGO is not held tighter than 10 um a
-#: frame: below that no film is without faults of its own.
+#: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]``
+#: in rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data,
+#: which is where the noise is estimated; at the tight end small effects show. A disk of LEGO is not held
+#: tighter than 10 um a frame: below that no film is without faults of its own.
 SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
     "disk": (
         (0.1, 1e-4, 1e-4, 1e-3),
@@ -41,7 +41,7 @@ _FOLLOWS = 0.7  # a fit whose leverage is larger follows each frame
 
 @dataclass(frozen=True)
 class Problem:
-    """A measurement laid out for a model, with everything that one solve needs but the point it starts from."""
+    """A measurement laid out for a model, with everything that a solve needs but its start."""
 
     model: Model
     record: Record
@@ -50,7 +50,15 @@ class Problem:
     schedule: tuple[tuple[float, ...], ...]
     diffusion: tuple[float, ...]
 
-    def arguments(self, point: Point) -> tuple[Any, ...]:
+    def arguments(
+        self, point: Point
+    ) -> tuple[
+        Model,
+        tuple[Array, Array, Array, NDArray[np.bool_]],
+        tuple[Array, Array, float],
+        list[tuple[str, int, float, float]],
+        list[float],
+    ]:
         """What the core takes to describe a problem at a point."""
         r = self.record
         information = self.noise.information(r, point.states[:, 0])
@@ -73,7 +81,7 @@ class Point:
     clock: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A model fitted to a measurement.
 
@@ -126,7 +134,7 @@ class Fit:
 
     @property
     def residuals(self) -> Array:
-        """What was seen less what was fitted, for every row of the measurement, (rows, m); NaN where not seen."""
+        """What was seen less what was fitted, for every row of the measurement; NaN where not seen."""
         rows = np.full((len(self.measurement), self.misfit.shape[1]), np.nan)
         there = self.record.row >= 0
         rows[self.record.row[there]] = self.misfit[there]
@@ -140,7 +148,8 @@ class Fit:
     def inflation(self, before: Fit) -> float:
         """By what a fall of chi2 from another fit is divided before it counts.
 
-        The scatter that remains, times how much stronger the misfits are at the frequencies where the two differ.
+        The scatter that remains, times how much stronger the misfits are at the frequencies where the two
+        differ.
         """
         sd = self.noise.sd(self.record, self.states[:, 0])
         misfit, signature = self.misfit / sd, (before.misfit - self.misfit) / sd
@@ -162,7 +171,8 @@ class Fit:
 
     def __str__(self) -> str:
         lines = [
-            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:.2g}" for name, value in self.parameters.items()
+            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:.2g}"
+            for name, value in self.parameters.items()
         ]
         verdict = "converged" if self.converged else "NOT converged"
         head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
@@ -179,10 +189,10 @@ def fit(
 ) -> Fit:
     """Fit a model to measured motion.
 
-    Unknown are the state at every frame, the model's free parameters and the camera's; minimised is the sum of the
-    squared misfits in units of the noise and of the squared model errors in units of an assumed one, which is
-    lowered in steps (weak-constraint multiple shooting). No data are differentiated, and chaotic records of any
-    length can be fitted.
+    Unknown are the state at every frame, the model's free parameters and the camera's; minimised is the sum
+    of the squared misfits in units of the noise and of the squared model errors in units of an assumed one,
+    which is lowered in steps (weak-constraint multiple shooting). No data are differentiated, and chaotic
+    records of any length can be fitted.
 
     Parameters
     ----------
@@ -194,8 +204,8 @@ def fit(
         Names of the model's free parameters; by default ``k0, k1, k2, W`` (with a prior of 5 %) of a disk,
         ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects.
     camera : bool or iterable of str
-        Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the orientation,
-        ``row`` time of a rolling shutter, ``clock``), or which of them.
+        Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
+        orientation, ``row`` time of a rolling shutter, ``clock``), or which of them.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
 
@@ -235,7 +245,8 @@ def fit_record(
     """As :func:`fit`, of some of the measurement's frames."""
     if measurement.kind != getattr(model, "kind", None):
         raise FitError(
-            f"the measurement has columns {', '.join(measurement.names)}, which {type(model).__name__} does not explain"
+            f"the measurement has columns {', '.join(measurement.names)}, "
+            f"which {type(model).__name__} does not explain"
         )
     parameters = free_parameters(model, free, camera, priors)
     cameras = _core.camera_parameters(measurement.kind)
@@ -247,7 +258,8 @@ def fit_record(
 def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
-    The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its line.
+    The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
+    line.
 
     Parameters
     ----------
@@ -260,7 +272,8 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
     t = fitted.record.t
     line = 0.5 / float(t[-1] - t[0])
-    waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e in effects for p in e.spec.parameters if p.role == "frequency"]
+    scanned = [(e, p.name) for e in effects for p in e.spec.parameters if p.role == "frequency"]
+    waves = [(f"{e.name}.{name}", e.parameters[name]) for e, name in scanned]
     model = fitted.model.with_effects((*fitted.model.effects, *effects))
     model = model.with_parameters(dict(zip(names, amplitudes, strict=True)))
     order = list(model.parameters)
@@ -279,8 +292,9 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
 def _anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
     """Solve from loose to tight.
 
-    The noise is estimated at the loosest level at which the misfits still show it: there a wrong model does the least
-    harm. At looser ones the states follow every frame, and noise and model error cannot be told apart.
+    The noise is estimated at the loosest level at which the misfits still show it: there a wrong model does
+    the least harm. At looser ones the states follow every frame, and noise and model error cannot be told
+    apart.
     """
     as_stated, first = problem.noise, point
     for number, diffusion in enumerate(problem.schedule):
@@ -327,8 +341,8 @@ def _tighten(
 def loosened(fitted: Fit, scatter: float) -> Fit:
     """The tightest fit, of those that led to this one, whose scatter is below a limit; else the loosest.
 
-    A wrong model that is held tightly bends everything to obey it; where it is held less tightly it shows what is
-    missing.
+    A wrong model that is held tightly bends everything to obey it; where it is held less tightly it shows
+    what is missing.
     """
     problem, result = fitted.problem, fitted
     place = problem.schedule.index(problem.diffusion)
@@ -351,8 +365,8 @@ def held_cost(fitted: Fit, record: Record) -> Array:
     Returns
     -------
     cost : ndarray (n,)
-        Squared misfit of a frame in units of the noise, with the squared defect of the link that leaves it in units of
-        the model's assumed error.
+        Squared misfit of a frame in units of the noise, with the squared defect of the link that leaves it in
+        units of the model's assumed error.
     """
     problem = replace(fitted.problem, record=record, free=(), model=fitted.model)
     problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
@@ -360,7 +374,7 @@ def held_cost(fitted: Fit, record: Record) -> Array:
     end = _tighten(fitted.measurement, problem, start, problem.schedule)
     information = problem.noise.information(record, end.states[:, 0])
     misfit = np.nan_to_num(end.misfit)
-    cost = np.einsum("ni,nij,nj->n", misfit, information, misfit)
+    cost: Array = np.einsum("ni,nij,nj->n", misfit, information, misfit)
     # A defect is kept per second; its variance over a link of length dt is diffusion^2 dt.
     dt = np.diff(record.t)[:, None]
     links = np.nan_to_num(end.defect) ** 2 * dt / np.array(end.problem.diffusion) ** 2
@@ -372,7 +386,6 @@ def information_for(fitted: Fit, record: Record) -> Array:
     """The information of another record's frames, with the noise that a fit found."""
     noise = replace(fitted.noise, weight=np.ones(len(record.t)))
     return noise.information(record, record.states[:, 0])
-
 
 
 def solve(measurement: Measurement, problem: Problem, point: Point, iterations: int = 40) -> Fit:

@@ -24,8 +24,8 @@ _BAND = 17
 class Noise:
     """How far a measurement is from what it measures.
 
-    The variance of a channel is ``(factor sigma)^2 + (blur Omega)^2``, where ``sigma`` is what the measurement
-    states: noise often grows with the speed.
+    The variance of a channel is ``(factor sigma)^2 + (blur Omega)^2``, where ``sigma`` is what the
+    measurement states: noise often grows with the speed.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Noise:
         return np.hypot(self.factor * record.sigma, self.blur * np.abs(omega)[:, None])
 
     def information(self, record: Record, omega: Array) -> Array:
-        """Inverse covariance of every frame, (n, m, m), outliers weighted down; zero where nothing was seen."""
+        """Inverse covariance of every frame, (n, m, m), outliers weighted down; zero where not seen."""
         sd = self.sd(record, omega)
         seen = np.isfinite(sd)
         scale = np.where(seen, 1.0 / np.where(seen, sd, 1.0), 0.0)
@@ -89,7 +89,8 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi2.ppf(0.5, channels))
     limit = np.sqrt(chi2.ppf(_HONEST, channels)) * np.maximum(typical, 1.0)
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
-    # The variance comes from the frames within the limit, where honest noise would show this share of its own.
+    # The variance comes from the frames within the limit, where honest noise would show this share of its
+    # own.
     shown = chi2.cdf(chi2.ppf(_HONEST, channels), channels + 2) / _HONEST
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
@@ -112,19 +113,21 @@ def _distance(record: Record, misfit: Array, sd: Array) -> Array:
     """How many standard deviations each frame is off."""
     normal = np.where(np.isfinite(sd), misfit / np.where(np.isfinite(sd), sd, 1.0), 0.0)
     squared = np.einsum("ni,nij,nj->n", normal, np.linalg.inv(record.rho), normal)
-    return np.sqrt(np.maximum(squared, 0.0))
+    result: Array = np.sqrt(np.maximum(squared, 0.0))
+    return result
 
 
 def colour(misfit: Array, signature: Array) -> float:
     """How much stronger misfits are at the frequencies where an effect shows than on average, at least 1.
 
-    Misfits that go together for many frames, like those of a lens, look like an effect more easily than white noise.
+    Misfits that go together for many frames, like those of a lens, look like an effect more easily than white
+    noise.
 
     Parameters
     ----------
     misfit, signature : ndarray (n, m)
-        The misfits of a fit with the effect, and by how much they differ from those without it, both in units of the
-        noise; NaN where nothing was seen. The worst channel counts.
+        The misfits of a fit with the effect, and by how much they differ from those without it, both in units
+        of the noise; NaN where nothing was seen. The worst channel counts.
     """
     worst = 1.0
     for e, s in zip(np.nan_to_num(misfit).T, np.nan_to_num(signature).T, strict=True):

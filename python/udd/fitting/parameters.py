@@ -12,10 +12,20 @@ from udd.errors import FitError
 from udd.models import Disk, Model, Pendulum
 
 #: What is known of a camera beforehand, as standard deviations around zero: a pivot found to a few
-#: millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose centre is off by a millimetre, an orientation that lags the position by
-#: milliseconds, a shutter that may roll (a frame's time over a picture 0.4 m high), a clock good to 0.3 %.
+#: millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose centre is off by a millimetre,
+#: an orientation that lags the position by milliseconds, a shutter that may roll (a frame's time over a
+#: picture 0.4 m high), a clock good to 0.3 %.
 CAMERA = {
-    "disk": {"y0": 5e-3, "z0": 5e-3, "tilt": 0.035, "scale": 0.01, "right": 1e-3, "up": 1e-3, "lag": 0.01, "row": 0.05},
+    "disk": {
+        "y0": 5e-3,
+        "z0": 5e-3,
+        "tilt": 0.035,
+        "scale": 0.01,
+        "right": 1e-3,
+        "up": 1e-3,
+        "lag": 0.01,
+        "row": 0.05,
+    },
     "pendulum": {"theta0": 0.1},
 }
 CLOCK = 3e-3
@@ -54,8 +64,8 @@ def free_parameters(
     model : Disk or Pendulum
         Its values are the priors' means.
     free : iterable of str, optional
-        Names of the model's free parameters. By default ``k0, k1, k2, W`` of a disk, ``k0, length, inertia`` of a
-        pendulum, and the amplitudes of all effects.
+        Names of the model's free parameters. By default ``k0, k1, k2, W`` of a disk, ``k0, length, inertia``
+        of a pendulum, and the amplitudes of all effects.
     camera : bool or iterable of str
         Whether the camera's parameters are free, or which.
     priors : mapping of str to (mean, standard deviation), optional
@@ -64,7 +74,7 @@ def free_parameters(
     Raises
     ------
     FitError
-        A name that the model or the camera does not have.
+        A name that the model or the camera does not have, or a prior that is none.
     """
     values = model.parameters
     amplitudes = {f"{e.name}.{p}" for e in model.effects for p in e.amplitudes}
@@ -97,6 +107,11 @@ def free_parameters(
         role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
         result.append(Free(name, role, index, 0.0, known[name]))
     given = dict(priors or {})
+    for name, (mean, sd) in given.items():
+        if not (np.isfinite(mean) and sd > 0):
+            raise FitError(
+                f"the prior of {name} needs a finite mean and a standard deviation that must be positive"
+            )
     unknown = set(given) - {f.name for f in result}
     if unknown:
         raise FitError(f"a prior is given for {', '.join(sorted(unknown))}, which is not free")

@@ -1,4 +1,4 @@
-"""A measurement as the estimator takes it: frames in a row, linked or not, with a first guess of the states."""
+"""A measurement as the estimator takes it: frames in a row, linked or not, and a guess of the states."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ class Record:
     Attributes
     ----------
     t : ndarray (n,)
-        Time of each frame, s. Frames that were missing in short gaps are put in, so that no flow runs for long.
+        Time of each frame, s. Frames that were missing in short gaps are put in, so that no flow runs for
+        long.
     seen : ndarray (n, m)
         What was seen; 0 where it was not.
     sigma : ndarray (n, m)

@@ -1,6 +1,6 @@
 //! A cable or thread that winds up with the disk's orientation.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// A cable or thread that winds up with the disk's orientation.
 pub struct CableTorque;
@@ -11,6 +11,7 @@ impl Law for CableTorque {
         title: "cable torque",
         equation: "torque = -kappa beta + c",
         meaning: "something elastic winds up as the disk turns and pulls it back",
+        bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[

@@ -1,6 +1,6 @@
 //! A torque that never changes.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// A torque that never changes.
 pub struct ConstantTorque;
@@ -11,6 +11,7 @@ impl Law for ConstantTorque {
         title: "constant torque",
         equation: "torque = c",
         meaning: "something turns the disk always the same way",
+        bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[EffectParameter {

@@ -1,6 +1,6 @@
 //! Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
 pub struct Coulomb;
@@ -11,6 +11,7 @@ impl Law for Coulomb {
         title: "Coulomb friction",
         equation: "torque = -c tanh(Omega/eps)",
         meaning: "dry friction whose size does not depend on the speed",
+        bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[

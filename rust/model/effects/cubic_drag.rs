@@ -1,6 +1,6 @@
 //! Drag that grows with the cube of the speed.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// Drag that grows with the cube of the speed.
 pub struct CubicDrag;
@@ -11,6 +11,7 @@ impl Law for CubicDrag {
         title: "cubic drag",
         equation: "torque = -c Omega^3",
         meaning: "a resistance that grows with the cube of the speed",
+        bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[EffectParameter {

@@ -1,6 +1,6 @@
 //! A drive speed that drifts steadily, as on an emptying battery.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// A drive speed that drifts steadily, as on an emptying battery.
 pub struct DriveDrift;
@@ -11,6 +11,7 @@ impl Law for DriveDrift {
         title: "drive drift",
         equation: "W_c = W (1 + a T)",
         meaning: "the drive slows down or speeds up over the record, as on an emptying battery",
+        bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
         parameters: &[EffectParameter {

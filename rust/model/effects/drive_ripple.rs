@@ -1,6 +1,6 @@
 //! A drive speed that varies periodically at a frequency of its own.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// A drive speed that varies periodically at a frequency of its own.
 pub struct DriveRipple;
@@ -11,6 +11,7 @@ impl Law for DriveRipple {
         title: "drive ripple",
         equation: "W_c = W (1 + a cos(phi) + b sin(phi)), phi = 2 pi f T",
         meaning: "the motor or its gears make the drive speed vary at a steady frequency",
+        bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
         parameters: &[

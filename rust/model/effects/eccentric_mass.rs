@@ -1,6 +1,6 @@
 //! A disk whose mass is not centred: gravity's torque follows its orientation.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// A disk whose mass is not centred: gravity's torque follows its orientation.
 pub struct EccentricMass;
@@ -11,6 +11,7 @@ impl Law for EccentricMass {
         title: "eccentric mass",
         equation: "torque = a sin(beta) + b cos(beta)",
         meaning: "the disk carries more mass on one side, which gravity turns down",
+        bodies: &[Body::Disk],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[

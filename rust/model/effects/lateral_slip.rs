@@ -1,6 +1,6 @@
 //! Sideways slip of the disk in proportion to the lateral offset of its centre.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// Sideways slip of the disk in proportion to the lateral offset of its centre.
 pub struct LateralSlip;
@@ -11,6 +11,7 @@ impl Law for LateralSlip {
         title: "lateral slip",
         equation: "u = -c Y",
         meaning: "the disk slips sideways in the contact, towards its centre line",
+        bodies: &[Body::Disk],
         slots: &[Slot::Lateral],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
         parameters: &[EffectParameter {

@@ -1,6 +1,6 @@
 //! A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
 pub struct LoadDrive;
@@ -11,6 +11,7 @@ impl Law for LoadDrive {
         title: "load-dependent drive",
         equation: "W_c = W (1 - a (F/g - 1)), F = g - Z Omega^2 - Y dOmega/dT",
         meaning: "the motor slows when the disk pulls harder on the wheels",
+        bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
         parameters: &[EffectParameter {

@@ -75,6 +75,23 @@ impl Slot {
     }
 }
 
+/// What an effect acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Body {
+    Disk,
+    Pendulum,
+}
+
+impl Body {
+    /// Its name in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Body::Disk => "disk",
+            Body::Pendulum => "pendulum",
+        }
+    }
+}
+
 /// How a change of the contact's velocity enters the angular momentum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Momentum {
@@ -129,6 +146,8 @@ pub struct Spec {
     pub equation: &'static str,
     /// What it would mean physically, in a sentence.
     pub meaning: &'static str,
+    /// The bodies that it can act on.
+    pub bodies: &'static [Body],
     /// The slots that it enters.
     pub slots: &'static [Slot],
     /// How it may enter the angular momentum, the default first; empty for torque and friction.

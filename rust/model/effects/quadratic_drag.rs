@@ -1,6 +1,6 @@
 //! Air drag that grows with the square of the speed.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// Air drag that grows with the square of the speed.
 pub struct QuadraticDrag;
@@ -11,6 +11,7 @@ impl Law for QuadraticDrag {
         title: "quadratic drag",
         equation: "torque = -c |Omega| Omega",
         meaning: "the air resists with the square of the speed",
+        bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[EffectParameter {

@@ -1,6 +1,6 @@
 //! Friction that grows with the distance of the disk's centre from the contact.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// Friction that grows with the distance of the disk's centre from the contact.
 pub struct RadialFriction;
@@ -11,6 +11,7 @@ impl Law for RadialFriction {
         title: "friction growing with the distance",
         equation: "k = k_plain + c (Y^2 + Z^2)",
         meaning: "the contact rubs more the farther the disk's centre is from it",
+        bodies: &[Body::Disk],
         slots: &[Slot::Friction],
         momenta: &[],
         parameters: &[EffectParameter {

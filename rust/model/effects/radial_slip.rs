@@ -1,6 +1,6 @@
 //! Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
 pub struct RadialSlip;
@@ -11,6 +11,7 @@ impl Law for RadialSlip {
         title: "slip along gravity's radial component",
         equation: "(u, W_c - W) = -c Z (Y, Z)/(Y^2 + Z^2)",
         meaning: "the disk slips along the line from contact to centre, pulled by gravity's component along it",
+        bodies: &[Body::Disk],
         slots: &[Slot::Lateral, Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
         parameters: &[EffectParameter {

@@ -1,6 +1,6 @@
 //! Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
 pub struct Relaxation;
@@ -11,6 +11,7 @@ impl Law for Relaxation {
         title: "relaxation of the rolling constraint",
         equation: "W_c = W - b W Z",
         meaning: "the wheels lift the disk less when its centre is above them, in proportion to the drive",
+        bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
         parameters: &[EffectParameter {

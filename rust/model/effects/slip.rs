@@ -1,6 +1,6 @@
 //! Slip of the disk between the wheels in proportion to the height of its centre.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// Slip of the disk between the wheels in proportion to the height of its centre.
 pub struct Slip;
@@ -11,6 +11,7 @@ impl Law for Slip {
         title: "slip c Z",
         equation: "W_c = W - c Z",
         meaning: "the disk slips between the wheels, down when its centre is above them",
+        bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
         parameters: &[EffectParameter {

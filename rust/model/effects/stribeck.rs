@@ -1,6 +1,6 @@
 //! Dry friction that fades with the speed over the width `fade`, smoothed over the width `eps`.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// Dry friction that fades with the speed over the width `fade`, smoothed over the width `eps`.
 pub struct Stribeck;
@@ -11,6 +11,7 @@ impl Law for Stribeck {
         title: "Stribeck friction",
         equation: "torque = -c tanh(Omega/eps) exp(-(Omega/fade)^2)",
         meaning: "dry friction that is strongest near rest and fades as the contact slides faster",
+        bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[

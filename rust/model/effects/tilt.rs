@@ -3,7 +3,7 @@
 //! A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
 //! are one and the same: the world turned by `a`.
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// Gravity and drive that are not parallel: an angle `a` between them.
 pub struct Tilt;
@@ -14,6 +14,7 @@ impl Law for Tilt {
         title: "tilt between gravity and drive",
         equation: "torque = a g Z",
         meaning: "the wheels do not drive the disk straight up against gravity (only the angle between the two can be known)",
+        bodies: &[Body::Disk],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[EffectParameter {

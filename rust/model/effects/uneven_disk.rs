@@ -3,7 +3,7 @@
 //! A warped disk, for example, is squeezed twice per turn by the wheels that hold it. The first
 //! harmonic is an [eccentric mass](super::EccentricMass).
 
-use super::{At, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
 
 /// A disk that is not the same all round: a torque that repeats `n` times per turn.
 pub struct UnevenDisk;
@@ -14,6 +14,7 @@ impl Law for UnevenDisk {
         title: "uneven disk",
         equation: "torque = a sin(n beta) + b cos(n beta)",
         meaning: "the disk is warped or uneven, so that the wheels push it towards preferred orientations",
+        bodies: &[Body::Disk],
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[

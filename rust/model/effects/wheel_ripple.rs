@@ -1,6 +1,6 @@
 //! A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 
-use super::{At, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
 
 /// A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 pub struct WheelRipple;
@@ -11,6 +11,7 @@ impl Law for WheelRipple {
         title: "drive ripple at the wheel's frequency",
         equation: "W_c = W (1 + a cos(phi) + b sin(phi)), phi = W T/r",
         meaning: "the drive wheel is out of round, so that its speed varies once per turn",
+        bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
         parameters: &[

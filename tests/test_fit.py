@@ -1,0 +1,133 @@
+"""The fit against simulated truth, an independent least-squares fit, and bad input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+import simulated
+import udd
+from udd.errors import FitError
+from udd.fitting import record_of
+
+
+@pytest.fixture(scope="module")
+def fits() -> list[tuple[udd.Disk, simulated.Camera, udd.Fit]]:
+    """Six records of 40 s with a relaxation, each with its own drive, camera and start, and their fits."""
+    result = []
+    for rng in np.random.default_rng(7).spawn(6):
+        model = udd.Disk(rng.uniform(0.03, 0.06), effects=[udd.effects.relaxation(b=rng.uniform(1, 8))])
+        camera = simulated.Camera(
+            offset=(rng.normal(0, 1e-3), rng.normal(0, 1e-3)),
+            tilt=rng.normal(0, 0.015),
+            scale=rng.normal(0, 0.003),
+            lag=rng.normal(0, 3e-3),
+            clock=rng.normal(0, 1e-3),
+        )
+        measured, _states = simulated.film(model, rng, 40.0, camera)
+        start = udd.Disk(model.W * 1.04, k0=0.009, k1=0.12, k2=0.065, effects=[udd.effects.relaxation(b=0.0)])
+        result.append((model, camera, udd.fit(measured, start)))
+    return result
+
+
+def test_parameters_are_found_within_their_errors(fits):
+    names = ["k0", "k1", "k2", "W", "relaxation.b"]
+    z = np.array(
+        [[(f.parameters[n] - m.parameters[n]) / f.errors[n] for n in names] for m, _camera, f in fits]
+    )
+    assert np.abs(z).max() < 4.5
+    # Thirty z-scores, five to a record and correlated there: their rms scatters by about 20 %.
+    assert 0.5 < np.sqrt(np.mean(z**2)) < 1.6
+
+
+def test_the_camera_is_found(fits):
+    for _model, camera, f in fits:
+        truth = {"y0": camera.offset[0], "z0": camera.offset[1], "tilt": camera.tilt, "lag": camera.lag}
+        for name, value in truth.items():
+            assert abs(f.parameters[name] - value) < 4.5 * f.errors[name], name
+        # The pivot is found to a small part of a frame's noise of 0.5 mm.
+        assert f.errors["y0"] < 1e-4
+
+
+def test_the_noise_is_found(fits):
+    for _model, camera, f in fits:
+        assert f.converged
+        assert 0.9 < f.scatter < 1.3  # 1 % of outliers at 8 sigma add to it
+        speed = np.array([0.0, 4.0, 10.0])
+        found = np.hypot(f.noise.factor[0] * 5e-4, f.noise.blur[0] * speed)
+        truth = camera.noise + camera.per_speed * speed
+        # A thousand frames give 3 %; the law is a sum in the truth and a root of squares in the model.
+        np.testing.assert_allclose(found, truth, rtol=0.25)
+
+
+def test_gaps_and_outliers_do_not_hurt():
+    rng = np.random.default_rng(3)
+    model = udd.Disk(0.04)
+    measured, _states = simulated.film(model, rng, 40.0)
+    values = measured.values.copy()
+    values[100:130] = np.nan  # 1.2 s: a new run starts after it
+    values[400:408] = np.nan  # 0.3 s: bridged
+    values[rng.random(len(values)) < 0.03] += [0.05, -0.04, 1.0]
+    f = udd.fit(udd.Measurement(measured.t, values), udd.Disk(0.041))
+    assert (~f.record.linked).sum() == 1
+    for name in ("k0", "W", "k1"):
+        assert abs(f.parameters[name] - model.parameters[name]) < 4.5 * f.errors[name], name
+
+
+def test_a_pendulum_agrees_with_plain_least_squares():
+    """Not chaotic: one trajectory through all data is the same estimate, made here by SciPy alone."""
+    t = np.arange(0, 30, 0.05)
+
+    def run(p: np.ndarray) -> np.ndarray:
+        def rates(_t: float, x: np.ndarray) -> list[float]:
+            return [-9.81 * np.sin(x[1]) - p[0] * x[0], x[0]]
+
+        options = {"rtol": 1e-9, "atol": 1e-11}
+        return solve_ivp(rates, (t[0], t[-1]), [p[1], p[2]], t_eval=t, **options).y[1]
+
+    theta = run(np.array([0.03, 0.2, 0.7])) + 2e-3 * np.random.default_rng(5).standard_normal(len(t))
+    plain = least_squares(lambda p: run(p) - theta, [0.05, 0.0, 0.5])
+    error = np.sqrt(np.linalg.inv(plain.jac.T @ plain.jac)[0, 0]) * 2e-3
+    f = udd.fit(udd.Measurement(t, {"theta": theta}), udd.Pendulum(1.0, k0=0.1), free=["k0"], camera=False)
+    # The two differ by the model error that the fit allows, a small part of the error.
+    assert abs(f.parameters["k0"] - plain.x[0]) < 0.3 * error
+    assert f.errors["k0"] == pytest.approx(error, rel=0.15)
+
+
+def test_frames_keep_their_rows():
+    t = np.delete(np.arange(40) * 0.04, [10, 11])
+    measured = udd.Measurement(t, np.column_stack([0.01 * np.sin(t), 0.01 * np.cos(t), t]))
+    record = record_of(measured)
+    assert len(record.t) == 40  # the two missing frames are put in
+    assert (record.row == -1).sum() == 2
+    np.testing.assert_array_equal(record.seen[record.row >= 0], measured.values)
+    assert not record.observed[record.row == -1].any()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": udd.Pendulum(1.0)}, "does not explain"),
+        ({"model": udd.DLE(1.0)}, "does not explain"),
+        ({"free": ["k9"]}, "no parameter 'k9'"),
+        ({"camera": ["focus"]}, "no parameter 'focus'"),
+        ({"priors": {"R": (0.08, 0.001)}}, "R, which is not free"),
+        ({"priors": {"k0": (0.01, 0.0)}}, "must be positive"),
+    ],
+)
+def test_bad_input_is_named(change, message):
+    t = np.arange(100) * 0.04
+    measured = udd.Measurement(t, np.column_stack([0.01 * np.sin(t), 0.01 * np.cos(t), t]))
+    arguments = {"measurement": measured, "model": udd.Disk(0.04), **change}
+    with pytest.raises(FitError, match=message):
+        udd.fit(**arguments)
+
+
+def test_too_little_is_refused():
+    t = np.arange(30) * 0.04
+    values = np.full((30, 3), np.nan)
+    values[:5] = 0.01
+    with pytest.raises(FitError, match="5 usable frames"):
+        udd.fit(udd.Measurement(t, values), udd.Disk(0.04))
