@@ -36,6 +36,7 @@ class Lens:
         """Whether the map changes nothing."""
         return not (self.curve or self.tilt_u or self.tilt_v or self.aspect or self.shear)
 
+    @np.errstate(invalid="ignore")  # NaN: where the disk was not seen
     def plane(self, picture: Complexes | complex) -> Complexes:
         """Points of the disk's plane for points of the picture."""
         z = np.asarray(picture, dtype=np.complex128)
@@ -47,6 +48,7 @@ class Lens:
         at = self.middle + self.size * (w.real * (1 + self.aspect) + self.shear * w.imag + 1j * w.imag)
         return np.asarray(at, dtype=np.complex128)
 
+    @np.errstate(invalid="ignore")
     def picture(self, plane: Complexes | complex) -> Complexes:
         """Points of the picture for points of the disk's plane."""
         z = np.asarray(plane, dtype=np.complex128)
