@@ -101,12 +101,9 @@ fn elimination_equals_a_dense_solve() {
     let parameters = reduced.schur.clone().lu().solve(&reduced.gradient).unwrap();
     let states = reduced.states(&parameters);
     let expected = full.clone().lu().solve(&rhs).unwrap();
-    for i in 0..n {
-        approx::assert_relative_eq!(
-            states[i],
-            expected.fixed_rows::<2>(2 * i).into_owned(),
-            max_relative = 1e-9
-        );
+    for (i, state) in states.iter().enumerate() {
+        let wanted = expected.fixed_rows::<2>(2 * i).into_owned();
+        approx::assert_relative_eq!(*state, wanted, max_relative = 1e-9);
     }
     approx::assert_relative_eq!(parameters, expected.rows(2 * n, p).into_owned(), max_relative = 1e-9);
 

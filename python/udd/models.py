@@ -112,9 +112,8 @@ class Model:
             if not isinstance(effect, Effect):
                 raise ModelError(f"effects must be made by udd.effects, not {effect!r}")
             if self.kind not in effect.spec.bodies:
-                raise ModelError(
-                    f"the effect {effect.name} acts on a {' or '.join(effect.spec.bodies)}, not on a {self.kind}"
-                )
+                bodies = " or ".join(effect.spec.bodies)
+                raise ModelError(f"the effect {effect.name} acts on a {bodies}, not on a {self.kind}")
         names = [effect.name for effect in result]
         for name in names:
             if names.count(name) > 1:

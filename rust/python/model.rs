@@ -1,6 +1,7 @@
 //! Models as Python hands them over.
 
 use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 
 use super::errors::ModelError;
@@ -33,12 +34,21 @@ type Spec = (String, Vec<f64>, Vec<(String, Option<String>)>, bool);
 impl AnyModel {
     /// Reads the attribute `_spec` of a Python model.
     pub fn from_python(model: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = model.py();
         let spec = model.getattr("_spec").and_then(|spec| spec.extract::<Spec>());
-        let Ok((kind, values, effects, edge)) = spec else {
-            return Err(ModelError::new_err(format!(
-                "a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {}",
-                model.get_type().name()?
-            )));
+        let (kind, values, effects, edge) = match spec {
+            Ok(spec) => spec,
+            Err(error)
+                if error.is_instance_of::<PyAttributeError>(py)
+                    || error.is_instance_of::<PyTypeError>(py) =>
+            {
+                return Err(ModelError::new_err(format!(
+                    "a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {}",
+                    model.get_type().name()?
+                )));
+            }
+            // A Ctrl-C, for example, stays one.
+            Err(error) => return Err(error),
         };
         let effects = effects.iter().map(|(name, momentum)| effect(name, momentum.as_deref()));
         let effects = effects.collect::<PyResult<Vec<_>>>()?;

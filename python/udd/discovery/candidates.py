@@ -86,4 +86,3 @@ def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     duration, step = t[-1] - t[0], np.median(np.diff(t))
     frequencies = np.arange(2.0 / duration, min(0.25 / step, 6.0), 0.5 / duration)
     return [Candidate(effects.drive_ripple(f=float(f)), f"drive ripple at {f:.3g} Hz") for f in frequencies]
-

@@ -31,6 +31,7 @@ TRAIN = 0.6
 #: one drive.
 SAME = 0.9999
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
+_WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
 _UNEXPLAINED = 2.0  # chi2 per degree of freedom above which a model does not explain its data, whatever lacks
 _TRIED = 6  # of the best candidates, fitted in full
@@ -140,6 +141,8 @@ class Discovery:
         of a pendulum over the whole held-out part.
     scans : list of list of Scored
         What the score said of every candidate, for each round of the search, the best first.
+    looks : list of int
+        How many candidates each round looked at, every frequency counted.
     measurement : Measurement
     split : float
         Time from which the data were held out, s.
@@ -154,6 +157,7 @@ class Discovery:
     error_after: Errors
     ratio: tuple[float, float, float]
     scans: list[list[Scored]]
+    looks: list[int]
     measurement: Measurement
     split: float
     trained: Fit = field(repr=False)
@@ -276,6 +280,7 @@ def discover(
         error_after=after,
         ratio=search.improvement(before, after) if found else (1.0, 1.0, 1.0),
         scans=scans,
+        looks=search.looks,
         measurement=measurement,
         split=float(record.t[first]),
         trained=trained,
@@ -341,6 +346,7 @@ class _Search:
 
     def __init__(self, record: Record, first: int, tell: Callable[[str], None]) -> None:
         self.record, self.first, self.tell = record, first, tell
+        self.looks: list[int] = []
 
     def errors(self, fitted: Fit) -> Errors:
         return held_out_errors(fitted, self.record, self.first)
@@ -375,26 +381,29 @@ class _Search:
     def _score(self, fitted: Fit) -> Scan:
         """Score every candidate around the fit and, where it does not explain the data, around a looser one.
 
-        A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show where it is
-        held tightly. The scan with the stronger candidate counts.
+        A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
+        where it is held tightly. The scan with the stronger candidate counts.
         """
         scans = []
-        self._looks = 0
+        looks = 0
         for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
             scans.append(scan(current, [*library(current.model), *best]))
-            self._looks += len(scans[-1].scored) + len(rippled)
+            looks += len(scans[-1].scored) + len(rippled)
+        self.looks.append(looks)
         return max(scans, key=lambda s: max((c.chi2 for c in s.scored if c.physical), default=0.0))
 
     def _single(self, current: _State, scanned: Scan) -> tuple[_Step, _State] | None:
-        passing = [s for s in scanned.scored if s.physical and not s.absorbed and s.p * self._looks < ALPHA]
-        passing.sort(key=lambda s: -s.chi2)
+        passing = [
+            s for s in scanned.scored if s.physical and not s.absorbed and s.p * self.looks[-1] < ALPHA
+        ]
+        passing.sort(key=lambda s: -round(s.chi2, 3))
         trials = []
         for s in passing[:_TRIED]:
             self.tell(f"trying {s.candidate.title}")
             trials.append(self._try(current.part, [s.candidate], list(s.amplitudes)))
-        return self._accept(current, [t for t in trials if t], scanned, self._looks)
+        return self._accept(current, [t for t in trials if t], scanned, self.looks[-1])
 
     def _pair(self, current: _State, scanned: Scan) -> tuple[_Step, _State] | None:
         best = scanned.pairs()
@@ -419,14 +428,21 @@ class _Search:
         self, current: _State, trials: list[_Trial], scanned: Scan, looks: int
     ) -> tuple[_Step, _State] | None:
         """The best trial that passes all tests."""
+        # chi2 compares only where the model is held equally tightly; a form that cannot be is worse.
+        tightest = max((t.fit.level for t in trials), default=0)
+        trials = [t for t in trials if t.fit.level == tightest >= current.part.level]
         if not trials:
             return None
         held = self.record.part(slice(self.first, None))
         unit = min(trials, key=lambda t: t.fit.chi2).fit.inflation(current.part)
-        for trial in sorted(trials, key=lambda t: t.criterion(unit)):
+        # Equal ones, like a slip and a relaxation at one drive, come in the library's order.
+        trials = sorted(trials, key=lambda t: round(t.criterion(unit), 3))
+        least = trials[0].criterion(unit)
+        # Where the best form fails a test, a clearly worse one is not named instead.
+        for trial in (t for t in trials if t.criterion(unit) - least <= 2 * NATS):
             ratio = cost_improvement(current.part, trial.fit, held)
             whole = self._try(current.whole, trial.candidates, trial.amplitudes) if ratio[2] < 1.0 else None
-            if whole is None:
+            if whole is None or whole.fit.level < current.whole.level:
                 continue
             fall = (current.whole.chi2 - whole.fit.chi2) / whole.fit.inflation(current.whole)
             p = min(float(chi2.sf(fall, len(trial.amplitudes))) * looks, 1.0)
@@ -440,7 +456,7 @@ class _Search:
 
     def _worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
-        return before.unit == "m" and any(improvement(before, after, h)[1] > 1.0 for h in before.horizons)
+        return before.unit == "m" and any(improvement(before, after, h)[1] > _WORSE for h in before.horizons)
 
     def _alternatives(
         self, chosen: _Trial, trials: list[_Trial], scanned: Scan, unit: float

@@ -37,6 +37,7 @@ _FRAME = 0.04
 _NOISE_ROUNDS = 12
 _STEPS = 20  # a right model converges in three to seven
 _FOLLOWS = 0.7  # a fit whose leverage is larger follows each frame
+_BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,11 @@ class Fit:
         there = self.record.row >= 0
         rows[self.record.row[there]] = self.misfit[there]
         return rows
+
+    @property
+    def level(self) -> int:
+        """How tightly the model was held: the place of its assumed error in the schedule."""
+        return self.problem.schedule.index(self.problem.diffusion)
 
     @property
     def scatter(self) -> float:
@@ -302,7 +308,7 @@ def _anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
         shown, problem, point = _estimate_noise(measurement, problem, point)
         if shown:
             return _tighten(measurement, problem, point, problem.schedule[number:])
-    # A film so precise that its noise never shows is believed.
+    # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
     return _tighten(measurement, replace(problem, noise=as_stated), first, problem.schedule)
 
 
@@ -317,6 +323,8 @@ def _estimate_noise(measurement: Measurement, problem: Problem, point: Point) ->
         if leverage.mean() > _FOLLOWS:
             return False, problem, point
         noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
+        if measurement.sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):
+            return False, problem, point
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, omega):
             break
@@ -345,8 +353,7 @@ def loosened(fitted: Fit, scatter: float) -> Fit:
     what is missing.
     """
     problem, result = fitted.problem, fitted
-    place = problem.schedule.index(problem.diffusion)
-    for diffusion in reversed(problem.schedule[:place]):
+    for diffusion in reversed(problem.schedule[: fitted.level]):
         if result.scatter < scatter:
             break
         result = solve(fitted.measurement, replace(problem, diffusion=diffusion), result.point)

@@ -54,6 +54,11 @@ class Noise:
         result: Array = self.weight[:, None, None] * inverse * scale[:, :, None] * scale[:, None, :]
         return result
 
+    def beyond(self, record: Record, omega: Array, factor: float) -> bool:
+        """Whether any channel is noisier than stated by more than a factor, in the median."""
+        ratio = np.where(record.observed, self.sd(record, omega) / record.sigma, np.nan)
+        return bool((np.nanmedian(ratio, axis=0) > factor).any())
+
     def like(self, other: Noise, record: Record, omega: Array) -> bool:
         """Whether two noises agree to 3 % in the median."""
         seen = record.observed

@@ -76,23 +76,13 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
     return ax
 
 
-def looks(discovery: Any, stage: int) -> int:
-    """How many candidates a stage of the search looked at, each scanned frequency counted."""
-    from udd.discovery.candidates import ripples
-
-    scan = discovery.scans[stage]
-    shown = sum(any(p.role == "frequency" for p in s.candidate.effect.spec.parameters) for s in scan)
-    scanned = len(ripples(discovery.baseline.model, discovery.trained.record.t)) if shown else 0
-    return len(scan) - shown + scanned
-
-
 def threshold(discovery: Any, stage: int) -> float:
     """The chi2 that a candidate with one amplitude must reach, all candidates counted."""
     from scipy.stats import chi2
 
     from udd.discovery.discover import ALPHA
 
-    return float(chi2.isf(ALPHA / looks(discovery, stage), 1))
+    return float(chi2.isf(ALPHA / discovery.looks[stage], 1))
 
 
 def errors(discovery: Any, ax: Axes | None = None) -> Axes:

@@ -10,7 +10,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 #: From this likeness on, no length of record at one drive tells two effects apart.
-IDENTICAL = 0.999
+IDENTICAL = 0.9999
 
 _SYMBOLS = (
     (r"\bOmega\b", "Ω"),
