@@ -25,6 +25,8 @@ def number(name: str, value: object, *, least: float | None = None, above: float
         result = float(cast("SupportsFloat", value))
     except (TypeError, ValueError):
         raise ModelError(f"{name} must be a number, not {value!r}") from None
+    except OverflowError:
+        raise ModelError(f"{name} is too large a number") from None
     if not math.isfinite(result):
         raise ModelError(f"{name} must be finite, not {result}")
     if least is not None and result < least:

@@ -96,9 +96,8 @@ def lyapunov(
     tol : float, optional
         The run ends once the standard error is down to this; by default 2e-3 per unit of time, or 8e-3 /s.
     transient : float, optional
-        Time at the start that is left out in any case, by default 400, or 100 s (less
-        for a short `t`). Should the first half of
-        what follows disagree with the second, it is left out too.
+        Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
+        Should the first half of what follows disagree with the second, it is left out too.
     state0 : array_like, shape (dim,), optional
         Initial state. Where several attractors coexist it decides between them.
     rtol, atol : float

@@ -107,7 +107,10 @@ class Model:
     def _effects(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
         if isinstance(effects, Effect):
             effects = (effects,)
-        result = tuple(effects)
+        try:
+            result = tuple(effects)
+        except TypeError:
+            raise ModelError(f"effects must be a list of effects, not {effects!r}") from None
         for effect in result:
             if not isinstance(effect, Effect):
                 raise ModelError(f"effects must be made by udd.effects, not {effect!r}")

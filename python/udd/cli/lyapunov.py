@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--to", dest="last", type=float, help="the last")
     parser.add_argument("--n", type=int, help="how many")
     parser.add_argument("--B", type=float, default=0.0, help="damping (default 0)")
-    parser.add_argument("--t", type=float, help="length of the run (default 20000)")
+    parser.add_argument("--t", type=float, help="length of the run at most (default 100000)")
     parser.add_argument("--tol", type=float, default=1e-3, help="standard error to reach (default 1e-3)")
 
 

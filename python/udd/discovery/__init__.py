@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from .discover import Alternative, Discovery, Found, discover
+from .discover import discover
 from .heldout import Errors
+from .results import Alternative, Discovery, Found
 from .scan import Scored
 
 __all__ = ["Alternative", "Discovery", "Errors", "Found", "Scored", "discover"]

@@ -127,6 +127,11 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
     )
 
 
+def comparison_horizon(errors: Errors) -> float:
+    """The horizon at which a disk's models are compared: a second, or the nearest below that there is, s."""
+    return max((h for h in errors.horizons if h <= 1.0), default=errors.horizons[0])
+
+
 def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> tuple[float, float, float]:
     """The ratio of the median errors at a horizon, after over before, with its 95 % interval."""
     k = before.horizons.index(horizon)

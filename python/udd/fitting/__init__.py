@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from .fit import Fit, extend, fit, fit_record, held_cost, information_for, loosened
+from .fit import extend, fit, fit_record
+from .problem import Fit
 from .record import Record, record_of
+from .solve import held_cost, information_for, loosened
 
 __all__ = [
     "Fit",

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
-import tempfile
-from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from udd.files import write_whole
 
 from .table import Measurement, MeasurementError
 
@@ -22,19 +22,15 @@ def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:
     table = numbers(m)
     flagged = bool((m.flag != "").any())
 
-    def write(file: IO[bytes]) -> None:
-        lines = [f"# {key} = {_text(key, value)}" for key, value in m.meta.items()]
-        lines.append(",".join([*table, *(["flag"] if flagged else [])]))
-        file.write(("\n".join(lines) + "\n").encode())
-        for i, row in enumerate(zip(*(column.tolist() for column in table.values()), strict=True)):
-            cells = [
-                "" if math.isnan(x) else repr(x) for x in row
-            ]  # repr: the shortest text that reads back exactly
-            if flagged:
-                cells.append(_cell(str(m.flag[i])))
-            file.write((",".join(cells) + "\n").encode())
-
-    _whole(path, write)
+    lines = [f"# {key} = {_text(key, value)}" for key, value in m.meta.items()]
+    lines.append(",".join([*table, *(["flag"] if flagged else [])]))
+    for i, row in enumerate(zip(*(column.tolist() for column in table.values()), strict=True)):
+        # repr: the shortest text that reads back exactly
+        cells = ["" if math.isnan(x) else repr(x) for x in row]
+        if flagged:
+            cells.append(_cell(str(m.flag[i])))
+        lines.append(",".join(cells))
+    write_whole(path, ("\n".join(lines) + "\n").encode())
 
 
 def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
@@ -46,7 +42,9 @@ def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
     columns: dict[str, Any] = dict(numbers(m))
     columns["flag"] = [str(x) for x in m.flag]
     schema = {key: _text(key, value) for key, value in m.meta.items()}
-    _whole(path, lambda file: pq.write_table(pa.table(columns, metadata=schema), file))
+    buffer = io.BytesIO()
+    pq.write_table(pa.table(columns, metadata=schema), buffer)
+    write_whole(path, buffer.getvalue())
 
 
 def numbers(m: Measurement) -> dict[str, NDArray[np.float64]]:
@@ -87,22 +85,3 @@ def _cell(text: str) -> str:
     if any(c in text for c in ',"\n\r'):
         return '"' + text.replace('"', '""').replace("\n", " ").replace("\r", " ") + '"'
     return text
-
-
-def _whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None]) -> None:
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise MeasurementError(f"{target}: there is no folder {target.parent}")
-    if target.is_dir():
-        raise MeasurementError(f"{target} is a folder, not a file to write to")
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
-    except BaseException:
-        os.unlink(name)
-        raise

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from udd.fitting import Fit
-from udd.fitting.fit import levels, solve
+from udd.fitting.problem import levels
+from udd.fitting.solve import solve
 
 _FOLLOWS = 0.7  # of the noise's variance: above it the states merely follow each frame
 

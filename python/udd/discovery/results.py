@@ -1,0 +1,170 @@
+"""What a discovery found."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+from udd.effects import Effect
+from udd.fitting import Fit
+from udd.measurement import Measurement
+from udd.models import Model
+
+from .heldout import Errors, comparison_horizon
+from .scan import Scored
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that was added, with its numbers and its evidence.
+
+    Attributes
+    ----------
+    effect : Effect
+        With the fitted parameters (all data).
+    title, equation, expression : str
+        In prose, as the library writes it, and with the numbers in it.
+    parameters, errors : dict of str to float
+        The fitted parameters with standard errors.
+    chi2 : float
+        By how much chi2 fell when it was added, in units of the fit's scatter.
+    p : float
+        Probability of so large a fall by chance, all candidates counted.
+    ratio : tuple of float
+        Cost of the held-out frames after over before, all parameters held, with its 95 % interval.
+    """
+
+    effect: Effect
+    title: str
+    equation: str
+    expression: str
+    parameters: dict[str, float]
+    errors: dict[str, float]
+    chi2: float
+    p: float
+    ratio: tuple[float, float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "name": self.effect.name,
+            "momentum": self.effect.momentum,
+            "title": self.title,
+            "equation": self.equation,
+            "expression": self.expression,
+            "parameters": {n: {"value": v, "se": self.errors.get(n)} for n, v in self.parameters.items()},
+            "chi2": self.chi2,
+            "p": self.p,
+            "held_out_cost_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+        }
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A candidate that the data cannot tell from one that was chosen.
+
+    Attributes
+    ----------
+    instead_of : str
+        Name of the effect that it could replace.
+    effect : Effect
+    title, equation : str
+    nats : float
+        By how much worse it fits, in units of log-likelihood; negative where it fits better.
+    likeness : float
+        How alike the two act on these data, 0 to 1; 1 cannot be told apart at any length of record.
+    """
+
+    instead_of: str
+    effect: Effect
+    title: str
+    equation: str
+    nats: float
+    likeness: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "instead_of": self.instead_of,
+            "name": self.effect.name,
+            "momentum": self.effect.momentum,
+            "title": self.title,
+            "equation": self.equation,
+            "nats_worse": self.nats,
+            "likeness": self.likeness,
+        }
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """What a model lacks, given measured motion.
+
+    Attributes
+    ----------
+    verdict : str
+        ``"nothing missing"``, ``"effect identified"`` or ``"effect present, form not identified"``.
+    baseline, fit : Fit
+        The model without and with the added effects, each fitted to all data.
+    effects : list of Found
+        The effects that were added; empty when nothing is missing.
+    alternatives : list of Alternative
+        Candidates that the data cannot tell apart from the chosen ones.
+    error_before, error_after : Errors
+        The same held-out errors, of models fitted without the held-out data; the noise floor beside them.
+    ratio : tuple of float
+        Held-out error after over before, with its 95 % interval: of the disk at :func:`comparison_horizon`,
+        of a pendulum over the whole held-out part.
+    scans : list of list of Scored
+        What the score said of every candidate, for each round of the search, the best first.
+    looks : list of int
+        How many candidates each round looked at, every frequency counted.
+    measurement : Measurement
+    split : float
+        Time from which the data were held out, s.
+    """
+
+    verdict: str
+    baseline: Fit
+    fit: Fit
+    effects: list[Found]
+    alternatives: list[Alternative]
+    error_before: Errors
+    error_after: Errors
+    ratio: tuple[float, float, float]
+    scans: list[list[Scored]]
+    looks: list[int]
+    measurement: Measurement
+    split: float
+    trained: Fit = field(repr=False)
+
+    @property
+    def horizon(self) -> float | None:
+        """The horizon that `ratio` is taken at, s; None for the whole held-out part."""
+        return comparison_horizon(self.error_before) if self.error_before.unit == "m" else None
+
+    @property
+    def model(self) -> Model:
+        """The refitted model with the effects."""
+        return self.fit.model
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "verdict": self.verdict,
+            "effects": [found.to_dict() for found in self.effects],
+            "alternatives": [other.to_dict() for other in self.alternatives],
+            "error_before": self.error_before.to_dict(),
+            "error_after": self.error_after.to_dict(),
+            "held_out_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+            "horizon_s": self.horizon,
+            "held_out_from_s": self.split,
+            "baseline": self.baseline.to_dict(),
+            "fit": self.fit.to_dict(),
+        }
+
+    def report(self, path: str | os.PathLike[str], **details: Any) -> None:
+        """Write a page that a person reads: pictures first, one file. See :func:`udd.report.write`."""
+        from udd.report import write
+
+        write(self, path, **details)

@@ -1,0 +1,183 @@
+"""What a fit solves, and what it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.measurement import Measurement
+from udd.models import Model
+
+from .noise import Noise, colour
+from .parameters import Free
+from .record import Record
+
+Array = NDArray[np.float64]
+
+#: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]``
+#: in rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data,
+#: which is where the noise is estimated; at the tight end small effects show. A disk of LEGO is not held
+#: tighter than 10 um a frame: below that no film is without faults of its own.
+SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
+    "disk": (
+        (0.1, 1e-4, 1e-4, 1e-3),
+        (0.02, 3e-5, 3e-5, 3e-4),
+        (3e-3, 1e-5, 1e-5, 1e-4),
+    ),
+    "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5), (1e-4, 3e-6), (1e-5, 3e-7)),
+}
+_FRAME = 0.04
+
+
+def levels(kind: str) -> tuple[tuple[float, ...], ...]:
+    """The model's assumed error, loose to tight, per square root of a second."""
+    return tuple(tuple(q / _FRAME**0.5 for q in level) for level in SCHEDULE[kind])
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A measurement laid out for a model, with everything that a solve needs but its start."""
+
+    model: Model
+    record: Record
+    free: tuple[Free, ...]
+    noise: Noise
+    schedule: tuple[tuple[float, ...], ...]
+    diffusion: tuple[float, ...]
+
+    def arguments(
+        self, point: Point
+    ) -> tuple[
+        Model,
+        tuple[Array, Array, Array, NDArray[np.bool_]],
+        tuple[Array, Array, float],
+        list[tuple[str, int, float, float]],
+        list[float],
+    ]:
+        """What the core takes to describe a problem at a point."""
+        r = self.record
+        information = self.noise.information(r, point.states[:, 0])
+        return (
+            self.model.with_parameters(point.model),
+            (r.t, r.seen, information, r.linked),
+            (point.states, point.camera, point.clock),
+            [f.core for f in self.free],
+            list(self.diffusion),
+        )
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all unknowns: the states, the model's parameters, the camera's, and the clock's error."""
+
+    states: Array
+    model: Mapping[str, float]
+    camera: Array
+    clock: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model fitted to a measurement.
+
+    Attributes
+    ----------
+    model : Disk or Pendulum
+        With the fitted parameters.
+    parameters : dict of str to float
+        The free parameters, the camera's included.
+    errors : dict of str to float
+        Their standard errors.
+    covariance : ndarray (p, p)
+        In the order of `parameters`.
+    chi2, dof : float
+        Sum of squares in units of the assumed noise and model error, and what it should be.
+    converged : bool
+    measurement : Measurement
+    record : Record
+        The frames as the estimator saw them.
+    states : ndarray (n, d)
+        The state at each frame of `record`.
+    state_covariance : ndarray (n, d, d)
+    misfit, misfit_variance : ndarray (n, m)
+        What was seen less what was fitted, NaN where nothing was seen, and the variance of what was fitted.
+    defect : ndarray (n - 1, d)
+        By how much each state misses what the model makes of the one before, per second: the residual of each
+        equation. NaN where frames are not linked.
+    noise : Noise
+        The measurement's noise as the record shows it.
+    """
+
+    model: Model
+    parameters: dict[str, float]
+    errors: dict[str, float]
+    covariance: Array
+    chi2: float
+    dof: float
+    converged: bool
+    iterations: int
+    measurement: Measurement
+    record: Record
+    states: Array
+    state_covariance: Array
+    misfit: Array
+    misfit_variance: Array
+    defect: Array
+    noise: Noise
+    problem: Problem
+    point: Point
+
+    @property
+    def residuals(self) -> Array:
+        """What was seen less what was fitted, for every row of the measurement; NaN where not seen."""
+        rows = np.full((len(self.measurement), self.misfit.shape[1]), np.nan)
+        there = self.record.row >= 0
+        rows[self.record.row[there]] = self.misfit[there]
+        return rows
+
+    @property
+    def level(self) -> int:
+        """How tightly the model was held: the place of its assumed error in the schedule."""
+        return self.problem.schedule.index(self.problem.diffusion)
+
+    @property
+    def scatter(self) -> float:
+        """chi2 per degree of freedom: 1 where model and noise explain the data."""
+        return self.chi2 / self.dof
+
+    def inflation(self, before: Fit) -> float:
+        """By what a fall of chi2 from another fit is divided before it counts.
+
+        The scatter that remains, times how much stronger the misfits are at the frequencies where the two
+        differ.
+        """
+        sd = self.noise.sd(self.record, self.states[:, 0])
+        misfit, signature = self.misfit / sd, (before.misfit - self.misfit) / sd
+        return max(self.scatter, 1.0) * colour(misfit, signature)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads: parameters with errors, noise, goodness."""
+        return {
+            "model": repr(self.model),
+            "parameters": {n: {"value": v, "se": self.errors[n]} for n, v in self.parameters.items()},
+            "chi2": self.chi2,
+            "dof": self.dof,
+            "converged": self.converged,
+            "noise": {
+                name: {"factor": float(f), "per_rad_per_s": float(b)}
+                for name, f, b in zip(self.measurement.names, self.noise.factor, self.noise.blur, strict=True)
+            },
+        }
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:.2g}"
+            for name, value in self.parameters.items()
+        ]
+        verdict = "converged" if self.converged else "NOT converged"
+        head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
+        return "\n".join([head, *lines])
