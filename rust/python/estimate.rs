@@ -53,6 +53,9 @@ fn rows<const K: usize>(array: &PyReadonlyArray2<'_, f64>, what: &str) -> PyResu
 }
 
 fn record<const M: usize>((t, seen, information, linked): &Data<'_>) -> PyResult<Record<M>> {
+    if information.as_array().shape()[1..] != [M, M] {
+        return Err(PyValueError::new_err(format!("information must hold {M} x {M} matrices")));
+    }
     let record = Record {
         t: list(t),
         seen: rows::<M>(seen, "seen")?.into_iter().map(SVector::from).collect(),
@@ -205,6 +208,11 @@ fn score<'py>(
         groups: &[(F, Vec<f64>, Vec<Role>)],
     ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
+        let beyond =
+            |values: &[f64], role: &Role| matches!(role, Role::Model(index) if *index >= values.len());
+        if groups.iter().any(|(_, values, roles)| roles.iter().any(|role| beyond(values, role))) {
+            return Err(PyValueError::new_err("a candidate has no parameter of that number"));
+        }
         let score = interrupt::run(py, |_| estimator.score(&point, groups))?;
         let c = score.gradient.len();
         Ok((
