@@ -219,3 +219,12 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn an_end_that_is_no_number_fails() {
+    let disk = DiskFamily { effects: vec![], edge: false }.build(&[0.039, 0.08, 9.81, 0.012, 0.103, 0.055]);
+    for end in [f64::NAN, f64::INFINITY] {
+        let run = propagate(&disk, 0.0, end, [0.0, 1e-3, 0.04, 0.0], &Tolerance::default());
+        assert!(matches!(run, Err(Failure::NotFinite { .. })), "{run:?}");
+    }
+}

@@ -147,7 +147,8 @@ where
             if !accepted {
                 self.counts.rejected += 1;
                 self.h = h * factor;
-                if self.t + self.h == self.t || self.h.abs() < 1e-100 {
+                // A size that is not a number, as towards an end that is none, would never shrink.
+                if self.t + self.h == self.t || self.h.abs() < 1e-100 || !self.h.is_finite() {
                     return Err(if error.is_finite() {
                         Failure::StepUnderflow { t: self.t }
                     } else {

@@ -7,6 +7,7 @@
 use super::dense::Dense;
 use super::root::bracketed;
 use super::step::{Step, step};
+use super::tableau::STAGES;
 use crate::model::{Sides, System};
 use crate::scalar::Scalar;
 
@@ -110,7 +111,7 @@ where
     ) -> Option<(f64, Step<S, D>)> {
         let zero = ZERO * scale;
         let mut take = |size: f64| {
-            *evaluations += 6;
+            *evaluations += (STAGES - 1) as u64;
             let step = step(self.system, self.t, self.x, self.rate, size, self.sides);
             (self.value(target, self.t + size, &step.x), step)
         };
