@@ -34,10 +34,11 @@ pub struct Exponent {
 
 /// The largest exponent of the orbit from `x0`, the mean growth rate of a tangent vector.
 ///
-/// The tangent is the derivative part of a dual run, as accurate as the state. It is scaled back to length 1 at the end of
-/// every block; the blocks' growth rates give the mean and, from their scatter, its standard error. Where the first half of the blocks disagrees with the second by
-/// more than chance allows, the run was still on its way to the attractor and the first half is
-/// dropped. Blocks are merged in pairs as the run goes on, so memory stays bounded.
+/// The tangent is the derivative part of a dual run, as accurate as the state. It is scaled back to
+/// length 1 at the end of every block; the blocks' growth rates give the mean and, from their scatter,
+/// its standard error. Where the first half of the blocks disagrees with the second by more than chance
+/// allows, the run was still on its way to the attractor and the first half is dropped. Blocks are merged
+/// in pairs as the run goes on, so memory stays bounded.
 pub fn largest_exponent<M: System<Dual<f64, 1>, D>, const D: usize>(
     system: &M,
     x0: [f64; D],

@@ -215,6 +215,9 @@ macro_rules! library {
     ($($module:ident :: $Name:ident),+ $(,)?) => {
         $(mod $module; pub use $module::$Name;)+
 
+        // Else a model with the effect could not be built.
+        const _: () = { $(assert!($Name::SPEC.parameters.len() <= MAX_PARAMETERS);)+ };
+
         /// The effects in the library.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Kind { $($Name),+ }
