@@ -112,11 +112,6 @@ def lyapunov(
     standard_error : float or ndarray
         Where `with_error` is set: from the scatter of the means over blocks of the run.
 
-    Warns
-    -----
-    ConvergenceWarning
-        Where the standard error does not meet `tol` after the time `t`.
-
     Raises
     ------
     ModelError
@@ -125,6 +120,11 @@ def lyapunov(
         The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up.
     KeyboardInterrupt
         On Ctrl-C, at once.
+
+    Warns
+    -----
+    ConvergenceWarning
+        Where the standard error does not meet `tol` after the time `t`.
 
     Notes
     -----
