@@ -111,6 +111,12 @@ def test_a_short_record_is_refused():
         udd.discover(measured, udd.Disk(0.04))
 
 
+def test_a_record_too_short_for_a_forecast_is_refused():
+    measured, _states = simulated.film(udd.Disk(0.04), np.random.default_rng(1), 3.0)
+    with pytest.raises(FitError, match=r"too short for a forecast|hold no"):
+        udd.discover(measured, udd.Disk(0.04))
+
+
 @pytest.mark.parametrize(("name", "length", "most"), [("a", 1.47, 0.2), ("b", 1.13, 0.4)])
 def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most):
     """loop.md: quadratic drag lowers the held-out error 1.8 to 7.4 times; Coulomb friction is rejected."""

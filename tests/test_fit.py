@@ -115,6 +115,10 @@ def test_frames_keep_their_rows():
         ({"camera": ["focus"]}, "no parameter 'focus'"),
         ({"priors": {"R": (0.08, 0.001)}}, "R, which is not free"),
         ({"priors": {"k0": (0.01, 0.0)}}, "must be positive"),
+        ({"priors": {"k0": 3}}, "a mean and a standard deviation"),
+        ({"free": "k0"}, "lists of names"),
+        ({"free": ["k0", "k0"]}, "k0 is named twice"),
+        ({"measurement": 3}, "a measurement is needed"),
     ],
 )
 def test_bad_input_is_named(change, message):

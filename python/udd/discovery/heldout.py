@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from udd import _core
+from udd.errors import FitError
 from udd.fitting import Fit, Record, held_cost, information_for
 
 Array = NDArray[np.float64]
@@ -170,6 +171,8 @@ def _windows(
     t = record.t
     step = float(np.median(np.diff(t)))
     horizons = tuple(h for h in wanted if h <= (t[-1] - t[first]) / 3 and h >= step)
+    if not horizons:
+        raise FitError(f"the held-out {t[-1] - t[first]:.2g} s are too short for a forecast: film for longer")
     back, every = max(round(window / step), 6), max(round(_EVERY / step), 1)
     ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
     run = np.concatenate([[0], np.cumsum(~record.linked)])
@@ -178,6 +181,11 @@ def _windows(
         if run[start - back] == run[start + ahead[-1]]:
             windows.append((start - back, start))
             ends.append(start + ahead)
+    if not windows:
+        raise FitError(
+            f"the held-out {t[-1] - t[first]:.2g} s hold no {back * step + horizons[-1]:.2g} s "
+            "without a gap, which a forecast takes: film for longer"
+        )
     return np.array(windows, dtype=np.int64), np.array(ends, dtype=np.int64), horizons
 
 

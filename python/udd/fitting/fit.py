@@ -75,6 +75,8 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
+    if not isinstance(measurement, Measurement):
+        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     return fit_record(measurement, record_of(measurement), model, free, camera=camera, priors=priors)
 
 

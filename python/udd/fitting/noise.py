@@ -56,8 +56,9 @@ class Noise:
 
     def beyond(self, record: Record, omega: Array, factor: float) -> bool:
         """Whether any channel is noisier than stated by more than a factor, in the median."""
-        ratio = np.where(record.observed, self.sd(record, omega) / record.sigma, np.nan)
-        return bool((np.nanmedian(ratio, axis=0) > factor).any())
+        sd, seen = self.sd(record, omega), record.observed
+        ratios = [sd[use, m] / record.sigma[use, m] for m, use in enumerate(seen.T)]
+        return any(float(np.median(ratio)) > factor for ratio in ratios)
 
     def like(self, other: Noise, record: Record, omega: Array) -> bool:
         """Whether two noises agree to 3 % in the median."""

@@ -86,10 +86,15 @@ def free_parameters(
         spread = {n: s if s > 0 else np.inf for n, s in spread.items()}
     elif isinstance(model, Pendulum):
         spread = {n: s * abs(values[n]) if np.isfinite(s) else np.inf for n, s in PENDULUM.items()}
+    if isinstance(free, str) or isinstance(camera, str):
+        raise FitError("free and camera are lists of names, not a name")
     names = list(spread) + [n for n in values if n in amplitudes] if free is None else list(free)
     kind = "disk" if isinstance(model, Disk) else "pendulum"
     known = {**CAMERA[kind], **({"clock": CLOCK} if kind == "disk" else {})}
     wanted = list(known) if camera is True else [] if camera is False else list(camera)
+    twice = {name for name in [*names, *wanted] if [*names, *wanted].count(name) > 1}
+    if twice:
+        raise FitError(f"{', '.join(sorted(twice))} is named twice")
     for name in names:
         if name not in values:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(values)}")
@@ -107,7 +112,10 @@ def free_parameters(
         role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
         result.append(Free(name, role, index, 0.0, known[name]))
     given = dict(priors or {})
-    for name, (mean, sd) in given.items():
+    for name, prior in given.items():
+        if not (isinstance(prior, (tuple, list)) and len(prior) == 2):
+            raise FitError(f"the prior of {name} must be a mean and a standard deviation, not {prior!r}")
+        mean, sd = prior
         if not (np.isfinite(mean) and sd > 0):
             raise FitError(
                 f"the prior of {name} needs a finite mean and a standard deviation that must be positive"

@@ -79,7 +79,8 @@ def tighten(
         if best is not None and not result.converged:
             break
         best, point = result, result.point
-    assert best is not None
+    if best is None:
+        raise FitError("the fit has no level to solve at")
     return best
 
 

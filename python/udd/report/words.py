@@ -9,8 +9,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-#: From this likeness on, no length of record at one drive tells two effects apart.
-IDENTICAL = 0.9999
+from udd.discovery.discover import SAME as IDENTICAL
 
 _SYMBOLS = (
     (r"\bOmega\b", "Ω"),
