@@ -4,7 +4,8 @@ use std::cell::Cell;
 
 use proptest::prelude::*;
 use udd::integrate::{Driver, Ending, Failure, Tolerance, propagate};
-use udd::model::{Disk, DiskFamily, Family, Sides, System};
+use udd::model::effects::{Effect, Kind};
+use udd::model::{Disk, DiskFamily, Family, PendulumFamily, Sides, System};
 use udd::scalar::{Dual, Scalar};
 
 fn disk(w: f64, edge: bool) -> Disk<f64> {
@@ -226,5 +227,32 @@ fn an_end_that_is_no_number_fails() {
     for end in [f64::NAN, f64::INFINITY] {
         let run = propagate(&disk, 0.0, end, [0.0, 1e-3, 0.04, 0.0], &Tolerance::default());
         assert!(matches!(run, Err(Failure::NotFinite { .. })), "{run:?}");
+    }
+}
+
+/// A disk or a pendulum that comes to rest stays on the surface `Omega = 0` to within rounding: the run
+/// goes on all the same, whatever the tolerance.
+#[test]
+fn rest_is_no_obstacle() {
+    let disk = DiskFamily { effects: Vec::new(), edge: false };
+    let mut seed = 11u64;
+    let mut uniform = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    for k in 0..600 {
+        let tolerance = Tolerance { rtol: [1e-9, 1e-7, 1e-6][k % 3], atol: [1e-12, 1e-10, 1e-9][k % 3] };
+        let built = disk.build(&[[0.0, 1e-6, 1e-4][k % 3], 0.08, 9.81, 0.012, 0.103, 0.055]);
+        let start = [2.0 * uniform(), 0.1 * uniform(), 0.1 * uniform(), 0.0];
+        let end = propagate(&built, 0.0, 60.0, start, &tolerance);
+        assert!(end.is_ok(), "{start:?}: {end:?}");
+    }
+    let dry = Effect { kind: Kind::Coulomb, momentum: None };
+    let pendulum = PendulumFamily { effects: vec![dry] }.build(&[0.3, 0.09, 9.81, 0.05, 0.01, 0.05]);
+    for k in 0..40 {
+        let tolerance = Tolerance { rtol: 1e-8, atol: [1e-9, 1e-12][k % 2] };
+        let end = propagate(&pendulum, 0.0, 200.0, [0.0, 2.0 * uniform()], &tolerance).unwrap();
+        // Dry friction smoothed over eps lets it creep to the bottom.
+        assert!(end[0].abs() < 1e-6, "{end:?}");
     }
 }

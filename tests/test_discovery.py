@@ -75,6 +75,22 @@ def test_an_effect_outside_the_library_is_not_denied():
     assert found.verdict == "effect present, form not identified"
 
 
+def test_the_clock_may_start_anywhere():
+    truth = udd.Disk(0.045, effects=[E.drive_ripple(a=0.05, f=1.3)])
+    measured, _states = simulated.film(truth, np.random.default_rng(5), 30.0)
+    at = [udd.discover(udd.Measurement(measured.t + t0, measured.values), udd.Disk(0.045)) for t0 in (0, 500)]
+    assert [f.effect.name for f in at[0].effects] == ["drive_ripple"]
+    # The same but for the rounding of the times.
+    for name in ("a", "b", "f"):
+        assert at[1].effects[0].parameters[name] == pytest.approx(at[0].effects[0].parameters[name], rel=1e-4)
+    assert at[1].split == pytest.approx(at[0].split + 500)
+
+
+def test_a_disk_without_drive_comes_to_rest():
+    measured, _states = simulated.film(udd.Disk(0.0), np.random.default_rng(0), 20.0)
+    assert udd.discover(measured, udd.Disk(0.0)).verdict == "nothing missing"
+
+
 def test_two_effects_are_found():
     truth = udd.Disk(0.045, effects=[E.relaxation(b=5.0), E.quadratic_drag(c=4e-4)])
     measured, _states = simulated.film(truth, np.random.default_rng(8), 60.0)

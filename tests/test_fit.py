@@ -106,6 +106,16 @@ def test_frames_keep_their_rows():
     assert not record.observed[record.row == -1].any()
 
 
+def test_a_wrapped_angle_is_followed():
+    t = np.arange(0, 20, 0.05)
+    theta = udd.simulate(udd.Pendulum(0.5, k0=0.002), t, [12.0, 0.0]).state[:, 1]
+    noisy = theta + 2e-3 * np.random.default_rng(1).standard_normal(len(t))
+    assert np.ptp(theta) > 20  # it goes round
+    wrapped = (noisy + np.pi) % (2 * np.pi) - np.pi
+    f = udd.fit(udd.Measurement(t, {"theta": wrapped}), udd.Pendulum(0.5, k0=0.01))
+    assert abs(f.parameters["k0"] - 0.002) < 4.5 * f.errors["k0"]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

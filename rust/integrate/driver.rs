@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use super::control::{Controller, initial_step};
 use super::dense::Dense;
-use super::landing::{Find, Target, Watch};
+use super::landing::{Find, NOISE, Target, Watch};
 use super::step::{Step, step};
 use super::tableau::STAGES;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
@@ -56,6 +56,8 @@ pub struct Driver<'a, M, S: Scalar, const D: usize, E = Tolerance> {
     last: Step<S, D>,
     /// Sides changed since time last moved on.
     flips: usize,
+    /// The state is on a surface to within rounding, which leaves its side open.
+    undecided: bool,
     /// The work so far.
     pub counts: Counts,
 }
@@ -93,6 +95,7 @@ where
             size: 0.0,
             last,
             flips: 0,
+            undecided: false,
             counts,
         }
     }
@@ -140,6 +143,8 @@ where
             let remaining = end - self.t;
             let cut = self.h.abs() * 1.01 >= remaining.abs();
             let h = if cut { remaining } else { self.h };
+            // A short step leads away from a surface that rounding does not let go of.
+            let (h, cut) = if self.undecided { (h * 0.1, false) } else { (h, cut) };
             let trial = step(self.system, self.t, &self.x, &self.rate, h, &self.sides);
             self.counts.evaluations += (STAGES - 1) as u64;
             let error = self.norm.of_step(&self.x, &trial, h);
@@ -160,11 +165,20 @@ where
             // A step cut short at the end says little about a long one.
             self.h = if cut { (h * factor).abs().max(self.h.abs()).copysign(h) } else { h * factor };
 
+            if self.undecided {
+                // All laws are continuous: on the surface both sides are the same to rounding.
+                self.h = h * factor.max(1.0) * 10.0;
+                self.undecided = false;
+                self.commit(h, trial, None);
+                self.sides = sides_of(self.system, S::lift(self.t), &self.x);
+                self.refresh();
+                return Ok(Ending::Free);
+            }
             if self.system.surfaces() == 0 && !self.wall {
                 self.commit(h, trial, cut.then_some(end));
                 return Ok(Ending::Free);
             }
-            if let Some(ending) = self.examine(h, trial, cut.then_some(end))? {
+            if let Some(ending) = self.examine(h, trial, cut.then_some(end)) {
                 return Ok(ending);
             }
         }
@@ -172,7 +186,7 @@ where
 
     /// Commits the trial step as far as the first target; `None` where it must be taken again
     /// because it started on the wrong side.
-    fn examine(&mut self, h: f64, trial: Step<S, D>, end: Option<f64>) -> Result<Option<Ending>, Failure> {
+    fn examine(&mut self, h: f64, trial: Step<S, D>, end: Option<f64>) -> Option<Ending> {
         let watch = Watch {
             system: self.system,
             t: self.t,
@@ -180,36 +194,38 @@ where
             rate: &self.rate,
             sides: &self.sides,
             wall: self.wall,
+            noise: NOISE.max(self.norm.state().atol),
         };
         let start = from_fn(|n| self.x[n].real());
         let dense = Dense::from_stages(&start, |i, n| trial.stages[i][n].real(), h);
         let (target, theta, high, scale) = match watch.find(&dense, h) {
             Find::Clear => {
                 self.commit(h, trial, end);
-                return Ok(Some(Ending::Free));
+                return Some(Ending::Free);
             }
             Find::Stale(target) => {
                 let moved = self.size != 0.0 && self.flips == 0;
                 self.rest();
-                return self.cross(target).map(|ending| (moved || ending == Ending::Wall).then_some(ending));
+                let ending = self.cross(target);
+                return (moved || ending == Ending::Wall).then_some(ending);
             }
             Find::Crossing { target, theta, high, scale } => (target, theta, high, scale),
         };
         match watch.land((target, theta, high, scale), &dense, h, &mut self.counts.evaluations) {
             Some((size, landed)) => {
                 self.commit(size, landed, None);
-                self.cross(target).map(Some)
+                Some(self.cross(target))
             }
             None if high == 1.0 => {
                 self.commit(h, trial, end);
-                Ok(Some(Ending::Free))
+                Some(Ending::Free)
             }
             None => {
                 let size = high * h;
                 let short = step(self.system, self.t, &self.x, &self.rate, size, &self.sides);
                 self.counts.evaluations += (STAGES - 1) as u64;
                 self.commit(size, short, None);
-                Ok(Some(Ending::Free))
+                Some(Ending::Free)
             }
         }
     }
@@ -235,15 +251,17 @@ where
     }
 
     /// Changes the side of the target that the state is on.
-    fn cross(&mut self, target: Target) -> Result<Ending, Failure> {
-        let Target::Surface(j) = target else { return Ok(Ending::Wall) };
+    fn cross(&mut self, target: Target) -> Ending {
+        let Target::Surface(j) = target else { return Ending::Wall };
         self.flips += 1;
         if self.flips > 2 * MAX_SURFACES {
-            return Err(Failure::Chattering { t: self.t });
+            self.undecided = true;
+            self.flips = 0;
+            return Ending::Free;
         }
         self.sides[j] = !self.sides[j];
         self.refresh();
-        Ok(Ending::Surface(j))
+        Ending::Surface(j)
     }
 
     fn refresh(&mut self) {

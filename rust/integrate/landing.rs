@@ -35,7 +35,7 @@ const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
-const NOISE: f64 = 1e-14;
+pub const NOISE: f64 = 1e-14;
 
 /// A system on the way from one step to the next: what is looked at, and from where.
 pub struct Watch<'a, M, S: Scalar, const D: usize> {
@@ -45,6 +45,8 @@ pub struct Watch<'a, M, S: Scalar, const D: usize> {
     pub rate: &'a [S; D],
     pub sides: &'a Sides<S>,
     pub wall: bool,
+    /// A surface whose function stays below this in a step is left alone: the step's error is larger.
+    pub noise: f64,
 }
 
 impl<M, S, const D: usize> Watch<'_, M, S, D>
@@ -77,7 +79,7 @@ where
                 values[i] = self.value(target, self.t + PROBES[i] * h, &states[i]);
                 scale = scale.max(values[i].abs());
             }
-            if scale < NOISE && target != Target::Wall {
+            if scale < self.noise && target != Target::Wall {
                 continue;
             }
             let Some(i) = values.iter().position(|&v| v < 0.0) else { continue };

@@ -98,8 +98,6 @@ pub enum Failure {
     StepUnderflow { t: f64 },
     #[error("more than {limit} steps were needed; the run stopped at t = {t}")]
     TooManySteps { t: f64, limit: u64 },
-    #[error("the law switches back and forth without end at t = {t}")]
-    Chattering { t: f64 },
     #[error("the disk left the wheels at t = {t}")]
     LeftDomain { t: f64 },
     #[error("interrupted")]

@@ -18,7 +18,7 @@ TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
 #: one drive.
 SAME = 0.9999
-_UNEXPLAINED = 2.0  # chi2 per degree of freedom above which a model does not explain its data, whatever lacks
+_UNEXPLAINED = 2.5  # chi2 per degree of freedom above which a model does not explain its data, whatever lacks
 _SHORTEST = 60  # frames
 
 
@@ -40,7 +40,7 @@ def discover(
     parameters held, the 95 % interval of the costs' ratio excludes 1, and at no horizon do forecasts get
     worse. All coefficients are refitted and the search goes on; single effects that do not pass are tried in
     pairs. Forms that the data cannot tell apart are named. Where no effect passes but the model does not
-    explain the data (chi2 per degree of freedom above 2), an effect is present that the library does not
+    explain the data (chi2 per degree of freedom above 2.5), an effect is present that the library does not
     hold.
 
     Parameters
@@ -112,7 +112,7 @@ def discover(
         scans=scans,
         looks=search.looks,
         measurement=measurement,
-        split=float(record.t[first]),
+        split=record.origin + float(record.t[first]),
         trained=trained,
     )
 

@@ -78,6 +78,18 @@ class Trial:
         return self.fit.chi2 / unit + price * sum(c.parameters for c in self.candidates)
 
     @property
+    def needed(self) -> bool:
+        """Whether each of the candidates is needed beside the others."""
+        names = list(self.fit.parameters)
+        for candidate in self.candidates:
+            own = [names.index(name) for name in candidate.amplitude_names]
+            a = np.array([self.fit.parameters[names[k]] for k in own])
+            block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
+            if a @ np.linalg.solve(block, a) < chi2.isf(ALPHA, len(own)):
+                return False
+        return True
+
+    @property
     def physical(self) -> bool:
         """Whether all amplitudes lie in their ranges."""
         values, errors = self.fit.parameters, self.fit.errors
@@ -177,7 +189,7 @@ class Search:
         """The best trial that passes all tests."""
         # chi2 compares only where the model is held equally tightly; a form that cannot be is worse.
         tightest = max((t.fit.level for t in trials), default=0)
-        trials = [t for t in trials if t.fit.level == tightest >= current.part.level]
+        trials = [t for t in trials if t.fit.level == tightest >= current.part.level and t.needed]
         if not trials:
             return None
         held = self.record.part(slice(self.first, None))
@@ -195,7 +207,10 @@ class Search:
             p = min(float(chi2.sf(fall, len(trial.amplitudes))) * looks, 1.0)
             if p >= ALPHA:
                 continue
-            after = self.errors(trial.fit)
+            try:
+                after = self.errors(trial.fit)
+            except FitError:
+                continue
             if not self._worse(current.errors, after):
                 others = self._alternatives(trial, trials, scanned, unit)
                 return Step(trial.candidates, fall, p, ratio, others), State(trial.fit, whole.fit, after)

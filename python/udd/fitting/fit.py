@@ -37,7 +37,7 @@ def fit(
     Unknown are the state at every frame, the model's free parameters and the camera's; minimised is the sum
     of the squared misfits in units of the noise and of the squared model errors in units of an assumed one,
     which is lowered in steps (weak-constraint multiple shooting). No data are differentiated, and chaotic
-    records of any length can be fitted.
+    records of any length can be fitted. The model's time counts from the measurement's first row.
 
     Parameters
     ----------

@@ -23,8 +23,8 @@ class Record:
     Attributes
     ----------
     t : ndarray (n,)
-        Time of each frame, s. Frames that were missing in short gaps are put in, so that no flow runs for
-        long.
+        Time of each frame since the measurement's first row, s. Frames that were missing in short gaps are
+        put in, so that no flow runs for long.
     seen : ndarray (n, m)
         What was seen; 0 where it was not.
     sigma : ndarray (n, m)
@@ -37,6 +37,9 @@ class Record:
         A first guess of the states.
     row : ndarray of int (n,)
         The measurement's row that a frame came from; -1 where it was put in.
+    origin : float
+        The measurement's time of its first row, s, from which the model's time counts: a drift's drive and a
+        ripple's phase are those at the record's start.
     """
 
     t: Array
@@ -46,6 +49,7 @@ class Record:
     linked: NDArray[np.bool_]
     states: Array
     row: NDArray[np.int64]
+    origin: float
 
     def part(self, frames: slice) -> Record:
         """The frames in a slice with step 1."""
@@ -77,9 +81,11 @@ def record_of(measurement: Measurement) -> Record:
     values, seen = measurement.values, measurement.seen
     if seen.sum() < 10:
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")
-    step = float(np.median(np.diff(measurement.t[seen])))
+    origin = float(measurement.t[0])
+    times = measurement.t[seen] - origin
+    step = float(np.median(np.diff(times)))
     longest = max(0.5, 3.5 * step)
-    t, row, linked = _fill(measurement.t[seen], np.flatnonzero(seen), step, longest)
+    t, row, linked = _fill(times, np.flatnonzero(seen), step, longest)
 
     channels = values.shape[1]
     there = row >= 0
@@ -93,8 +99,11 @@ def record_of(measurement: Measurement) -> Record:
         sigma[there] = measurement.sigma[row[there]]
         covariance = measurement.covariance()[row[there]]
         rho[there] = covariance / (sigma[there][:, :, None] * sigma[there][:, None, :])
-    guess = np.column_stack([np.interp(t, t[there], full[there, m]) for m in range(channels)])
-    return Record(t, full, sigma, rho, linked, _states(t, guess, linked), row)
+    known = full[there].copy()
+    if np.ptp(known[:, -1]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
+        known[:, -1] = np.unwrap(known[:, -1])
+    guess = np.column_stack([np.interp(t, t[there], known[:, m]) for m in range(channels)])
+    return Record(t, full, sigma, rho, linked, _states(t, guess, linked), row, origin)
 
 
 def _fill(

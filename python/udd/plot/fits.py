@@ -110,7 +110,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     sd = fit.noise.sd(fit.record, fit.states[:, 0])[:, k]
     there = np.isfinite(sd)
     ax = new_axes(ax)
-    t = fit.record.t
+    t = fit.record.t + fit.record.origin
     ax.fill_between(
         t[there],
         -2 * factor * sd[there],
@@ -140,7 +140,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
 def coordinates(fit: Any) -> dict[str, Array]:
     """What a residual can be drawn against, at the frame that each flow starts from."""
     columns = dict(zip(fit.model.state_names, fit.states[:-1].T, strict=True))
-    result = {"t": fit.record.t[:-1], **columns}
+    result = {"t": fit.record.t[:-1] + fit.record.origin, **columns}
     if "Z" in columns:
         result["R"] = np.hypot(columns["Y"], columns["Z"])
     return result

@@ -95,7 +95,7 @@ def fitted(fit: Any) -> Motion:
     columns = dict(zip(fit.model.state_names, fit.states.T, strict=True))
     for k, name in enumerate(fit.measurement.names):
         columns[name] = fit.record.seen[:, k] - fit.misfit[:, k]
-    return Motion("fitted", fit.record.t, columns, fit.model, _radius(fit.model))
+    return Motion("fitted", fit.record.t + fit.record.origin, columns, fit.model, _radius(fit.model))
 
 
 def only(result: Any) -> Motion:

@@ -67,17 +67,19 @@ def forecast(discovery: Any) -> Forecast:
     """From the first held-out frame on: a disk's first seconds, a pendulum's last ones of the whole run."""
     fit, m = discovery.fit, discovery.measurement
     t = fit.record.t
-    first = min(int(np.searchsorted(t, discovery.split)), len(t) - 2)
+    origin = fit.record.origin
+    first = min(int(np.searchsorted(t, discovery.split - origin)), len(t) - 2)
     if m.kind == "disk":
         shown_from, end = t[first] - _BEFORE, min(t[first] + _SHOWN["disk"], t[-1])
     else:
         shown_from, end = max(t[-1] - _SHOWN["pendulum"], t[first]), t[-1]
     times = np.arange(t[first] + _STEP, end, _STEP)
     before, after = (_predicted(f, first, times) for f in (discovery.baseline, fit))
-    shown = m.slice(shown_from, end)
+    shown = m.slice(shown_from + origin, end + origin)
     seen = np.where(shown.seen[:, None], shown.values, np.nan)
     late = times >= shown_from
-    return Forecast(float(t[first]), shown.t, seen, times[late], before[late], after[late])
+    times_seen, start = times[late] + origin, float(t[first]) + origin
+    return Forecast(start, shown.t, seen, times_seen, before[late], after[late])
 
 
 def _predicted(fit: Any, first: int, times: Array) -> Array:
