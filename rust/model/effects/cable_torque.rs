@@ -1,6 +1,6 @@
 //! A cable or thread that winds up with the disk's orientation.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// A cable or thread that winds up with the disk's orientation.
 pub struct CableTorque;
@@ -15,20 +15,8 @@ impl Law for CableTorque {
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[
-            EffectParameter {
-                name: "kappa",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (0.0, f64::INFINITY),
-                role: Role::Amplitude,
-            },
-            EffectParameter {
-                name: "c",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (f64::NEG_INFINITY, f64::INFINITY),
-                role: Role::Amplitude,
-            },
+            EffectParameter::amplitude("kappa", "m^2/s^2").within(0.0, f64::INFINITY),
+            EffectParameter::amplitude("c", "m^2/s^2"),
         ],
     };
 

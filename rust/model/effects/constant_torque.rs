@@ -1,6 +1,6 @@
 //! A torque that never changes.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// A torque that never changes.
 pub struct ConstantTorque;
@@ -14,13 +14,7 @@ impl Law for ConstantTorque {
         bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter {
-            name: "c",
-            unit: "m^2/s^2",
-            default: 0.0,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("c", "m^2/s^2")],
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
 pub struct Coulomb;
@@ -15,20 +15,8 @@ impl Law for Coulomb {
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[
-            EffectParameter {
-                name: "c",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (0.0, f64::INFINITY),
-                role: Role::Amplitude,
-            },
-            EffectParameter {
-                name: "eps",
-                unit: "rad/s",
-                default: 0.05,
-                range: (1e-4, 1.0),
-                role: Role::Shape(&[0.05]),
-            },
+            EffectParameter::amplitude("c", "m^2/s^2").within(0.0, f64::INFINITY),
+            EffectParameter::shape("eps", "rad/s", 0.05, &[0.05]).within(1e-4, 1.0),
         ],
     };
 

@@ -1,6 +1,6 @@
 //! Drag that grows with the cube of the speed.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// Drag that grows with the cube of the speed.
 pub struct CubicDrag;
@@ -14,13 +14,7 @@ impl Law for CubicDrag {
         bodies: &[Body::Disk, Body::Pendulum],
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter {
-            name: "c",
-            unit: "m^2 s",
-            default: 0.0,
-            range: (0.0, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("c", "m^2 s").within(0.0, f64::INFINITY)],
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! A drive speed that drifts steadily, as on an emptying battery.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// A drive speed that drifts steadily, as on an emptying battery.
 pub struct DriveDrift;
@@ -14,13 +14,7 @@ impl Law for DriveDrift {
         bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
-        parameters: &[EffectParameter {
-            name: "a",
-            unit: "1/s",
-            default: 0.0,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("a", "1/s")],
     };
 
     #[inline(always)]

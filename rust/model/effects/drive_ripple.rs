@@ -1,6 +1,6 @@
 //! A drive speed that varies periodically at a frequency of its own.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// A drive speed that varies periodically at a frequency of its own.
 pub struct DriveRipple;
@@ -15,15 +15,9 @@ impl Law for DriveRipple {
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
         parameters: &[
-            EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
-            EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
-            EffectParameter {
-                name: "f",
-                unit: "Hz",
-                default: 1.0,
-                range: (0.01, 12.0),
-                role: Role::Frequency,
-            },
+            EffectParameter::amplitude("a", "").within(-1.0, 1.0),
+            EffectParameter::amplitude("b", "").within(-1.0, 1.0),
+            EffectParameter::frequency("f", "Hz", 1.0).within(0.01, 12.0),
         ],
     };
 

@@ -1,6 +1,6 @@
 //! A disk whose mass is not centred: gravity's torque follows its orientation.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// A disk whose mass is not centred: gravity's torque follows its orientation.
 pub struct EccentricMass;
@@ -15,20 +15,8 @@ impl Law for EccentricMass {
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[
-            EffectParameter {
-                name: "a",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (f64::NEG_INFINITY, f64::INFINITY),
-                role: Role::Amplitude,
-            },
-            EffectParameter {
-                name: "b",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (f64::NEG_INFINITY, f64::INFINITY),
-                role: Role::Amplitude,
-            },
+            EffectParameter::amplitude("a", "m^2/s^2"),
+            EffectParameter::amplitude("b", "m^2/s^2"),
         ],
     };
 

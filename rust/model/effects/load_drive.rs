@@ -1,6 +1,6 @@
 //! A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
 pub struct LoadDrive;
@@ -14,13 +14,7 @@ impl Law for LoadDrive {
         bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
-        parameters: &[EffectParameter {
-            name: "a",
-            unit: "",
-            default: 0.0,
-            range: (0.0, 10.0),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("a", "").within(0.0, 10.0)],
     };
 
     #[inline(always)]

@@ -135,6 +135,33 @@ pub struct EffectParameter {
     pub role: Role,
 }
 
+impl EffectParameter {
+    const fn new(name: &'static str, unit: &'static str, default: f64, role: Role) -> Self {
+        Self { name, unit, default, range: (f64::NEG_INFINITY, f64::INFINITY), role }
+    }
+
+    /// What the effect is proportional to; zero by default, and of any size and sign.
+    pub const fn amplitude(name: &'static str, unit: &'static str) -> Self {
+        Self::new(name, unit, 0.0, Role::Amplitude)
+    }
+
+    /// What shapes the formula, with the value taken by default and those that a scan tries.
+    pub const fn shape(name: &'static str, unit: &'static str, default: f64, tried: &'static [f64]) -> Self {
+        Self::new(name, unit, default, Role::Shape(tried))
+    }
+
+    /// A frequency, with the value taken by default.
+    pub const fn frequency(name: &'static str, unit: &'static str, default: f64) -> Self {
+        Self::new(name, unit, default, Role::Frequency)
+    }
+
+    /// The same with a physical range.
+    pub const fn within(mut self, low: f64, high: f64) -> Self {
+        self.range = (low, high);
+        self
+    }
+}
+
 /// What is said of an effect beside its formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spec {

@@ -1,6 +1,6 @@
 //! Friction that grows with the distance of the disk's centre from the contact.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// Friction that grows with the distance of the disk's centre from the contact.
 pub struct RadialFriction;
@@ -14,13 +14,7 @@ impl Law for RadialFriction {
         bodies: &[Body::Disk],
         slots: &[Slot::Friction],
         momenta: &[],
-        parameters: &[EffectParameter {
-            name: "c",
-            unit: "1/s",
-            default: 0.0,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("c", "1/s")],
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
 pub struct RadialSlip;
@@ -14,13 +14,7 @@ impl Law for RadialSlip {
         bodies: &[Body::Disk],
         slots: &[Slot::Lateral, Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter {
-            name: "c",
-            unit: "m/s",
-            default: 0.0,
-            range: (0.0, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("c", "m/s").within(0.0, f64::INFINITY)],
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
 pub struct Relaxation;
@@ -14,13 +14,7 @@ impl Law for Relaxation {
         bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter {
-            name: "b",
-            unit: "1/m",
-            default: 0.0,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("b", "1/m")],
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Slip of the disk between the wheels in proportion to the height of its centre.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// Slip of the disk between the wheels in proportion to the height of its centre.
 pub struct Slip;
@@ -14,13 +14,7 @@ impl Law for Slip {
         bodies: &[Body::Disk],
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Constraint, Momentum::Consistent],
-        parameters: &[EffectParameter {
-            name: "c",
-            unit: "1/s",
-            default: 0.0,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("c", "1/s")],
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Dry friction that fades with the speed over the width `fade`, smoothed over the width `eps`.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// Dry friction that fades with the speed over the width `fade`, smoothed over the width `eps`.
 pub struct Stribeck;
@@ -15,27 +15,9 @@ impl Law for Stribeck {
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[
-            EffectParameter {
-                name: "c",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (0.0, f64::INFINITY),
-                role: Role::Amplitude,
-            },
-            EffectParameter {
-                name: "fade",
-                unit: "rad/s",
-                default: 1.0,
-                range: (0.05, 20.0),
-                role: Role::Shape(&[0.3, 1.0, 3.0]),
-            },
-            EffectParameter {
-                name: "eps",
-                unit: "rad/s",
-                default: 0.05,
-                range: (1e-4, 1.0),
-                role: Role::Shape(&[0.05]),
-            },
+            EffectParameter::amplitude("c", "m^2/s^2").within(0.0, f64::INFINITY),
+            EffectParameter::shape("fade", "rad/s", 1.0, &[0.3, 1.0, 3.0]).within(0.05, 20.0),
+            EffectParameter::shape("eps", "rad/s", 0.05, &[0.05]).within(1e-4, 1.0),
         ],
     };
 

@@ -3,7 +3,7 @@
 //! A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
 //! are one and the same: the world turned by `a`.
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// Gravity and drive that are not parallel: an angle `a` between them.
 pub struct Tilt;
@@ -17,13 +17,7 @@ impl Law for Tilt {
         bodies: &[Body::Disk],
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[EffectParameter {
-            name: "a",
-            unit: "rad",
-            default: 0.0,
-            range: (-0.5, 0.5),
-            role: Role::Amplitude,
-        }],
+        parameters: &[EffectParameter::amplitude("a", "rad").within(-0.5, 0.5)],
     };
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 //! A warped disk, for example, is squeezed twice per turn by the wheels that hold it. The first
 //! harmonic is an [eccentric mass](super::EccentricMass).
 
-use super::{At, Body, EffectParameter, Law, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
 /// A disk that is not the same all round: a torque that repeats `n` times per turn.
 pub struct UnevenDisk;
@@ -18,27 +18,9 @@ impl Law for UnevenDisk {
         slots: &[Slot::Torque],
         momenta: &[],
         parameters: &[
-            EffectParameter {
-                name: "a",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (f64::NEG_INFINITY, f64::INFINITY),
-                role: Role::Amplitude,
-            },
-            EffectParameter {
-                name: "b",
-                unit: "m^2/s^2",
-                default: 0.0,
-                range: (f64::NEG_INFINITY, f64::INFINITY),
-                role: Role::Amplitude,
-            },
-            EffectParameter {
-                name: "n",
-                unit: "",
-                default: 2.0,
-                range: (2.0, 12.0),
-                role: Role::Shape(&[2.0, 3.0, 4.0]),
-            },
+            EffectParameter::amplitude("a", "m^2/s^2"),
+            EffectParameter::amplitude("b", "m^2/s^2"),
+            EffectParameter::shape("n", "", 2.0, &[2.0, 3.0, 4.0]).within(2.0, 12.0),
         ],
     };
 

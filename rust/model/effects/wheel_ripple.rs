@@ -1,6 +1,6 @@
 //! A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Role, Scalar, Slot, Slots, Spec};
+use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
 
 /// A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 pub struct WheelRipple;
@@ -15,15 +15,9 @@ impl Law for WheelRipple {
         slots: &[Slot::Vertical],
         momenta: &[Momentum::Consistent],
         parameters: &[
-            EffectParameter { name: "a", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
-            EffectParameter { name: "b", unit: "", default: 0.0, range: (-1.0, 1.0), role: Role::Amplitude },
-            EffectParameter {
-                name: "r",
-                unit: "m",
-                default: 0.03,
-                range: (1e-3, 0.3),
-                role: Role::Shape(&[0.03]),
-            },
+            EffectParameter::amplitude("a", "").within(-1.0, 1.0),
+            EffectParameter::amplitude("b", "").within(-1.0, 1.0),
+            EffectParameter::shape("r", "m", 0.03, &[0.03]).within(1e-3, 0.3),
         ],
     };
 
