@@ -184,6 +184,8 @@ fn solve<'py>(
     each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
 }
 
+/// A wider family with its values, and the roles of what it adds.
+type Group<F> = (F, Vec<f64>, Vec<Role>);
 /// Three arrays.
 type Three<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
@@ -205,7 +207,7 @@ fn score<'py>(
         (data, start): (&Data<'py>, &Start<'py>),
         free: &[FreeTuple],
         diffusion: &[f64],
-        groups: &[(F, Vec<f64>, Vec<Role>)],
+        groups: &[Group<F>],
     ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
         let beyond =
@@ -221,27 +223,31 @@ fn score<'py>(
             array(py, [c], score.alone.iter().copied())?,
         ))
     }
-    let roles = |indices: Vec<usize>| indices.into_iter().map(Role::Model).collect::<Vec<_>>();
-    let mixed = || PyValueError::new_err("a candidate is a model of another kind");
+    /// The candidates' families; all must be of the model's own kind.
+    fn groups<F>(
+        candidates: Vec<(Bound<'_, PyAny>, Vec<usize>)>,
+        own: impl Fn(AnyModel) -> Option<(F, Vec<f64>)>,
+    ) -> PyResult<Vec<Group<F>>> {
+        let one = |(model, indices): (Bound<'_, PyAny>, Vec<usize>)| {
+            let (family, values) = own(AnyModel::from_python(&model)?)
+                .ok_or_else(|| PyValueError::new_err("a candidate is a model of another kind"))?;
+            Ok((family, values, indices.into_iter().map(Role::Model).collect()))
+        };
+        candidates.into_iter().map(one).collect()
+    }
     match AnyModel::from_python(model)? {
         AnyModel::Disk(family, values) => {
-            let groups = candidates
-                .into_iter()
-                .map(|(m, indices)| match AnyModel::from_python(&m)? {
-                    AnyModel::Disk(f, v) => Ok((f, v, roles(indices))),
-                    _ => Err(mixed()),
-                })
-                .collect::<PyResult<Vec<_>>>()?;
+            let groups = groups(candidates, |m| match m {
+                AnyModel::Disk(family, values) => Some((family, values)),
+                _ => None,
+            })?;
             run((family, values, DiskCamera), py, (&data, &start), &free, &diffusion, &groups)
         }
         AnyModel::Pendulum(family, values) => {
-            let groups = candidates
-                .into_iter()
-                .map(|(m, indices)| match AnyModel::from_python(&m)? {
-                    AnyModel::Pendulum(f, v) => Ok((f, v, roles(indices))),
-                    _ => Err(mixed()),
-                })
-                .collect::<PyResult<Vec<_>>>()?;
+            let groups = groups(candidates, |m| match m {
+                AnyModel::Pendulum(family, values) => Some((family, values)),
+                _ => None,
+            })?;
             run((family, values, AngleSensor), py, (&data, &start), &free, &diffusion, &groups)
         }
         AnyModel::Dle(..) => Err(PyValueError::new_err("no camera sees the dimensionless equations")),

@@ -77,8 +77,6 @@ def discover(
     """
     tell = progress or (lambda _text: None)
     free = None if free is None else list(free)
-    if not isinstance(measurement, Measurement):
-        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     record = record_of(measurement)
     n = len(record.t)
     if n < _SHORTEST:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from udd.errors import FitError
-from udd.fitting import Fit, Record, extend, loosened
+from udd.fitting import Fit, Record, extend, held_cost, loosened
 
 from .candidates import Candidate, library
 from .heldout import (
@@ -193,13 +193,14 @@ class Search:
         if not trials:
             return None
         held = self.record.part(slice(self.first, None))
+        cost = held_cost(current.part, held)
         unit = min(trials, key=lambda t: t.fit.chi2).fit.inflation(current.part)
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit), 3))
         least = trials[0].criterion(unit)
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in trials if t.criterion(unit) - least <= 2 * NATS):
-            ratio = cost_improvement(current.part, trial.fit, held)
+            ratio = cost_improvement(cost, held_cost(trial.fit, held), held)
             whole = self._try(current.whole, trial.candidates, trial.amplitudes) if ratio[2] < 1.0 else None
             if whole is None or whole.fit.level < current.whole.level:
                 continue

@@ -15,12 +15,11 @@ from udd.models import Model
 
 from .noise import estimated, stated
 from .parameters import Free, free_parameters
-from .problem import Fit, Point, Problem, levels
+from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .solve import solve, tighten
 
 _NOISE_ROUNDS = 12
-_FOLLOWS = 0.7  # a fit whose leverage is larger follows each frame
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 
@@ -75,8 +74,6 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
-    if not isinstance(measurement, Measurement):
-        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     return fit_record(measurement, record_of(measurement), model, free, camera=camera, priors=priors)
 
 
@@ -154,9 +151,7 @@ def _estimate_noise(measurement: Measurement, problem: Problem, point: Point) ->
         result = solve(measurement, problem, point)
         point, before = result.point, problem.noise
         omega = point.states[:, 0]
-        seen = problem.record.observed
-        leverage = (result.misfit_variance / before.sd(problem.record, omega) ** 2)[seen]
-        if leverage.mean() > _FOLLOWS:
+        if result.leverage > FOLLOWS:
             return False, problem, point
         noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
         if measurement.sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):

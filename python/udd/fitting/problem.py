@@ -31,6 +31,8 @@ SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
     "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5), (1e-4, 3e-6), (1e-5, 3e-7)),
 }
 _FRAME = 0.04
+#: A fit whose leverage is larger follows each frame.
+FOLLOWS = 0.7
 
 
 def levels(kind: str) -> tuple[tuple[float, ...], ...]:
@@ -148,6 +150,12 @@ class Fit:
     def scatter(self) -> float:
         """chi2 per degree of freedom: 1 where model and noise explain the data."""
         return self.chi2 / self.dof
+
+    @property
+    def leverage(self) -> float:
+        """How closely the fit follows each frame: its variance in units of the noise's, in the mean."""
+        sd = self.noise.sd(self.record, self.states[:, 0])
+        return float((self.misfit_variance / sd**2)[self.record.observed].mean())
 
     def inflation(self, before: Fit) -> float:
         """By what a fall of chi2 from another fit is divided before it counts.

@@ -76,8 +76,10 @@ def record_of(measurement: Measurement) -> Record:
     Raises
     ------
     FitError
-        Where too few frames were seen.
+        Where it is no measurement, or too few frames were seen.
     """
+    if not isinstance(measurement, Measurement):
+        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     values, seen = measurement.values, measurement.seen
     if seen.sum() < 10:
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")

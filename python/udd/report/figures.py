@@ -17,7 +17,7 @@ from udd.plot import fits
 from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
 from . import runs
-from .loose import loosened
+from .loose import loosest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -113,7 +113,7 @@ def residuals(discovery: Any) -> Image:
     columns = [("the known model", discovery.baseline, BEFORE)]
     if discovery.effects:
         columns.append(("with the added effect", discovery.fit, AFTER))
-    columns = [(words, loosened(fit), colour) for words, fit, colour in columns]
+    columns = [(words, loosest(fit), colour) for words, fit, colour in columns]
     names = discovery.baseline.model.state_names
     figure = _figure(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.3 * len(names) + 0.3)
     axes = figure.subplots(len(names), len(columns), squeeze=False, sharey="row")
