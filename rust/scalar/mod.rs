@@ -1,14 +1,19 @@
 //! What a number is.
 //!
 //! Every model is written once, generic over [`Scalar`]. Run over `f64` it gives a trajectory; over
-//! [`Dual`] numbers it gives tangents and parameter sensitivities, exact to rounding; a packet of
-//! lanes would give many trajectories at once. Branches are therefore written with masks
+//! [`Dual`] numbers it gives tangents and parameter sensitivities, exact to rounding; over a [`Packet`]
+//! it gives many trajectories at once. Branches are therefore written with masks
 //! ([`Scalar::select`]) instead of `if`.
 
 mod dual;
+pub mod elementary;
+mod isa;
+mod packet;
 mod real;
 
 pub use dual::Dual;
+pub use isa::{Isa, Work};
+pub use packet::{LaneMask, Packet};
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -29,9 +34,9 @@ pub trait Scalar:
     + SubAssign
 {
     /// The number without its derivatives: the type of a step size or of time in the stepper.
-    type Real: Scalar<Mask = Self::Mask>;
+    type Real: Real<Mask = Self::Mask>;
     /// The outcome of a comparison, one truth value per lane.
-    type Mask: Copy + Debug + Send + Sync + PartialEq;
+    type Mask: Mask;
 
     /// A constant: its derivatives are zero.
     fn constant(value: f64) -> Self;
@@ -68,4 +73,54 @@ pub trait Scalar:
     fn square(self) -> Self {
         self * self
     }
+}
+
+/// A number without derivatives: one lane (`f64`) or several ([`Packet`]).
+pub trait Real: Scalar<Real = Self> {
+    /// How many trajectories it stands for.
+    const LANES: usize;
+
+    /// The number with these lanes.
+    fn from_lanes(lane: impl FnMut(usize) -> f64) -> Self;
+    /// Lane `i`.
+    fn lane(self, i: usize) -> f64;
+    /// Changes lane `i`.
+    fn set_lane(&mut self, i: usize, value: f64);
+    /// Each lane by itself. Meant for what is one machine instruction or a few without branches.
+    fn each(self, f: impl Fn(f64) -> f64) -> Self;
+    /// The same for pairs of lanes.
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self;
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.each(f64::abs)
+    }
+    /// The larger one; `other` where either is not a number.
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    /// The smaller one; `other` where either is not a number.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    /// True where it is neither infinite nor not a number.
+    #[inline(always)]
+    fn finite(self) -> Self::Mask {
+        self.abs().less(Self::constant(f64::INFINITY))
+    }
+}
+
+/// Truth values, one per lane.
+pub trait Mask: Copy + Debug + Send + Sync + PartialEq + 'static {
+    /// The mask with these lanes.
+    fn from_lanes(lane: impl FnMut(usize) -> bool) -> Self;
+    /// Lane `i`.
+    fn lane(self, i: usize) -> bool;
+    fn and(self, other: Self) -> Self;
+    fn or(self, other: Self) -> Self;
+    fn not(self) -> Self;
+    /// Whether any lane is true.
+    fn any(self) -> bool;
 }

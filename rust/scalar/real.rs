@@ -1,6 +1,6 @@
 //! `f64` as a [`Scalar`]: one lane, no derivatives.
 
-use super::Scalar;
+use super::{Mask, Real, Scalar, elementary};
 
 impl Scalar for f64 {
     type Real = f64;
@@ -44,22 +44,74 @@ impl Scalar for f64 {
     }
     #[inline(always)]
     fn exp(self) -> f64 {
-        f64::exp(self)
+        elementary::exp(self)
     }
     #[inline(always)]
     fn ln(self) -> f64 {
-        f64::ln(self)
+        elementary::ln(self)
     }
     #[inline(always)]
     fn sin(self) -> f64 {
-        f64::sin(self)
+        elementary::sin_cos(self).0
     }
     #[inline(always)]
     fn cos(self) -> f64 {
-        f64::cos(self)
+        elementary::sin_cos(self).1
     }
     #[inline(always)]
     fn tanh(self) -> f64 {
-        f64::tanh(self)
+        elementary::tanh(self)
+    }
+}
+
+impl Real for f64 {
+    const LANES: usize = 1;
+
+    #[inline(always)]
+    fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> f64 {
+        lane(0)
+    }
+    #[inline(always)]
+    fn lane(self, _i: usize) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, _i: usize, value: f64) {
+        *self = value;
+    }
+    #[inline(always)]
+    fn each(self, f: impl Fn(f64) -> f64) -> f64 {
+        f(self)
+    }
+    #[inline(always)]
+    fn zip(self, other: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
+        f(self, other)
+    }
+}
+
+impl Mask for bool {
+    #[inline(always)]
+    fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> bool {
+        lane(0)
+    }
+    #[inline(always)]
+    fn lane(self, _i: usize) -> bool {
+        self
+    }
+    #[inline(always)]
+    fn and(self, other: bool) -> bool {
+        self & other
+    }
+    #[inline(always)]
+    fn or(self, other: bool) -> bool {
+        self | other
+    }
+    #[inline(always)]
+    fn not(self) -> bool {
+        !self
+    }
+    #[inline(always)]
+    fn any(self) -> bool {
+        self
     }
 }
