@@ -15,7 +15,7 @@ pub use dle::{Dle, DleFamily};
 pub use effects::{Effect, Momentum};
 pub use pendulum::{Pendulum, PendulumFamily};
 
-use crate::scalar::Scalar;
+use crate::scalar::{Mask, Scalar};
 
 /// The most switching surfaces a model can have.
 pub const MAX_SURFACES: usize = 4;
@@ -44,6 +44,17 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         ""
     }
 
+    /// Passes surface `j`, on which the state lies, in the lanes `here`: changes its side and, where the
+    /// law asks for it, other sides and the state (a contact that comes to rest sticks).
+    fn switch(&self, j: usize, _t: S, _x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        sides[j] = choose(here, sides[j].not(), sides[j]);
+    }
+
+    /// Whether the rates or the state jump at surface `j`. Elsewhere the law is continuous.
+    fn jumps(&self, _j: usize) -> bool {
+        false
+    }
+
     /// The boundary of the model's domain: positive inside, and the run ends where it becomes zero.
     fn wall(&self, _x: &[S; D]) -> Option<S> {
         None
@@ -58,6 +69,12 @@ pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: 
         sides[j] = S::zero().less(value);
     }
     sides
+}
+
+/// `yes` in the lanes where `mask` is true, `no` in the others.
+#[inline(always)]
+pub fn choose<M: Mask>(mask: M, yes: M, no: M) -> M {
+    mask.and(yes).or(mask.not().and(no))
 }
 
 /// A parameter of a model or an effect.
