@@ -17,8 +17,10 @@ _PUBLIC = {
     "Discovery": "udd.discovery",
     "Disk": "udd.models",
     "Fit": "udd.fitting",
+    "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
     "Pendulum": "udd.models",
+    "SweepSpec": "udd.sweeping",
     "Trajectory": "udd.trajectory",
     "UddError": "udd.errors",
     "discover": "udd.discovery",
@@ -30,6 +32,7 @@ _PUBLIC = {
     "read_measurement": "udd.measurement",
     "render": "udd.film",
     "simulate": "udd.trajectory",
+    "sweep": "udd.sweeping",
     "track": "udd.tracking",
 }
 
@@ -42,6 +45,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
     from udd.errors import ConvergenceWarning as ConvergenceWarning
+    from udd.errors import IncompleteWarning as IncompleteWarning
     from udd.errors import UddError as UddError
     from udd.exponents import lyapunov as lyapunov
     from udd.film import render as render
@@ -52,6 +56,8 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.models import DLE as DLE
     from udd.models import Disk as Disk
     from udd.models import Pendulum as Pendulum
+    from udd.sweeping import SweepSpec as SweepSpec
+    from udd.sweeping.sweeps import sweep as sweep
     from udd.tracking import track as track
     from udd.trajectory import Trajectory as Trajectory
     from udd.trajectory import simulate as simulate

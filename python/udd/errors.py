@@ -21,3 +21,19 @@ class FitError(UddError):
 
 class ConvergenceWarning(UserWarning):
     """A result's error bar does not meet the tolerance asked for."""
+
+
+class IncompleteWarning(UserWarning):
+    """A result is returned without the parts that were not finished.
+
+    Parameters
+    ----------
+    message : str
+        What is missing, and why.
+    interrupted : bool
+        Whether the user stopped it.
+    """
+
+    def __init__(self, message: str, interrupted: bool = False) -> None:
+        super().__init__(message)
+        self.interrupted = interrupted

@@ -13,7 +13,14 @@ from udd.errors import UddError
 from .answer import Answer, as_json
 from .parser import make_parser
 
-_EXTRAS = {"av": "track", "cv2": "track"}
+# What need not be installed: the extra that brings it, and who needs it.
+_EXTRAS = {
+    "av": ("track", "films need"),
+    "cv2": ("track", "films need"),
+    "distributed": ("scale", "sweeps need"),
+    "xarray": ("scale", "sweeps need"),
+    "zarr": ("scale", "sweeps need"),
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,7 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         name = (error.name or "").partition(".")[0]
         if name not in _EXTRAS:
             raise
-        return _fail(f'{name} is not installed, which films need: pip install "udd[{_EXTRAS[name]}]"')
+        extra, needed = _EXTRAS[name]
+        return _fail(f'{name} is not installed, which {needed}: pip install "udd[{extra}]"')
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}")
