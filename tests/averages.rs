@@ -133,7 +133,7 @@ fn without_gravity_the_disk_at_rest_is_lifted() {
 #[test]
 fn without_drive_the_centre_stays_on_a_circle() {
     let disk = disk(0.0, 9.81);
-    let mut driver = Driver::new(&disk, 0.0, [0.0, 0.03, 0.04, 0.0], None, &TIGHT);
+    let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [0.0, 0.03, 0.04, 0.0], None, &TIGHT);
     while driver.t() < 10.0 {
         driver.advance(10.0).unwrap();
         let [_, y, z, _] = *driver.x();

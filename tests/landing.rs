@@ -17,7 +17,7 @@ const KINK: f64 = (0.103 - 0.012) / 0.055;
 #[test]
 fn the_disk_lands_on_its_surfaces_to_1e12() {
     let disk = disk(0.088, false);
-    let mut driver = Driver::new(&disk, 0.0, [3.0, 0.005, 0.0, 0.0], None, &Tolerance::default());
+    let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [3.0, 0.005, 0.0, 0.0], None, &Tolerance::default());
     let mut seen = [0; 2];
     let mut before = 3.0;
     while driver.t() < 60.0 {
@@ -94,7 +94,7 @@ fn tangents_pass_the_kinks() {
 fn a_start_on_a_surface_takes_the_flow_s_side() {
     let disk = disk(0.014, false);
     for (y, sign) in [(1e-3, 1.0), (-1e-3, -1.0)] {
-        let mut driver = Driver::new(&disk, 0.0, [0.0, y, 0.04, 0.0], None, &Tolerance::default());
+        let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [0.0, y, 0.04, 0.0], None, &Tolerance::default());
         assert_eq!(driver.advance(1.0).unwrap(), Ending::Free);
         assert!(driver.x()[0] * sign > 0.0);
     }
@@ -116,7 +116,7 @@ fn runs_go_backwards_too() {
 #[test]
 fn the_wall_ends_the_run_at_1e12() {
     let disk = disk(0.039, true);
-    let mut driver = Driver::new(&disk, 0.0, [0.0, 1e-3, 0.04, 0.0], None, &Tolerance::default()).with_wall();
+    let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [0.0, 1e-3, 0.04, 0.0], None, &Tolerance::default()).with_wall();
     let ending = loop {
         match driver.advance(1000.0).unwrap() {
             Ending::Wall => break Ending::Wall,
@@ -154,7 +154,7 @@ fn crossings(height: f64) -> Result<(usize, f64, u64), Failure> {
     let calls = Cell::new(0);
     let system = Parabola(&calls);
     let x0 = [height - 0.5, 1.0];
-    let mut driver = Driver::new(&system, 0.0, x0, Some(2.0), &Tolerance::default());
+    let mut driver: Driver<_, f64, _> = Driver::new(&system, 0.0, x0, Some(2.0), &Tolerance::default());
     let mut count = 0;
     while driver.t() < 2.0 {
         count += usize::from(matches!(driver.advance(2.0)?, Ending::Surface(_)));
@@ -201,7 +201,7 @@ proptest! {
         let rtol = 10f64.powf(-digits);
         let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
         let x0 = [omega, y, z, 0.0];
-        let mut driver = Driver::new(&disk, 0.0, x0, None, &tolerance);
+        let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, x0, None, &tolerance);
         while driver.t() < 0.5 {
             let ending = driver.advance(0.5).unwrap();
             let speed = driver.x()[0].abs();

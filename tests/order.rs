@@ -2,7 +2,8 @@
 
 use std::array::from_fn;
 
-use udd::integrate::{Dense, step};
+use udd::integrate::tableau::DormandPrince;
+use udd::integrate::{Dopri5, Method, Point, Tolerance, step};
 use udd::model::{DiskFamily, Dle, Family, System, sides_of};
 use udd::scalar::{Dual, Scalar};
 
@@ -19,7 +20,7 @@ fn fixed<S: Scalar<Real = f64>, const D: usize>(
         let t = i as f64 * h;
         let sides = sides_of(system, S::lift(t), &x);
         let rate = system.rates(S::lift(t), &x, &sides);
-        x = step(system, t, &x, &rate, h, &sides).x;
+        x = step::<DormandPrince, _, D, 7, 4>(system, t, &x, &rate, h, &sides).0;
     }
     x
 }
@@ -88,12 +89,13 @@ fn tangents_of_the_disk_are_of_order_5_on_a_smooth_piece() {
 fn dense_output_is_of_order_4() {
     let dle = Dle { w: 1.0, b: 0.2 };
     let x0 = [1.0, 1.0, 0.01];
-    let sides = sides_of(&dle, 0.0, &x0);
-    let rate = dle.rates(0.0, &x0, &sides);
+    let start = Point { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
     for theta in [0.3, 0.62] {
         let points = [0.08, 0.06, 0.04, 0.03, 0.02].map(|h| {
-            let polynomial = Dense::new(&x0, &step(&dle, 0.0, &x0, &rate, h, &sides), h);
-            (h, distance(polynomial.at(theta), fixed(&dle, x0, theta * h, 64)))
+            let mut method = Dopri5::new();
+            method.begin(&dle, &start, true);
+            method.attempt(&dle, &start, h, &Tolerance::default());
+            (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))
         });
         assert!((slope(&points) - 5.0).abs() < WITHIN, "slope {} at {theta}", slope(&points));
     }

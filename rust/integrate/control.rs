@@ -2,83 +2,86 @@
 
 use std::array::from_fn;
 
-use super::tableau::DORMAND_PRINCE as METHOD;
+use super::method::Point;
 use super::tolerance::Tolerance;
-use crate::model::{Sides, System};
-use crate::scalar::Scalar;
+use crate::model::System;
+use crate::scalar::{Mask, Real, Scalar};
 
 /// Safety factor, and the narrowest and widest change of the step size.
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 10.0;
-/// The integral part's share (Gustafsson's stabilisation) and the proportional exponent.
+/// The integral part's share (Gustafsson's stabilisation).
 const BETA: f64 = 0.04;
-const ALPHA: f64 = 1.0 / 5.0 - 0.75 * BETA;
+/// Errors below this count as this.
+const LEAST: f64 = 1e-4;
 
-/// PI control (Hairer, Nørsett & Wanner, Solving ODEs I, II.4 and II.5).
+/// PI control (Hairer, Nørsett & Wanner, Solving ODEs I, II.4 and II.5), lane by lane.
 #[derive(Clone, Copy, Debug)]
-pub struct Controller {
-    /// The error norm of the last accepted step.
-    previous: f64,
+pub struct Controller<R: Real> {
+    /// The proportional exponent.
+    alpha: f64,
+    /// Logarithm of the error norm of the last accepted step.
+    previous: R,
     /// Whether the last trial was rejected; the step does not grow right after.
-    rejected: bool,
+    rejected: R::Mask,
 }
 
-impl Default for Controller {
-    fn default() -> Self {
-        Self { previous: 1e-4, rejected: false }
+impl<R: Real> Controller<R> {
+    /// For a method of this order.
+    pub fn new(order: i32) -> Self {
+        let alpha = 1.0 / f64::from(order) - 0.75 * BETA;
+        Self { alpha, previous: R::constant(LEAST.ln()), rejected: R::mask(false) }
+    }
+
+    /// Forgets what was, in these lanes.
+    pub fn reset(&mut self, lanes: R::Mask) {
+        self.previous = R::select(lanes, R::constant(LEAST.ln()), self.previous);
+        self.rejected = self.rejected.and(lanes.not());
+    }
+
+    /// Where a step with this error norm is accepted, and the factor for the next step size; only
+    /// `lanes` are remembered.
+    #[inline(always)]
+    pub fn judge(&mut self, error: R, lanes: R::Mask) -> (R::Mask, R) {
+        let finite = error.finite();
+        let accepted = finite.and(R::one().less(error).not());
+        let log = error.max(R::constant(1e-200)).ln();
+        let integral = R::select(accepted, self.previous.scale(BETA), R::zero());
+        let factor = (integral - log.scale(self.alpha)).exp().scale(SAFETY);
+        let factor = factor.max(R::constant(SHRINK)).min(R::constant(GROW));
+        let capped = R::select(self.rejected, factor.min(R::one()), factor);
+        let factor = R::select(finite, R::select(accepted, capped, factor), R::constant(0.1));
+        let kept = R::select(accepted, log.max(R::constant(LEAST.ln())), self.previous);
+        self.previous = R::select(lanes, kept, self.previous);
+        self.rejected = lanes.and(accepted.not()).or(lanes.not().and(self.rejected));
+        (accepted, factor)
     }
 }
 
-impl Controller {
-    /// Whether a step with this error norm is accepted, and the factor for the next step size.
-    #[inline]
-    pub fn judge(&mut self, error: f64) -> (bool, f64) {
-        if !error.is_finite() {
-            self.rejected = true;
-            return (false, 0.1);
-        }
-        let proportional = error.powf(ALPHA);
-        if error > 1.0 {
-            self.rejected = true;
-            return (false, (SAFETY / proportional).max(SHRINK));
-        }
-        let mut factor = GROW;
-        if error > 0.0 {
-            factor = (SAFETY * self.previous.powf(BETA) / proportional).clamp(SHRINK, GROW);
-        }
-        if self.rejected {
-            factor = factor.min(1.0);
-        }
-        self.previous = error.max(1e-4);
-        self.rejected = false;
-        (true, factor)
-    }
-}
-
-/// A first step size (Hairer's algorithm, II.4), positive; one evaluation of the rates.
-pub fn initial_step<S: Scalar<Real = f64>, const D: usize>(
+/// A first step size (Hairer's algorithm, II.4), positive; two evaluations of the rates.
+pub fn initial_step<S: Scalar, const D: usize>(
     system: &impl System<S, D>,
-    (t, x, rate): (f64, &[S; D], &[S; D]),
-    direction: f64,
-    sides: &Sides<S>,
+    at: &Point<S, D>,
+    order: i32,
     tolerance: &Tolerance,
-) -> f64 {
-    let real = |v: &[S; D]| from_fn::<f64, D, _>(|n| v[n].real());
-    let (x_real, f_real) = (real(x), real(rate));
-    let norm = |v: [f64; D]| tolerance.norm(v, x_real, x_real);
+) -> S::Real {
+    let constant = S::Real::constant;
+    let real = |v: &[S; D]| from_fn::<S::Real, D, _>(|n| v[n].real());
+    let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
+    let (x_real, f_real) = (real(&at.x), real(&rate));
+    let norm = |v: [S::Real; D]| tolerance.norm(v, x_real, x_real);
     let (size, speed) = (norm(x_real), norm(f_real));
-    let h0 = if size < 1e-5 || speed < 1e-5 { 1e-6 } else { 0.01 * size / speed };
+    let small = size.less(constant(1e-5)).or(speed.less(constant(1e-5)));
+    let h0 = S::Real::select(small, constant(1e-6), size.scale(0.01) / speed);
 
-    let moved = from_fn(|n| x[n] + rate[n].scale(direction * h0));
-    let later = real(&system.rates(S::lift(t + direction * h0), &moved, sides));
+    let moved = from_fn(|n| at.x[n] + rate[n].times(h0));
+    let later = real(&system.rates(S::lift(at.t + h0), &moved, &at.sides));
     let bend = norm(from_fn(|n| later[n] - f_real[n])) / h0;
     let steepest = speed.max(bend);
-    let h1 = if steepest <= 1e-15 {
-        (h0 * 1e-3).max(1e-6)
-    } else {
-        (0.01 / steepest).powf(1.0 / f64::from(METHOD.order))
-    };
-    let h = h1.min(100.0 * h0);
-    if h.is_finite() { h } else { 1e-6 }
+    let flat = constant(1e-15).less(steepest).not();
+    let curved = ((constant(0.01) / steepest).ln().scale(1.0 / f64::from(order))).exp();
+    let h1 = S::Real::select(flat, h0.scale(1e-3).max(constant(1e-6)), curved);
+    let h = h1.min(h0.scale(100.0));
+    S::Real::select(h.finite(), h, constant(1e-6))
 }

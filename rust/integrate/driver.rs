@@ -3,15 +3,15 @@
 use std::array::from_fn;
 
 use super::control::{Controller, initial_step};
-use super::dense::Dense;
-use super::landing::{Find, NOISE, Target, Watch};
-use super::step::{Step, step};
-use super::tableau::STAGES;
+use super::landing::{Landed, Landing, NOISE, TARGETS, WALL, Watch};
+use super::method::{Method, Point, Trial};
+use super::runge_kutta::Dopri5;
+use super::saltation::pass;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
-use crate::model::{MAX_SURFACES, Sides, System, sides_of};
-use crate::scalar::Scalar;
+use crate::model::{MAX_SURFACES, System, choose, sides_of};
+use crate::scalar::{Mask, Real, Scalar};
 
-/// What the work was.
+/// What the work was, summed over the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Steps accepted.
@@ -33,259 +33,406 @@ pub enum Ending {
     Wall,
 }
 
-/// A run in progress: each [`advance`](Driver::advance) takes one accepted step.
+/// What one trial step did, lane by lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress<M> {
+    /// Lanes that took a step, be it one of no length onto the surface that they are on.
+    pub moved: M,
+    /// Those of them that ended on each target: the switching surfaces, then the wall.
+    pub crossed: [M; TARGETS],
+    /// Lanes that cannot go on.
+    pub failed: M,
+}
+
+impl<M: Mask> Progress<M> {
+    /// Lanes that ended on the wall.
+    pub fn walled(&self) -> M {
+        self.crossed[WALL]
+    }
+}
+
+/// A run in progress, or one in each lane: every [`trial`](Driver::trial) tries a step in all of them.
 ///
-/// Between steps the law is smooth: a step ends on the first switching surface it meets, to 1e-12 of
-/// the surface function's size in the step, and the next one starts on the other side. Everything
-/// derived from a run (samples, events, tangents, exponents) is built on this loop.
-pub struct Driver<'a, M, S: Scalar, const D: usize, E = Tolerance> {
-    system: &'a M,
+/// Lanes have their own time, step size and fate. Between steps the law is smooth: a step ends on the
+/// first switching surface it meets, to 1e-12 of the surface function's size in the step, and the next
+/// one starts on the other side. Everything derived from a run (samples, events, tangents, sections,
+/// exponents) is built on this loop.
+pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>> {
+    /// What is integrated.
+    pub system: M,
+    method: K,
     norm: E,
-    controller: Controller,
-    /// Whether the run ends on the wall.
+    controller: Controller<S::Real>,
+    /// Whether lanes end on the wall.
     wall: bool,
-    t: f64,
-    x: [S; D],
-    rate: [S; D],
-    sides: Sides<S>,
+    at: Point<S, D>,
     /// The size of the next trial step, of the sign of the direction.
-    h: f64,
-    /// The last accepted step: its start, its size and the step itself.
-    from: (f64, [S; D]),
-    size: f64,
-    last: Step<S, D>,
+    h: S::Real,
+    /// The last accepted step: its start and its size.
+    from: S::Real,
+    size: S::Real,
+    landing: Landing<S::Real>,
     /// Sides changed since time last moved on.
-    flips: usize,
+    flips: S::Real,
     /// The state is on a surface to within rounding, which leaves its side open.
-    undecided: bool,
+    undecided: S::Mask,
     /// The work so far.
     pub counts: Counts,
 }
 
-impl<'a, M, S, const D: usize, E> Driver<'a, M, S, D, E>
+impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
 where
-    S: Scalar<Real = f64, Mask = bool>,
+    S: Scalar,
     M: System<S, D>,
     E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
 {
     /// Starts at time `t` and state `x`. The size and the direction of the first trial step are those
     /// of `h` where given; otherwise the size is estimated and the direction is forward.
-    pub fn new(system: &'a M, t: f64, x: [S; D], h: Option<f64>, norm: &E) -> Self {
-        let mut sides = sides_of(system, S::lift(t), &x);
-        let rate = system.rates(S::lift(t), &x, &sides);
-        let direction = h.map_or(1.0, f64::signum);
-        start_sides(system, t, &x, &rate, direction, &mut sides);
-        let mut counts = Counts { evaluations: 1, ..Counts::default() };
-        let h = h.unwrap_or_else(|| {
-            counts.evaluations += 1;
-            initial_step(system, (t, &x, &rate), 1.0, &sides, norm.state())
-        });
-        let last = Step { x, stages: [rate; STAGES] };
-        Self {
+    pub fn new(system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
+        let mut driver = Self {
+            at: Point { t, x, sides: sides_of(&system, S::lift(t), &x) },
             system,
+            method: K::new(),
             norm: *norm,
-            controller: Controller::default(),
+            controller: Controller::new(K::ORDER),
             wall: false,
-            t,
-            x,
-            rate,
-            sides,
-            h,
-            from: (t, x),
-            size: 0.0,
-            last,
-            flips: 0,
-            undecided: false,
-            counts,
-        }
+            h: S::Real::zero(),
+            from: t,
+            size: S::Real::zero(),
+            landing: Landing::new(),
+            flips: S::Real::zero(),
+            undecided: S::mask(false),
+            counts: Counts::default(),
+        };
+        driver.start(S::mask(true), t, x, h);
+        driver
     }
 
-    /// Ends the run on the model's wall, where it has one.
+    /// Ends runs on the model's wall, where it has one.
     pub fn with_wall(mut self) -> Self {
-        self.wall = self.system.wall(&self.x).is_some();
+        self.wall = self.system.wall(&self.at.x).is_some();
         self
     }
 
+    /// Starts anew in these lanes, as [`new`](Driver::new) does.
+    pub fn start(&mut self, lanes: S::Mask, t: S::Real, x: [S; D], h: Option<S::Real>) {
+        self.at.t = S::Real::select(lanes, t, self.at.t);
+        self.at.x = from_fn(|n| S::select(lanes, x[n], self.at.x[n]));
+        let mut fresh = self.at;
+        fresh.sides = sides_of(&self.system, S::lift(fresh.t), &fresh.x);
+        let h = h.unwrap_or_else(|| {
+            self.counts.evaluations += 2;
+            initial_step(&self.system, &fresh, K::ORDER, self.norm.state())
+        });
+        start_sides(&self.system, &mut fresh, h);
+        self.at.sides = from_fn(|j| choose(lanes, fresh.sides[j], self.at.sides[j]));
+        self.h = S::Real::select(lanes, h, self.h);
+        self.from = S::Real::select(lanes, t, self.from);
+        self.size = S::Real::select(lanes, S::Real::zero(), self.size);
+        self.flips = S::Real::select(lanes, S::Real::zero(), self.flips);
+        self.undecided = self.undecided.and(lanes.not());
+        self.landing.on = self.landing.on.map(|on| on.and(lanes.not()));
+        self.controller.reset(lanes);
+        self.begin(lanes);
+    }
+
     /// The time reached.
-    pub fn t(&self) -> f64 {
-        self.t
+    pub fn t(&self) -> S::Real {
+        self.at.t
     }
 
     /// The state reached.
     pub fn x(&self) -> &[S; D] {
-        &self.x
+        &self.at.x
     }
 
     /// The size of the next trial step.
-    pub fn h(&self) -> f64 {
+    pub fn h(&self) -> S::Real {
         self.h
     }
 
     /// The time at which the last accepted step began.
-    pub fn from(&self) -> f64 {
-        self.from.0
+    pub fn from(&self) -> S::Real {
+        self.from
     }
 
-    /// The last accepted step's size (times are rounded, sizes are not) and its polynomial.
-    pub fn dense(&self) -> (f64, Dense<S, D>) {
-        (self.size, Dense::new(&self.from.1, &self.last, self.size))
+    /// The last accepted step's size (times are rounded, sizes are not).
+    pub fn size(&self) -> S::Real {
+        self.size
+    }
+
+    /// The state at `dt` after the start of the last accepted step, on its polynomial; in lanes that moved
+    /// in the last trial.
+    #[inline(always)]
+    pub fn dense(&self, dt: S::Real) -> [S; D] {
+        self.method.at(dt)
+    }
+
+    /// The same for every other step.
+    pub fn method(&self) -> &K {
+        &self.method
     }
 
     /// Goes on from another state at the same time, as when tangents are scaled back.
-    pub fn set_state(&mut self, x: [S; D]) {
-        self.x = x;
-        self.refresh();
+    pub fn set_state(&mut self, lanes: S::Mask, x: [S; D]) {
+        self.at.x = from_fn(|n| S::select(lanes, x[n], self.at.x[n]));
+        self.begin(lanes);
     }
 
-    /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
-    pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
-        loop {
-            let remaining = end - self.t;
-            let cut = self.h.abs() * 1.01 >= remaining.abs();
-            let h = if cut { remaining } else { self.h };
-            // A short step leads away from a surface that rounding does not let go of.
-            let (h, cut) = if self.undecided { (h * 0.1, false) } else { (h, cut) };
-            let trial = step(self.system, self.t, &self.x, &self.rate, h, &self.sides);
-            self.counts.evaluations += (STAGES - 1) as u64;
-            let error = self.norm.of_step(&self.x, &trial, h);
-            let (accepted, factor) = self.controller.judge(error);
-            if !accepted {
-                self.counts.rejected += 1;
-                self.h = h * factor;
-                // A size that is not a number, as towards an end that is none, would never shrink.
-                if self.t + self.h == self.t || self.h.abs() < 1e-100 || !self.h.is_finite() {
-                    return Err(if error.is_finite() {
-                        Failure::StepUnderflow { t: self.t }
-                    } else {
-                        Failure::NotFinite { t: self.t }
-                    });
-                }
-                continue;
-            }
-            // A step cut short at the end says little about a long one.
-            self.h = if cut { (h * factor).abs().max(self.h.abs()).copysign(h) } else { h * factor };
+    /// Tries a step in every lane that is not at its `end`, at most up to there; a lane that gets there
+    /// reaches it exactly.
+    #[inline(always)]
+    pub fn trial(&mut self, end: S::Real) -> Progress<S::Mask> {
+        let remaining = end - self.at.t;
+        let active = S::Mask::from_lanes(|i| remaining.lane(i) != 0.0);
+        let targets = self.wall || self.system.surfaces() > 0;
+        let landing = self.landing.lanes();
 
-            if self.undecided {
-                // All laws are continuous: on the surface both sides are the same to rounding.
-                self.h = h * factor.max(1.0) * 10.0;
-                self.undecided = false;
-                self.commit(h, trial, None);
-                self.sides = sides_of(self.system, S::lift(self.t), &self.x);
-                self.refresh();
-                return Ok(Ending::Free);
-            }
-            if self.system.surfaces() == 0 && !self.wall {
-                self.commit(h, trial, cut.then_some(end));
-                return Ok(Ending::Free);
-            }
-            if let Some(ending) = self.examine(h, trial, cut.then_some(end)) {
-                return Ok(ending);
+        let cut = self.h.abs().scale(1.01).less(remaining.abs()).not();
+        let mut h = S::Real::select(cut, remaining, self.h);
+        let mut last = cut;
+        if targets {
+            // A short step leads away from a surface that rounding does not let go of.
+            h = S::Real::select(self.undecided, h.scale(0.1), h);
+            h = S::Real::select(landing, self.landing.size, h);
+            last = cut.and(self.undecided.or(landing).not());
+        }
+        let asked = S::Real::select(active, h, S::Real::zero());
+        let trial = self.method.attempt(&self.system, &self.at, asked, &self.norm);
+        self.counts.evaluations += K::evaluations() * active.count();
+
+        let judged = active.and(landing.not());
+        let (good, factor) = self.controller.judge(trial.error, judged);
+        let accepted = judged.and(good);
+        let rejected = judged.and(good.not());
+        last = last.and(accepted);
+        let mut failed = S::mask(false);
+        if K::SERIES {
+            // A series knows its own size: there is nothing to learn from one step for the next.
+            last = last.and(trial.size.abs().less(asked.abs()).not());
+            failed = rejected.or(accepted.and(S::Mask::from_lanes(|i| {
+                let (t, size) = (self.at.t.lane(i), trial.size.lane(i));
+                t + size == t
+            })));
+        } else {
+            // A step cut short at the end says little about a long one.
+            let next = asked * factor;
+            let kept = next.abs().max(self.h.abs()).zip(asked, f64::copysign);
+            let next = S::Real::select(cut.and(good), kept, next);
+            self.h = S::Real::select(judged, next, self.h);
+            if rejected.any() {
+                failed = rejected.and(S::Mask::from_lanes(|i| {
+                    let (t, h) = (self.at.t.lane(i), self.h.lane(i));
+                    // A size that is not a number, as towards an end that is none, would never shrink.
+                    t + h == t || h.abs() < 1e-100 || !h.is_finite()
+                }));
             }
         }
+        self.counts.rejected += rejected.count();
+
+        let mut progress =
+            Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
+        if targets {
+            let accepted = progress.moved;
+            self.on_surfaces(&trial, accepted, landing, factor, (end, last), &mut progress);
+        } else {
+            self.commit(&trial, progress.moved, (end, last));
+        }
+        progress
     }
 
-    /// Commits the trial step as far as the first target; `None` where it must be taken again
-    /// because it started on the wrong side.
-    fn examine(&mut self, h: f64, trial: Step<S, D>, end: Option<f64>) -> Option<Ending> {
+    /// Commits the trial where it crosses no target, and deals with the lanes where it does.
+    fn on_surfaces(
+        &mut self,
+        trial: &Trial<S, D>,
+        accepted: S::Mask,
+        landing: S::Mask,
+        factor: S::Real,
+        (end, last): (S::Real, S::Mask),
+        progress: &mut Progress<S::Mask>,
+    ) {
+        let never = S::mask(false);
+        self.method.extend(&self.system, &self.at);
         let watch = Watch {
-            system: self.system,
-            t: self.t,
-            x: &self.x,
-            rate: &self.rate,
-            sides: &self.sides,
+            system: &self.system,
+            at: &self.at,
             wall: self.wall,
             noise: NOISE.max(self.norm.state().atol),
         };
-        let start = from_fn(|n| self.x[n].real());
-        let dense = Dense::from_stages(&start, |i, n| trial.stages[i][n].real(), h);
-        let (target, theta, high, scale) = match watch.find(&dense, h) {
-            Find::Clear => {
-                self.commit(h, trial, end);
-                return Some(Ending::Free);
+        let leaving = accepted.and(self.undecided);
+        let found = watch.find(&self.method, trial.size, accepted.and(leaving.not()));
+        let crossing = union(&found.crossing);
+        let stale = union(&found.stale);
+        let clear = accepted.and(crossing.or(stale).not());
+        let mut trial = *trial;
+        let mut crossed = [never; TARGETS];
+        let mut landed = Landed { there: never, grazed: never };
+
+        if landing.any() {
+            // What landing lanes want is the value of their own target.
+            let mut value = S::Real::zero();
+            for target in watch.targets().filter(|&j| self.landing.on[j].any()) {
+                let own = watch.value(target, self.at.t + trial.size, &trial.x);
+                value = S::Real::select(self.landing.on[target], own, value);
             }
-            Find::Stale(target) => {
-                let moved = self.size != 0.0 && self.flips == 0;
-                self.rest();
-                let ending = self.cross(target);
-                return (moved || ending == Ending::Wall).then_some(ending);
+            let on = self.landing.on;
+            landed = self.landing.judge(value);
+            crossed = on.map(|on| on.and(landed.there));
+        }
+        if crossing.any() {
+            if K::SERIES {
+                // The polynomial is as good as the step: it may end there.
+                let x = self.method.at(found.dt);
+                trial.x = from_fn(|n| S::select(crossing, x[n], trial.x[n]));
+                trial.size = S::Real::select(crossing, found.dt, trial.size);
+                crossed = from_fn(|j| crossed[j].or(found.crossing[j]));
+                landed.there = landed.there.or(crossing);
+            } else {
+                let mut slope = S::Real::zero();
+                let ahead = trial.size.scale(1e-4);
+                for target in watch.targets().filter(|&j| found.crossing[j].any()) {
+                    let on = |dt: S::Real| watch.value(target, self.at.t + dt, &self.method.at(dt));
+                    let own = (on(found.dt + ahead) - on(found.dt - ahead)) / (ahead + ahead);
+                    slope = S::Real::select(found.crossing[target], own, slope);
+                }
+                self.landing.begin(&found, crossing, slope);
             }
-            Find::Crossing { target, theta, high, scale } => (target, theta, high, scale),
-        };
-        match watch.land((target, theta, high, scale), &dense, h, &mut self.counts.evaluations) {
-            Some((size, landed)) => {
-                self.commit(size, landed, None);
-                Some(self.cross(target))
+        }
+
+        let moved = clear.or(landed.there).or(landed.grazed);
+        let fresh = self.size.abs().less(S::Real::constant(f64::MIN_POSITIVE)).not();
+        let unflipped = self.flips.less(S::Real::one());
+        self.commit(&trial, moved, (end, last.and(clear)));
+        progress.moved = moved;
+
+        if leaving.any() {
+            // All laws are continuous: on the surface both sides are the same to rounding.
+            let longer = trial.size * factor.max(S::Real::one()).scale(10.0);
+            self.h = S::Real::select(leaving, longer, self.h);
+            self.undecided = self.undecided.and(leaving.not());
+            let sides = sides_of(&self.system, S::lift(self.at.t), &self.at.x);
+            self.at.sides = from_fn(|j| choose(leaving, sides[j], self.at.sides[j]));
+            self.begin(leaving);
+        }
+        if stale.any() {
+            // The last step becomes one of no length.
+            self.from = S::Real::select(stale, self.at.t, self.from);
+            self.size = S::Real::select(stale, S::Real::zero(), self.size);
+        }
+        for target in 0..TARGETS {
+            let over = crossed[target].or(found.stale[target]);
+            if !over.any() {
+                continue;
             }
-            None if high == 1.0 => {
-                self.commit(h, trial, end);
-                Some(Ending::Free)
-            }
-            None => {
-                let size = high * h;
-                let short = step(self.system, self.t, &self.x, &self.rate, size, &self.sides);
-                self.counts.evaluations += (STAGES - 1) as u64;
-                self.commit(size, short, None);
-                Some(Ending::Free)
-            }
+            let turned = self.cross(target, over);
+            let told = found.stale[target].and(if target == WALL { stale } else { fresh.and(unflipped) });
+            progress.moved = progress.moved.or(told);
+            progress.crossed[target] = crossed[target].or(told).and(turned);
         }
     }
 
-    fn commit(&mut self, h: f64, step: Step<S, D>, end: Option<f64>) {
-        self.from = (self.t, self.x);
-        self.size = h;
-        let t = end.unwrap_or(self.t + h);
-        if t != self.t {
-            self.flips = 0;
+    #[inline(always)]
+    fn commit(&mut self, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
+        let t = S::Real::select(last, end, self.at.t + trial.size);
+        let still = S::Mask::from_lanes(|i| t.lane(i) == self.at.t.lane(i));
+        self.flips = S::Real::select(lanes.and(still.not()), S::Real::zero(), self.flips);
+        self.from = S::Real::select(lanes, self.at.t, self.from);
+        self.size = S::Real::select(lanes, trial.size, self.size);
+        self.at.t = S::Real::select(lanes, t, self.at.t);
+        self.at.x = from_fn(|n| S::select(lanes, trial.x[n], self.at.x[n]));
+        self.method.accept(lanes);
+        self.counts.accepted += lanes.count();
+    }
+
+    /// Changes the side of the target that these lanes are on; returns those where it did.
+    fn cross(&mut self, target: usize, lanes: S::Mask) -> S::Mask {
+        if target == WALL {
+            return lanes;
         }
-        self.t = t;
-        self.x = step.x;
-        self.rate = step.stages[STAGES - 1];
-        self.last = step;
-        self.counts.accepted += 1;
+        self.flips = S::Real::select(lanes, self.flips + S::Real::one(), self.flips);
+        let stuck = lanes.and(S::Real::constant(2.0 * MAX_SURFACES as f64).less(self.flips));
+        self.undecided = self.undecided.or(stuck);
+        self.flips = S::Real::select(stuck, S::Real::zero(), self.flips);
+        let turned = lanes.and(stuck.not());
+        let Point { t, x, sides } = &mut self.at;
+        pass(&self.system, target, *t, self.size, x, sides, turned);
+        self.begin(turned);
+        turned
     }
 
-    /// The last step becomes one of no length.
-    fn rest(&mut self) {
-        self.from = (self.t, self.x);
-        self.size = 0.0;
-    }
-
-    /// Changes the side of the target that the state is on.
-    fn cross(&mut self, target: Target) -> Ending {
-        let Target::Surface(j) = target else { return Ending::Wall };
-        self.flips += 1;
-        if self.flips > 2 * MAX_SURFACES {
-            self.undecided = true;
-            self.flips = 0;
-            return Ending::Free;
-        }
-        self.sides[j] = !self.sides[j];
-        self.refresh();
-        Ending::Surface(j)
-    }
-
-    fn refresh(&mut self) {
-        self.rate = self.system.rates(S::lift(self.t), &self.x, &self.sides);
-        self.counts.evaluations += 1;
+    fn begin(&mut self, lanes: S::Mask) {
+        self.method.begin(&self.system, &self.at, lanes);
+        self.counts.evaluations += lanes.count();
     }
 }
 
-/// At a start exactly on a surface the side is the one the flow goes to.
-fn start_sides<S, const D: usize>(
-    system: &impl System<S, D>,
-    t: f64,
-    x: &[S; D],
-    rate: &[S; D],
-    direction: f64,
-    sides: &mut Sides<S>,
-) where
+impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
+where
     S: Scalar<Real = f64, Mask = bool>,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
 {
+    /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
+    pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
+        loop {
+            let progress = self.trial(end);
+            if progress.failed {
+                return Err(self.failure());
+            }
+            if progress.moved {
+                return Ok(match progress.crossed.iter().position(|&crossed| crossed) {
+                    Some(WALL) => Ending::Wall,
+                    Some(j) => Ending::Surface(j),
+                    None => Ending::Free,
+                });
+            }
+        }
+    }
+}
+
+impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
+where
+    S: Scalar,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    /// Why lane 0 cannot go on.
+    pub fn failure(&self) -> Failure {
+        self.failure_of(0)
+    }
+
+    /// Why a lane cannot go on.
+    pub fn failure_of(&self, lane: usize) -> Failure {
+        let t = self.at.t.lane(lane);
+        let rate = self.system.rates(S::lift(self.at.t), &self.at.x, &self.at.sides);
+        let finite = |v: &[S; D]| v.iter().all(|v| v.real().lane(lane).is_finite());
+        if finite(&self.at.x) && finite(&rate) && self.h.lane(lane).is_finite() {
+            Failure::StepUnderflow { t }
+        } else {
+            Failure::NotFinite { t }
+        }
+    }
+}
+
+#[inline(always)]
+fn union<M: Mask>(masks: &[M; TARGETS]) -> M {
+    masks[1..].iter().fold(masks[0], |any, &mask| any.or(mask))
+}
+
+/// At a start exactly on a surface the side is the one the flow goes to.
+fn start_sides<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &mut Point<S, D>, h: S::Real) {
     for j in 0..system.surfaces() {
-        if system.surface(j, S::lift(t), x, sides).real() == 0.0 {
-            let ahead = direction * 1e-9;
-            let moved = from_fn(|n| x[n] + rate[n].scale(ahead));
-            sides[j] = S::zero().less(system.surface(j, S::lift(t + ahead), &moved, sides));
+        let value = system.surface(j, S::lift(at.t), &at.x, &at.sides).real();
+        let on = S::Mask::from_lanes(|i| value.lane(i) == 0.0);
+        if on.any() {
+            let ahead = h.each(|h| 1e-9_f64.copysign(h));
+            let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
+            let moved = from_fn(|n| at.x[n] + rate[n].times(ahead));
+            let there = system.surface(j, S::lift(at.t + ahead), &moved, &at.sides);
+            at.sides[j] = choose(on, S::zero().less(there), at.sides[j]);
         }
     }
 }

@@ -1,49 +1,46 @@
 //! Landing on switching surfaces and on the wall.
 //!
 //! A step is taken with the side of every surface frozen. Then [`Watch::find`] looks on the step's
-//! polynomial for the first place where a surface's sign contradicts its side, and [`Watch::land`]
-//! takes the step anew up to there, until the surface's function is zero.
+//! polynomial for the first place where a surface's sign contradicts its side. A lane that crosses takes
+//! its step anew up to there, and [`Landing`] corrects the step's size until the surface's function is
+//! zero; the other lanes go on meanwhile.
 
-use super::dense::Dense;
+use std::array::from_fn;
+
+use super::method::{Method, Point};
 use super::root::bracketed;
-use super::step::{Step, step};
-use super::tableau::STAGES;
-use crate::model::{Sides, System};
-use crate::scalar::Scalar;
+use crate::model::{MAX_SURFACES, System};
+use crate::scalar::{Mask, Real, Scalar};
 
-/// What can be crossed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
-    Surface(usize),
-    Wall,
-}
+/// What can be crossed: the switching surfaces, then the wall.
+pub const TARGETS: usize = MAX_SURFACES + 1;
+pub const WALL: usize = MAX_SURFACES;
 
-/// What a step does to the targets.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Find {
-    /// It crosses none.
-    Clear,
-    /// The first crossing, at `theta` on the polynomial; the sign is wrong at `high`.
-    Crossing { target: Target, theta: f64, high: f64, scale: f64 },
-    /// The step starts on the target and leaves it to the wrong side.
-    Stale(Target),
-}
-
-/// Where within a step the signs are looked at, so that a target crossed twice is seen too.
-const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 /// A target's function counts as zero below this part of its largest value in the step.
 const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 pub const NOISE: f64 = 1e-14;
 
-/// A system on the way from one step to the next: what is looked at, and from where.
+/// What a step does to the targets, lane by lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Found<R: Real> {
+    /// Lanes whose first crossing is of this target.
+    pub crossing: [R::Mask; TARGETS],
+    /// Lanes that start on this target and leave it to the wrong side.
+    pub stale: [R::Mask; TARGETS],
+    /// How far after the start of the step the crossing is.
+    pub dt: R,
+    /// A later place where the sign is wrong on the polynomial.
+    pub high: R,
+    /// Where the target's function counts as zero.
+    pub zero: R,
+}
+
+/// A run on the way from one step to the next: what is looked at, and from where.
 pub struct Watch<'a, M, S: Scalar, const D: usize> {
     pub system: &'a M,
-    pub t: f64,
-    pub x: &'a [S; D],
-    pub rate: &'a [S; D],
-    pub sides: &'a Sides<S>,
+    pub at: &'a Point<S, D>,
     pub wall: bool,
     /// A surface whose function stays below this in a step is left alone: the step's error is larger.
     pub noise: f64,
@@ -51,118 +48,207 @@ pub struct Watch<'a, M, S: Scalar, const D: usize> {
 
 impl<M, S, const D: usize> Watch<'_, M, S, D>
 where
-    S: Scalar<Real = f64, Mask = bool>,
+    S: Scalar,
     M: System<S, D>,
 {
-    /// The target's function, positive on the side that the law is frozen on.
-    fn value(&self, target: Target, t: f64, x: &[S; D]) -> f64 {
-        match target {
-            Target::Surface(j) => {
-                let value = self.system.surface(j, S::lift(t), x, self.sides).real();
-                if self.sides[j] { value } else { -value }
-            }
-            Target::Wall => self.system.wall(x).map_or(1.0, S::real),
-        }
+    /// The targets that there are.
+    pub fn targets(&self) -> impl Iterator<Item = usize> + use<M, S, D> {
+        (0..self.system.surfaces()).chain(self.wall.then_some(WALL))
     }
 
-    /// The first crossing within a step of size `h` with this polynomial.
-    pub fn find(&self, dense: &Dense<f64, D>, h: f64) -> Find {
-        let states = PROBES.map(|theta| dense.at(theta).map(S::lift));
-        let mut first = Find::Clear;
-        let mut earliest = f64::INFINITY;
-        let surfaces = (0..self.system.surfaces()).map(Target::Surface);
-        for target in surfaces.chain(self.wall.then_some(Target::Wall)) {
-            let start = self.value(target, self.t, self.x);
-            let mut values = [0.0; PROBES.len()];
+    /// The target's function, positive on the side that the law is frozen on.
+    #[inline(always)]
+    pub fn value(&self, target: usize, t: S::Real, x: &[S; D]) -> S::Real {
+        if target == WALL {
+            return self.system.wall(x).map_or(S::Real::one(), S::real);
+        }
+        let value = self.system.surface(target, S::lift(t), x, &self.at.sides).real();
+        S::Real::select(self.at.sides[target], value, -value)
+    }
+
+    /// The first crossings within the method's last trial, of size `h`.
+    #[inline(always)]
+    pub fn find<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Found<S::Real> {
+        let never = S::mask(false);
+        let infinite = S::Real::constant(f64::INFINITY);
+        let zero = S::Real::zero();
+        let mut found =
+            Found { crossing: [never; TARGETS], stale: [never; TARGETS], dt: infinite, high: infinite, zero };
+        let mut earliest = infinite;
+        let mut stale = never;
+        for target in self.targets() {
+            let on = |dt: S::Real| self.value(target, self.at.t + dt, &method.at(dt));
+            let start = self.value(target, self.at.t, &self.at.x);
             let mut scale = start.abs();
-            for i in 0..PROBES.len() {
-                values[i] = self.value(target, self.t + PROBES[i] * h, &states[i]);
-                scale = scale.max(values[i].abs());
-            }
-            if scale < self.noise && target != Target::Wall {
-                continue;
-            }
-            let Some(i) = values.iter().position(|&v| v < 0.0) else { continue };
-            let on = |theta: f64| self.value(target, self.t + theta * h, &dense.at(theta).map(S::lift));
-            let mut low = if i == 0 { (0.0, start) } else { (PROBES[i - 1], values[i - 1]) };
-            let mut high = (PROBES[i], values[i]);
-            if i == 0 && start <= ON_TARGET * scale {
-                // On the target: either it goes to the right side for a moment only, or not at all.
-                match excursion(on, &mut high, ON_TARGET * scale) {
-                    Some(point) => low = point,
-                    None => return Find::Stale(target),
+            let (mut low, mut high) = ((zero, start), (zero, zero));
+            let (mut wrong, mut early) = (never, never);
+            for (i, &theta) in K::PROBES.iter().enumerate() {
+                let dt = h.scale(theta);
+                let value = on(dt);
+                scale = scale.max(value.abs());
+                let new = value.less(zero).and(wrong.not());
+                high = pick(new, (dt, value), high);
+                wrong = wrong.or(new);
+                low = pick(wrong, low, (dt, value));
+                if i == 0 {
+                    early = new;
                 }
             }
-            let theta = bracketed(on, low, high, 1e-3 * ZERO * scale);
-            if theta < earliest {
-                earliest = theta;
-                first = Find::Crossing { target, theta, high: high.0, scale };
+            let mut crossing = lanes.and(wrong);
+            if target != WALL {
+                crossing = crossing.and(scale.less(S::Real::constant(self.noise)).not());
             }
+            if !crossing.any() {
+                continue;
+            }
+            let least = scale.scale(ON_TARGET);
+            let near = crossing.and(early).and(least.less(start).not());
+            if near.any() {
+                // On the target: either it goes to the right side for a moment only, or not at all.
+                let gone = excursion(on, &mut low, &mut high, least, near);
+                found.stale[target] = near.and(gone.not()).and(stale.not());
+                stale = stale.or(found.stale[target]);
+                crossing = crossing.and(near.not().or(gone));
+            }
+            let tiny = scale.scale(1e-3 * ZERO);
+            let dt = bracketed(on, low, high, tiny, crossing);
+            let first = crossing.and(dt.abs().less(earliest));
+            earliest = S::Real::select(first, dt.abs(), earliest);
+            found.dt = S::Real::select(first, dt, found.dt);
+            found.high = S::Real::select(first, high.0, found.high);
+            found.zero = S::Real::select(first, scale.scale(ZERO), found.zero);
+            found.crossing = from_fn(|j| match j == target {
+                true => first,
+                false => found.crossing[j].and(first.not()),
+            });
         }
-        first
-    }
-
-    /// The step up to the crossing, with its size: `None` where the step itself, unlike its polynomial,
-    /// does not cross (it grazes).
-    pub fn land(
-        &self,
-        (target, theta, high, scale): (Target, f64, f64, f64),
-        dense: &Dense<f64, D>,
-        h: f64,
-        evaluations: &mut u64,
-    ) -> Option<(f64, Step<S, D>)> {
-        let zero = ZERO * scale;
-        let mut take = |size: f64| {
-            *evaluations += (STAGES - 1) as u64;
-            let step = step(self.system, self.t, self.x, self.rate, size, self.sides);
-            (self.value(target, self.t + size, &step.x), step)
-        };
-        let on = |theta: f64| self.value(target, self.t + theta * h, &dense.at(theta).map(S::lift));
-
-        // Newton with the polynomial's slope, then secants.
-        let mut size = theta * h;
-        let mut slope = (on(theta + 1e-4) - on(theta - 1e-4)) / (2e-4 * h);
-        let mut last: Option<(f64, f64)> = None;
-        for _ in 0..8 {
-            let (value, step) = take(size);
-            if value.abs() <= zero {
-                return Some((size, step));
-            }
-            if let Some((old, old_value)) = last {
-                slope = (value - old_value) / (size - old);
-            }
-            last = Some((size, value));
-            size -= value / slope;
-            let within = size / h > 0.0 && size / h <= high;
-            if !within {
-                break;
-            }
-        }
-
-        let end = high * h;
-        let (value, _) = take(end);
-        if value >= 0.0 {
-            return None;
-        }
-        let start = self.value(target, self.t, self.x).max(0.0);
-        let size = bracketed(|size| take(size).0, (0.0, start), (end, value), zero);
-        Some((size, take(size).1))
+        found.crossing = found.crossing.map(|lanes| lanes.and(stale.not()));
+        found
     }
 }
 
-/// Looks ever closer to the start for a point where the function is above `least`; `high` becomes
-/// the last point seen below zero.
-fn excursion(on: impl Fn(f64) -> f64, high: &mut (f64, f64), least: f64) -> Option<(f64, f64)> {
-    let mut theta = high.0;
+#[inline(always)]
+fn pick<R: Real>(mask: R::Mask, yes: (R, R), no: (R, R)) -> (R, R) {
+    (R::select(mask, yes.0, no.0), R::select(mask, yes.1, no.1))
+}
+
+/// Looks ever closer to the start for a point where the function is above `least`, which becomes the
+/// low end of the bracket; the high end becomes the last point seen below zero. Returns the lanes that
+/// have such a point.
+fn excursion<R: Real>(
+    on: impl Fn(R) -> R,
+    low: &mut (R, R),
+    high: &mut (R, R),
+    least: R,
+    lanes: R::Mask,
+) -> R::Mask {
+    let mut gone = R::mask(false);
+    let mut dt = high.0;
     for _ in 0..30 {
-        theta *= 0.5;
-        let value = on(theta);
-        if value > least {
-            return Some((theta, value));
-        }
-        if value < 0.0 {
-            *high = (theta, value);
+        dt = dt.scale(0.5);
+        let value = on(dt);
+        let open = lanes.and(gone.not());
+        let above = open.and(least.less(value));
+        *low = pick(above, (dt, value), *low);
+        gone = gone.or(above);
+        *high = pick(open.and(value.less(R::zero())), (dt, value), *high);
+    }
+    gone
+}
+
+/// Lanes on their way to a target, by steps of corrected size.
+#[derive(Clone, Copy, Debug)]
+pub struct Landing<R: Real> {
+    /// The lanes that land on each target.
+    pub on: [R::Mask; TARGETS],
+    /// The size of the next trial.
+    pub size: R,
+    /// Brackets: a size that is too short and one that is too long, which is known (`sure`) or only
+    /// supposed from the polynomial.
+    low: (R, R),
+    high: (R, R),
+    sure: R::Mask,
+    /// The trial before, and the slope of the function over the size.
+    last: (R, R),
+    slope: R,
+    zero: R,
+    count: R,
+}
+
+/// How trials of landing lanes went.
+#[derive(Clone, Copy, Debug)]
+pub struct Landed<M> {
+    /// The step ends on the target.
+    pub there: M,
+    /// The step, unlike its polynomial, does not cross: it grazes.
+    pub grazed: M,
+}
+
+impl<R: Real> Landing<R> {
+    /// No lane is landing.
+    pub fn new() -> Self {
+        let (zero, never) = (R::zero(), R::mask(false));
+        Self {
+            on: [never; TARGETS],
+            size: zero,
+            low: (zero, zero),
+            high: (zero, zero),
+            sure: never,
+            last: (zero, zero),
+            slope: zero,
+            zero,
+            count: zero,
         }
     }
-    None
+
+    /// The lanes that are landing.
+    #[inline(always)]
+    pub fn lanes(&self) -> R::Mask {
+        self.on.iter().fold(R::mask(false), |any, &lanes| any.or(lanes))
+    }
+
+    /// Begins for the crossings found; `slope` is the function's on the polynomial.
+    pub fn begin(&mut self, found: &Found<R>, lanes: R::Mask, slope: R) {
+        let zero = R::zero();
+        self.on = from_fn(|j| self.on[j].or(found.crossing[j].and(lanes)));
+        self.size = R::select(lanes, found.dt, self.size);
+        self.low = pick(lanes, (zero, zero), self.low);
+        self.high = pick(lanes, (found.high, zero), self.high);
+        self.sure = self.sure.and(lanes.not());
+        self.slope = R::select(lanes, slope, self.slope);
+        self.zero = R::select(lanes, found.zero, self.zero);
+        self.count = R::select(lanes, zero, self.count);
+    }
+
+    /// Looks at the target's value after a trial of `self.size`, and chooses the next size.
+    pub fn judge(&mut self, value: R) -> Landed<R::Mask> {
+        let zero = R::zero();
+        let lanes = self.lanes();
+        let size = self.size;
+        let probe = self.sure.not().and(size.abs().less(self.high.0.abs()).not());
+        let grazed = lanes.and(probe).and(value.less(zero).not());
+        let narrow = (self.high.0 - self.low.0).abs();
+        let collapsed = self.sure.and(self.high.0.abs().scale(2.0 * f64::EPSILON).less(narrow).not());
+        let there = lanes.and(self.zero.less(value.abs()).not().or(collapsed)).and(grazed.not());
+
+        let over = value.less(zero);
+        self.low = pick(over, self.low, (size, value));
+        self.high = pick(over, (size, value), self.high);
+        self.sure = self.sure.or(over);
+        self.count += R::one();
+        // Newton with the polynomial's slope, then secants.
+        let secant = (value - self.last.1) / (size - self.last.0);
+        self.slope = R::select(R::one().less(self.count), secant, self.slope);
+        let guess = size - value / self.slope;
+        self.last = (size, value);
+        let inside = (self.low.0.abs().less(guess.abs())).and(guess.abs().less(self.high.0.abs()));
+        let patient = self.count.less(R::constant(8.0));
+        let middle = (self.low.0 + self.high.0).scale(0.5);
+        let careful = R::select(self.sure, middle, self.high.0);
+        self.size = R::select(inside.and(patient), guess, careful);
+
+        let done = there.or(grazed);
+        self.on = self.on.map(|on| on.and(done.not()));
+        Landed { there, grazed }
+    }
 }

@@ -54,7 +54,7 @@ where
         return Ok((x0, h0));
     }
     let h0 = if h0 == 0.0 { t1 - t0 } else { h0.copysign(t1 - t0) };
-    let mut driver = Driver::new(system, t0, x0, Some(h0), tolerance);
+    let mut driver: Driver<_, S, D> = Driver::new(system, t0, x0, Some(h0), tolerance);
     while driver.t() != t1 {
         driver.advance(t1)?;
         if driver.counts.accepted > MOST_STEPS {

@@ -1,34 +1,49 @@
 //! Zeros of functions of one variable.
 
-/// A zero of `f` between `a` and `b`, where it has the values `fa` and `fb` of opposite sign.
+use crate::scalar::{Mask, Real};
+
+/// A zero of `f` between `a` and `b`, where it has the values `fa` and `fb` of opposite sign, in each of
+/// the lanes; what the others get means nothing.
 ///
 /// Regula falsi after Anderson & Björck (BIT 13 (1973) 253), with a bisection every third time, which
-/// bounds the work. It stops where `|f| <= zero` or the bracket is down to rounding.
-pub fn bracketed(
-    mut f: impl FnMut(f64) -> f64,
-    (mut a, mut fa): (f64, f64),
-    (mut b, mut fb): (f64, f64),
-    zero: f64,
-) -> f64 {
-    if fa == 0.0 {
-        return a;
-    }
+/// bounds the work. A lane stops where `|f| <= zero` or its bracket is down to rounding.
+#[inline(always)]
+pub fn bracketed<R: Real>(
+    mut f: impl FnMut(R) -> R,
+    (mut a, mut fa): (R, R),
+    (mut b, mut fb): (R, R),
+    zero: R,
+    mut lanes: R::Mask,
+) -> R {
+    // A zero at the start of the bracket is the answer.
+    let at_start = fa.abs().less(R::constant(f64::MIN_POSITIVE));
+    b = R::select(lanes.and(at_start), a, b);
+    lanes = lanes.and(at_start.not());
     for count in 1..=200 {
-        if fb.abs() <= zero || (b - a).abs() <= f64::EPSILON * b.abs() {
+        let done = zero.less(fb.abs()).not().or(b.abs().scale(f64::EPSILON).less((b - a).abs()).not());
+        lanes = lanes.and(done.not());
+        if !lanes.any() {
             break;
         }
-        let c = if count % 3 == 0 { 0.5 * (a + b) } else { b - fb * (b - a) / (fb - fa) };
+        let c = if count % 3 == 0 { (a + b).scale(0.5) } else { b - fb * (b - a) / (fb - fa) };
         let fc = f(c);
-        if (fc < 0.0) != (fb < 0.0) {
-            (a, fa) = (b, fb);
-        } else {
-            // The end `a` stays: weigh it down, so that it too is replaced soon.
-            let weight = 1.0 - fc / fb;
-            fa *= if weight > 0.0 { weight } else { 0.5 };
-        }
-        (b, fb) = (c, fc);
+        let crossed = differ::<R>(fc, fb);
+        // Where the end `a` stays, weigh it down, so that it too is replaced soon.
+        let weight = R::one() - fc / fb;
+        let weight = R::select(R::zero().less(weight), weight, R::constant(0.5));
+        let kept = (a, fa * weight);
+        let new = (R::select(crossed, b, kept.0), R::select(crossed, fb, kept.1));
+        (a, fa) = (R::select(lanes, new.0, a), R::select(lanes, new.1, fa));
+        (b, fb) = (R::select(lanes, c, b), R::select(lanes, fc, fb));
     }
     b
+}
+
+/// Where one of the two is negative and the other is not.
+#[inline(always)]
+fn differ<R: Real>(a: R, b: R) -> R::Mask {
+    let (a, b) = (a.less(R::zero()), b.less(R::zero()));
+    a.and(b.not()).or(b.and(a.not()))
 }
 
 #[cfg(test)]
@@ -42,7 +57,7 @@ mod tests {
             calls += 1;
             f(x)
         };
-        let found = bracketed(counted, (a, f(a)), (b, f(b)), 0.0);
+        let found = bracketed(counted, (a, f(a)), (b, f(b)), 0.0, true);
         assert!((found - wanted).abs() < 1e-15, "{found} for {wanted}");
         assert!(calls <= 200, "{calls} calls");
     }

@@ -4,13 +4,12 @@ use std::array::from_fn;
 
 use thiserror::Error;
 
-use super::step::Step;
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::{Dual, Mask, Real, Scalar};
 
 /// How large the error of a step is.
 pub trait ErrorNorm<S: Scalar, const D: usize> {
-    /// The norm of the error of a step of size `h` from `x`: 1 where it is just allowed.
-    fn of_step(&self, x: &[S; D], step: &Step<S, D>, h: S::Real) -> f64;
+    /// The norm of the error of a step from one state to another: 1 where it is just allowed.
+    fn of_step(&self, error: &[S; D], before: &[S; D], after: &[S; D]) -> S::Real;
 
     /// What is allowed for the state alone.
     fn state(&self) -> &Tolerance;
@@ -37,22 +36,23 @@ impl Default for Tolerance {
 
 impl Tolerance {
     /// The norm of `error`: 1 where it is just allowed.
-    #[inline]
-    pub fn norm<const D: usize>(&self, error: [f64; D], before: [f64; D], after: [f64; D]) -> f64 {
-        let mut sum = 0.0;
+    #[inline(always)]
+    pub fn norm<R: Real, const D: usize>(&self, error: [R; D], before: [R; D], after: [R; D]) -> R {
+        let mut sum = R::zero();
         for n in 0..D {
-            let ratio = error[n] / (self.atol + self.rtol * before[n].abs().max(after[n].abs()));
+            let size = before[n].abs().max(after[n].abs());
+            let ratio = error[n] / (size.scale(self.rtol) + R::constant(self.atol));
             sum += ratio * ratio;
         }
-        (sum / D as f64).sqrt()
+        sum.scale(1.0 / D as f64).sqrt()
     }
 }
 
-impl<S: Scalar<Real = f64>, const D: usize> ErrorNorm<S, D> for Tolerance {
-    #[inline]
-    fn of_step(&self, x: &[S; D], step: &Step<S, D>, h: f64) -> f64 {
-        let real = |x: &[S; D]| from_fn(|n| x[n].real());
-        self.norm(step.real_error(h), real(x), real(&step.x))
+impl<S: Scalar, const D: usize> ErrorNorm<S, D> for Tolerance {
+    #[inline(always)]
+    fn of_step(&self, error: &[S; D], before: &[S; D], after: &[S; D]) -> S::Real {
+        let real = |x: &[S; D]| from_fn::<S::Real, D, _>(|n| x[n].real());
+        self.norm(real(error), real(before), real(after))
     }
 
     fn state(&self) -> &Tolerance {
@@ -67,17 +67,22 @@ impl<S: Scalar<Real = f64>, const D: usize> ErrorNorm<S, D> for Tolerance {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WithTangents(pub Tolerance);
 
-impl<const D: usize, const N: usize> ErrorNorm<Dual<f64, N>, D> for WithTangents {
-    #[inline]
-    fn of_step(&self, x: &[Dual<f64, N>; D], step: &Step<Dual<f64, N>, D>, h: f64) -> f64 {
-        let error = step.error(h);
-        let mut worst = self.0.norm(error.map(|e| e.re), x.map(|v| v.re), step.x.map(|v| v.re));
+impl<R: Real, const D: usize, const N: usize> ErrorNorm<Dual<R, N>, D> for WithTangents {
+    #[inline(always)]
+    fn of_step(&self, error: &[Dual<R, N>; D], before: &[Dual<R, N>; D], after: &[Dual<R, N>; D]) -> R {
+        let mut worst = self.0.of_step(error, before, after);
         for i in 0..N {
-            let length = |v: &[Dual<f64, N>; D]| v.iter().map(|v| v.d[i] * v.d[i]).sum::<f64>();
-            let allowed = self.0.rtol.powi(2) * length(x).max(length(&step.x));
-            if allowed > 0.0 {
-                worst = worst.max((length(&error) / allowed).sqrt());
-            }
+            let length = |v: &[Dual<R, N>; D]| {
+                let mut sum = R::zero();
+                for n in 0..D {
+                    sum += v[n].d[i] * v[n].d[i];
+                }
+                sum
+            };
+            let allowed = length(before).max(length(after)).scale(self.0.rtol * self.0.rtol);
+            let ratio = (length(error) / allowed).sqrt();
+            // A tangent of no length has no error; what is not a number stays.
+            worst = R::select(R::zero().less(allowed).and(ratio.less(worst).not()), ratio, worst);
         }
         worst
     }

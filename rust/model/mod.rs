@@ -61,6 +61,36 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     }
 }
 
+impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
+    #[inline(always)]
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        (**self).rates(t, x, sides)
+    }
+    #[inline(always)]
+    fn surfaces(&self) -> usize {
+        (**self).surfaces()
+    }
+    #[inline(always)]
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        (**self).surface(j, t, x, sides)
+    }
+    fn surface_name(&self, j: usize) -> &'static str {
+        (**self).surface_name(j)
+    }
+    #[inline(always)]
+    fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        (**self).switch(j, t, x, sides, here);
+    }
+    #[inline(always)]
+    fn jumps(&self, j: usize) -> bool {
+        (**self).jumps(j)
+    }
+    #[inline(always)]
+    fn wall(&self, x: &[S; D]) -> Option<S> {
+        (**self).wall(x)
+    }
+}
+
 /// The sides on which a state lies, by the sign of each surface's function.
 pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: &[S; D]) -> Sides<S> {
     let mut sides = [S::mask(true); MAX_SURFACES];

@@ -29,7 +29,8 @@ pub struct Pendulum<S> {
 impl<S: Scalar> System<S, 2> for Pendulum<S> {
     #[inline]
     fn rates(&self, t: S, &[omega, theta]: &[S; 2], sides: &Sides<S>) -> [S; 2] {
-        let y = self.length * theta.sin();
+        let (sin, cos) = theta.sin_cos();
+        let y = self.length * sin;
         let mut forces = Slots::default();
         if !self.effects.is_empty() {
             let at = At {
@@ -37,7 +38,7 @@ impl<S: Scalar> System<S, 2> for Pendulum<S> {
                 omega,
                 speed: S::select(sides[0], omega, -omega),
                 y,
-                z: -(self.length * theta.cos()),
+                z: -(self.length * cos),
                 beta: theta,
                 k: self.k0,
                 inertia: self.inertia,

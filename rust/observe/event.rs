@@ -1,6 +1,6 @@
 //! What happened when.
 
-use crate::integrate::{Driver, Ending};
+use crate::integrate::{Driver, Ending, Method, Tolerance};
 use crate::model::System;
 
 /// What an event is.
@@ -22,7 +22,11 @@ pub struct Event<const D: usize> {
 
 impl<const D: usize> Event<D> {
     /// The event at the end of the driver's last step, if there is one.
-    pub fn seen<M: System<f64, D>>(ending: Ending, driver: &Driver<'_, M, f64, D>) -> Option<Self> {
+    pub fn seen<M, K>(ending: Ending, driver: &Driver<M, f64, D, Tolerance, K>) -> Option<Self>
+    where
+        M: System<f64, D>,
+        K: Method<f64, D>,
+    {
         let kind = match ending {
             Ending::Free => return None,
             Ending::Surface(j) => EventKind::Surface(j),

@@ -1,28 +1,38 @@
 //! A whole run as a piecewise polynomial.
 
-use crate::integrate::{Dense, Driver};
+use std::array::from_fn;
+
+use crate::integrate::{Driver, Method, Tolerance};
 use crate::model::System;
 
 /// The polynomials of all steps.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Record<const D: usize> {
     /// The times between steps, one more than there are steps.
     times: Vec<f64>,
-    pieces: Vec<(f64, Dense<f64, D>)>,
+    /// Each piece's unit of time and where its coefficients end.
+    pieces: Vec<(f64, usize)>,
+    coefficients: Vec<[f64; D]>,
+    /// The state where there is no step.
+    start: [f64; D],
 }
 
 impl<const D: usize> Record<D> {
-    /// Begins at time `t`.
-    pub fn new(t: f64) -> Self {
-        Self { times: vec![t], pieces: Vec::new() }
+    /// Begins at time `t` and state `x`.
+    pub fn new(t: f64, x: [f64; D]) -> Self {
+        Self { times: vec![t], pieces: Vec::new(), coefficients: Vec::new(), start: x }
     }
 
     /// Adds the driver's last step.
-    pub fn push<M: System<f64, D>>(&mut self, driver: &Driver<'_, M, f64, D>) {
-        let (size, dense) = driver.dense();
-        if size != 0.0 {
+    pub fn push<M, K>(&mut self, driver: &Driver<M, f64, D, Tolerance, K>)
+    where
+        M: System<f64, D>,
+        K: Method<f64, D>,
+    {
+        if driver.size() != 0.0 {
             self.times.push(driver.t());
-            self.pieces.push((size, dense));
+            let unit = driver.method().polynomial(&mut self.coefficients);
+            self.pieces.push((unit, self.coefficients.len()));
         }
     }
 
@@ -34,11 +44,15 @@ impl<const D: usize> Record<D> {
     /// The state at time `t`; `None` outside the run.
     pub fn at(&self, t: f64) -> Option<[f64; D]> {
         let (first, last) = self.span();
-        if !(first..=last).contains(&t) || self.pieces.is_empty() {
+        if !(first..=last).contains(&t) {
             return None;
         }
-        let next = self.times.partition_point(|&time| time <= t).clamp(1, self.pieces.len());
-        let (size, dense) = &self.pieces[next - 1];
-        Some(dense.at(((t - self.times[next - 1]) / size).min(1.0)))
+        let Some(newest) = self.pieces.len().checked_sub(1) else { return Some(self.start) };
+        let piece = self.times.partition_point(|&time| time <= t).saturating_sub(1).min(newest);
+        let begin = if piece == 0 { 0 } else { self.pieces[piece - 1].1 };
+        let (unit, end) = self.pieces[piece];
+        let theta = (t - self.times[piece]) / unit;
+        let own = &self.coefficients[begin..end];
+        Some(from_fn(|n| own.iter().rev().fold(0.0, |sum, c| sum * theta + c[n])))
     }
 }

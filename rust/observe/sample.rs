@@ -1,6 +1,6 @@
 //! The state at given times, read off the polynomials of the steps.
 
-use crate::integrate::Driver;
+use crate::integrate::{Driver, Method, Tolerance};
 use crate::model::System;
 
 /// Samples at increasing times.
@@ -22,17 +22,20 @@ impl<'a, const D: usize> Samples<'a, D> {
     }
 
     /// Takes the samples that lie in the driver's last step.
-    pub fn take<M: System<f64, D>>(&mut self, driver: &Driver<'_, M, f64, D>) {
+    pub fn take<M, K>(&mut self, driver: &Driver<M, f64, D, Tolerance, K>)
+    where
+        M: System<f64, D>,
+        K: Method<f64, D>,
+    {
         let end = driver.t();
         if self.times.get(self.x.len()).is_none_or(|&t| t > end) {
             return;
         }
-        let (size, dense) = driver.dense();
         while let Some(&t) = self.times.get(self.x.len()) {
             if t > end {
                 break;
             }
-            let x = if t == end { *driver.x() } else { dense.at((t - driver.from()) / size) };
+            let x = if t == end { *driver.x() } else { driver.dense(t - driver.from()) };
             self.x.push(x);
         }
     }

@@ -48,7 +48,8 @@ pub fn largest_exponent<M: System<Dual<f64, 1>, D>, const D: usize>(
     // A direction that no symmetry singles out.
     let direction: [f64; D] = from_fn(|n| [1.0, -0.7, 0.5, 0.3][n % 4]);
     let start = from_fn(|n| Dual { re: x0[n], d: [direction[n]] });
-    let mut driver = Driver::new(system, 0.0, start, None, &WithTangents(options.tolerance)).with_wall();
+    let norm = WithTangents(options.tolerance);
+    let mut driver: Driver<_, _, D, _> = Driver::new(system, 0.0, start, None, &norm).with_wall();
     let mut blocks = Blocks::new((options.time - options.transient) / (8 * Blocks::MOST) as f64);
     rescale(&mut driver);
 
@@ -95,10 +96,10 @@ fn length<const D: usize>(x: &[Dual<f64, 1>; D]) -> f64 {
 
 /// Scales the tangent to length 1; returns the logarithm of the length it had.
 fn rescale<M: System<Dual<f64, 1>, D>, const D: usize>(
-    driver: &mut Driver<'_, M, Dual<f64, 1>, D, WithTangents>,
+    driver: &mut Driver<M, Dual<f64, 1>, D, WithTangents>,
 ) -> f64 {
     let size = length(driver.x());
-    driver.set_state(driver.x().map(|v| Dual { re: v.re, d: [v.d[0] / size] }));
+    driver.set_state(true, driver.x().map(|v| Dual { re: v.re, d: [v.d[0] / size] }));
     size.ln()
 }
 

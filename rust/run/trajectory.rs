@@ -67,10 +67,10 @@ pub fn trajectory<M: System<f64, D>, const D: usize>(
     let mut samples = Samples::new(times, x0);
     let mut steps = (vec![start], vec![x0]);
     let mut events = Vec::new();
-    let mut record = keep.then(|| Record::new(start));
+    let mut record = keep.then(|| Record::new(start, x0));
     let mut outcome = Outcome::Finished;
 
-    let mut driver = Driver::new(system, start, x0, None, tolerance).with_wall();
+    let mut driver: Driver<_, f64, D> = Driver::new(system, start, x0, None, tolerance).with_wall();
     while driver.t() < end {
         stop.check()?;
         let ending = driver.advance(end)?;

@@ -153,11 +153,16 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     }
     #[inline(always)]
     fn sin(self) -> Self {
-        self.chain(self.re.sin(), self.re.cos())
+        self.sin_cos().0
     }
     #[inline(always)]
     fn cos(self) -> Self {
-        self.chain(self.re.cos(), -self.re.sin())
+        self.sin_cos().1
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.re.sin_cos();
+        (self.chain(sin, cos), self.chain(cos, -sin))
     }
     #[inline(always)]
     fn tanh(self) -> Self {

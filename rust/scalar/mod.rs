@@ -69,6 +69,11 @@ pub trait Scalar:
     fn sin(self) -> Self;
     fn cos(self) -> Self;
     fn tanh(self) -> Self;
+    /// Sine and cosine at the cost of one.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        (self.sin(), self.cos())
+    }
 
     fn square(self) -> Self {
         self * self
@@ -123,4 +128,6 @@ pub trait Mask: Copy + Debug + Send + Sync + PartialEq + 'static {
     fn not(self) -> Self;
     /// Whether any lane is true.
     fn any(self) -> bool;
+    /// How many lanes are true.
+    fn count(self) -> u64;
 }

@@ -51,6 +51,10 @@ impl<const L: usize> Mask for LaneMask<L> {
     fn any(self) -> bool {
         self.0.iter().fold(0, |any, bits| any | bits) != 0
     }
+    #[inline(always)]
+    fn count(self) -> u64 {
+        self.0.iter().fold(0, |count, bits| count + (bits & 1))
+    }
 }
 
 macro_rules! lanewise {
@@ -173,5 +177,9 @@ impl<const L: usize> Scalar for Packet<L> {
     #[inline(always)]
     fn tanh(self) -> Self {
         elementary::tanh(self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        elementary::sin_cos(self)
     }
 }

@@ -62,6 +62,10 @@ impl Scalar for f64 {
     fn tanh(self) -> f64 {
         elementary::tanh(self)
     }
+    #[inline(always)]
+    fn sin_cos(self) -> (f64, f64) {
+        elementary::sin_cos(self)
+    }
 }
 
 impl Real for f64 {
@@ -113,5 +117,9 @@ impl Mask for bool {
     #[inline(always)]
     fn any(self) -> bool {
         self
+    }
+    #[inline(always)]
+    fn count(self) -> u64 {
+        u64::from(self)
     }
 }

@@ -23,7 +23,7 @@ impl Law for DriveRipple {
 
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-        let phase = (p[2] * at.t).scale(std::f64::consts::TAU);
-        slots.vertical += at.w * (p[0] * phase.cos() + p[1] * phase.sin());
+        let (sin, cos) = (p[2] * at.t).scale(std::f64::consts::TAU).sin_cos();
+        slots.vertical += at.w * (p[0] * cos + p[1] * sin);
     }
 }

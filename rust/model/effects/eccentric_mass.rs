@@ -22,6 +22,7 @@ impl Law for EccentricMass {
 
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-        slots.torque += p[0] * at.beta.sin() + p[1] * at.beta.cos();
+        let (sin, cos) = at.beta.sin_cos();
+        slots.torque += p[0] * sin + p[1] * cos;
     }
 }

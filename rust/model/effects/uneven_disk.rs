@@ -26,7 +26,7 @@ impl Law for UnevenDisk {
 
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-        let angle = p[2] * at.beta;
-        slots.torque += p[0] * angle.sin() + p[1] * angle.cos();
+        let (sin, cos) = (p[2] * at.beta).sin_cos();
+        slots.torque += p[0] * sin + p[1] * cos;
     }
 }

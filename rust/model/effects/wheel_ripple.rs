@@ -23,7 +23,7 @@ impl Law for WheelRipple {
 
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-        let phase = at.w * at.t / p[2];
-        slots.vertical += at.w * (p[0] * phase.cos() + p[1] * phase.sin());
+        let (sin, cos) = (at.w * at.t / p[2]).sin_cos();
+        slots.vertical += at.w * (p[0] * cos + p[1] * sin);
     }
 }

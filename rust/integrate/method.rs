@@ -1,0 +1,65 @@
+//! What a one-step method is to the stepping loop.
+
+use super::tolerance::ErrorNorm;
+use crate::model::{Sides, System};
+use crate::scalar::Scalar;
+
+/// Where a run stands, lane by lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Point<S: Scalar, const D: usize> {
+    pub t: S::Real,
+    pub x: [S; D],
+    /// The side of each switching surface that the law is taken on.
+    pub sides: Sides<S>,
+}
+
+/// What a trial step gives.
+#[derive(Clone, Copy, Debug)]
+pub struct Trial<S: Scalar, const D: usize> {
+    /// The new state.
+    pub x: [S; D],
+    /// The step's size: the one asked for, or less where the method itself knows that it is too long.
+    pub size: S::Real,
+    /// The norm of the step's error: 1 where it is just allowed.
+    pub error: S::Real,
+}
+
+/// A one-step method over lanes; it keeps what it needs from one step to the next.
+pub trait Method<S: Scalar, const D: usize> {
+    /// The order of the solution that is carried on.
+    const ORDER: i32;
+    /// Whether the polynomial is as accurate as the new state, so that a step can end anywhere on it.
+    const SERIES: bool;
+    /// Where within a step switching surfaces are looked at, so that one crossed twice is seen too.
+    const PROBES: &'static [f64];
+
+    /// A method at rest.
+    fn new() -> Self;
+
+    /// Gets ready to step from `at`, in these lanes; the others keep what they have.
+    fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask);
+
+    /// Tries a step of size `h`.
+    fn attempt(
+        &mut self,
+        system: &impl System<S, D>,
+        at: &Point<S, D>,
+        h: S::Real,
+        norm: &impl ErrorNorm<S, D>,
+    ) -> Trial<S, D>;
+
+    /// Completes the polynomial of the last trial.
+    fn extend(&mut self, system: &impl System<S, D>, at: &Point<S, D>);
+
+    /// Goes on from the end of the last trial, in these lanes.
+    fn accept(&mut self, lanes: S::Mask);
+
+    /// The state at `dt` after the start of the last trial, on its polynomial.
+    fn at(&self, dt: S::Real) -> [S; D];
+
+    /// The same polynomial's unit of time and its coefficients, lowest first: `x = Σ_k c_k (dt/unit)^k`.
+    fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;
+
+    /// Evaluations of the rates in a trial.
+    fn evaluations() -> u64;
+}

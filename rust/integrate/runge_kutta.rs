@@ -1,0 +1,168 @@
+//! Explicit Runge-Kutta pairs.
+
+use std::array::from_fn;
+use std::marker::PhantomData;
+
+use super::method::{Method, Point, Trial};
+use super::tableau::{DormandPrince, Scheme};
+use super::tolerance::ErrorNorm;
+use crate::model::{Sides, System};
+use crate::scalar::Scalar;
+
+/// The rates at all stages and the new state of a step of size `h` from time `t` and state `x`, whose
+/// rate is `first`. The last of the stages that make a step is the rate at the new state.
+///
+/// It is a pure function, and generic over the scalar: `h` has one value per lane and no derivatives.
+/// The sides of the switching surfaces stay as given, so the step sees a smooth law.
+#[inline(always)]
+pub fn step<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P: usize>(
+    system: &impl System<S, D>,
+    t: S::Real,
+    x: &[S; D],
+    first: &[S; D],
+    h: S::Real,
+    sides: &Sides<S>,
+) -> ([S; D], [[S; D]; N]) {
+    let mut stages = [*first; N];
+    let mut new = *x;
+    for i in 1..T::TABLEAU.stages {
+        new = stage::<T, S, D, N, P>(i, x, &stages, h);
+        stages[i] = system.rates(S::lift(t + h.scale(T::TABLEAU.c[i])), &new, sides);
+    }
+    (new, stages)
+}
+
+/// The argument of stage `i`.
+#[inline(always)]
+fn stage<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P: usize>(
+    i: usize,
+    x: &[S; D],
+    stages: &[[S; D]; N],
+    h: S::Real,
+) -> [S; D] {
+    from_fn(|n| x[n] + combine(&T::TABLEAU.a[i], stages, i, n).times(h))
+}
+
+/// `Σ_(j < count) weights_j k_j` for component `n`, the zero weights left out.
+#[inline(always)]
+fn combine<S: Scalar, const D: usize, const N: usize>(
+    weights: &[f64; N],
+    stages: &[[S; D]; N],
+    count: usize,
+    n: usize,
+) -> S {
+    let mut sum = stages[0][n].scale(weights[0]);
+    for j in 1..count {
+        if weights[j] != 0.0 {
+            sum += stages[j][n].scale(weights[j]);
+        }
+    }
+    sum
+}
+
+/// A Runge-Kutta pair as a [`Method`].
+#[derive(Clone, Copy, Debug)]
+pub struct RungeKutta<T, S: Scalar, const D: usize, const N: usize, const P: usize> {
+    /// The start of the last trial, its size and its stages' rates.
+    x: [S; D],
+    h: S::Real,
+    stages: [[S; D]; N],
+    /// The rate at the point reached.
+    first: [S; D],
+    scheme: PhantomData<T>,
+}
+
+/// Dormand & Prince's pair of order 5(4).
+pub type Dopri5<S, const D: usize> = RungeKutta<DormandPrince, S, D, 7, 4>;
+
+impl<T, S, const D: usize, const N: usize, const P: usize> RungeKutta<T, S, D, N, P>
+where
+    T: Scheme<N, P>,
+    S: Scalar,
+{
+    /// The coefficient of `h θ^(j+1)` in component `n`.
+    #[inline(always)]
+    fn power(&self, j: usize, n: usize) -> S {
+        let mut power = self.stages[0][n].scale(T::TABLEAU.p[0][j]);
+        for i in 1..N {
+            if T::TABLEAU.p[i][j] != 0.0 {
+                power += self.stages[i][n].scale(T::TABLEAU.p[i][j]);
+            }
+        }
+        power
+    }
+}
+
+impl<T, S, const D: usize, const N: usize, const P: usize> Method<S, D> for RungeKutta<T, S, D, N, P>
+where
+    T: Scheme<N, P>,
+    S: Scalar,
+{
+    const ORDER: i32 = T::TABLEAU.order;
+    const SERIES: bool = false;
+    const PROBES: &'static [f64] = &[0.25, 0.5, 0.75, 1.0];
+
+    fn new() -> Self {
+        let zero = [S::zero(); D];
+        Self { x: zero, h: S::Real::zero(), stages: [zero; N], first: zero, scheme: PhantomData }
+    }
+
+    #[inline(always)]
+    fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {
+        let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
+        self.first = from_fn(|n| S::select(lanes, rate[n], self.first[n]));
+    }
+
+    #[inline(always)]
+    fn attempt(
+        &mut self,
+        system: &impl System<S, D>,
+        at: &Point<S, D>,
+        h: S::Real,
+        norm: &impl ErrorNorm<S, D>,
+    ) -> Trial<S, D> {
+        let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
+        let error = from_fn(|n| combine(&T::TABLEAU.e, &stages, T::TABLEAU.stages, n).times(h));
+        let error = norm.of_step(&error, &at.x, &x);
+        (self.x, self.h, self.stages) = (at.x, h, stages);
+        Trial { x, size: h, error }
+    }
+
+    #[inline(always)]
+    fn extend(&mut self, system: &impl System<S, D>, at: &Point<S, D>) {
+        for i in T::TABLEAU.stages..N {
+            let x = stage::<T, S, D, N, P>(i, &self.x, &self.stages, self.h);
+            self.stages[i] = system.rates(S::lift(at.t + self.h.scale(T::TABLEAU.c[i])), &x, &at.sides);
+        }
+    }
+
+    #[inline(always)]
+    fn accept(&mut self, lanes: S::Mask) {
+        let last = &self.stages[T::TABLEAU.stages - 1];
+        self.first = from_fn(|n| S::select(lanes, last[n], self.first[n]));
+    }
+
+    #[inline(always)]
+    fn at(&self, dt: S::Real) -> [S; D] {
+        // No step, no way along it.
+        let moving = S::Real::zero().less(self.h * self.h);
+        let theta = S::Real::select(moving, dt / self.h, S::Real::zero());
+        from_fn(|n| {
+            let mut sum = S::zero();
+            for j in (0..P).rev() {
+                sum = sum.times(theta) + self.power(j, n);
+            }
+            self.x[n] + sum.times(theta).times(self.h)
+        })
+    }
+
+    fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
+        coefficients.push(self.x);
+        coefficients.extend((0..P).map(|j| from_fn(|n| self.power(j, n).times(self.h))));
+        self.h
+    }
+
+    fn evaluations() -> u64 {
+        T::TABLEAU.stages as u64 - 1
+    }
+}

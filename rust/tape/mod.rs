@@ -1,0 +1,72 @@
+//! A model recorded once, as a list of operations, and its power series.
+//!
+//! A model's rates are evaluated once over [symbols](Symbol), which gives a [`Tape`]. The tape yields
+//! what repeated evaluation of the rates cannot: the Taylor coefficients of the solution, order by
+//! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
+
+mod jet;
+mod node;
+mod reach;
+mod record;
+mod series;
+mod symbol;
+
+pub use jet::Jets;
+pub use node::{Held, Node, Step};
+pub use record::Unrecordable;
+pub use symbol::{Function, SideOf, Symbol};
+
+use crate::model::Sides;
+use crate::scalar::Scalar;
+
+/// The operations that give the rates of a system of `D` equations.
+///
+/// ```
+/// use udd::model::DleFamily;
+/// use udd::tape::Tape;
+/// // Without damping, B = 0: two products.
+/// let tape = Tape::record(&DleFamily, &[None, Some(0.0)]).unwrap();
+/// let x = [1.0, 2.0, 3.0];
+/// assert_eq!(tape.rates(&[7.1, 0.0], 0.0, &x, &[true; 4]), [1.0, 3.0, 5.1]);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tape<const D: usize> {
+    /// Values that do not change along a solution, each made of earlier ones.
+    pub(crate) held: Vec<Held>,
+    /// What changes along a solution; a step uses the results of earlier ones.
+    pub(crate) steps: Vec<Step>,
+    /// Where the rates are found.
+    pub(crate) rates: [u16; D],
+    /// How many series there are; the first `D` are the state.
+    pub(crate) slots: usize,
+}
+
+impl<const D: usize> Tape<D> {
+    /// What changes along a solution, in the order of evaluation.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// What does not change along a solution, in the order of evaluation.
+    pub fn held(&self) -> &[Held] {
+        &self.held
+    }
+
+    /// The rates at time `t` and state `x`, with these values of the parameters.
+    ///
+    /// # Panics
+    /// Where there are fewer parameters than the model has.
+    #[inline(always)]
+    pub fn rates<S: Scalar>(&self, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        let mut held = Vec::with_capacity(self.held.len());
+        node::hold(&self.held, parameters, sides, &mut held);
+        let mut work = vec![[S::zero()]; self.slots];
+        for n in 0..D {
+            work[n][0] = x[n];
+        }
+        for step in &self.steps {
+            step.start(&mut work, &held, t, sides);
+        }
+        self.rates.map(|slot| work[usize::from(slot)][0])
+    }
+}

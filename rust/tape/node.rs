@@ -1,0 +1,241 @@
+//! The operations of a tape and the recurrences of their power series.
+//!
+//! Products: Leibniz. The others follow from the differential equation of the function, as
+//! `(exp a)' = exp(a) a'` (À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99).
+
+use super::series::{inner, inner_square, product, square};
+use super::symbol::Function;
+use crate::model::Sides;
+use crate::scalar::Scalar;
+
+/// A value that does not change along a solution; operands are earlier ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Held {
+    Constant(f64),
+    Parameter(u16),
+    Neg(u16),
+    Add(u16, u16),
+    Sub(u16, u16),
+    Mul(u16, u16),
+    Div(u16, u16),
+    /// An elementary function.
+    Apply(Function, u16),
+    /// The first on the positive side of this surface, else the second.
+    Select(u16, u16, u16),
+}
+
+/// An operation on series, with the numbers of their slots; `h` is the number of a [`Held`] value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Node {
+    /// `t`
+    Time,
+    /// `h`
+    Hold(u16),
+    /// `-a`
+    Neg(u16),
+    /// `a + b`
+    Add(u16, u16),
+    /// `a - b`
+    Sub(u16, u16),
+    /// `a + h`
+    Plus(u16, u16),
+    /// `a - h`
+    Minus(u16, u16),
+    /// `h - a`
+    From(u16, u16),
+    /// `a h`
+    Scale(u16, u16),
+    /// `a b`
+    Mul(u16, u16),
+    /// `a^2`
+    Square(u16),
+    /// `a / b`; its second slot is for `1 / b[0]`.
+    Div(u16, u16),
+    /// `h / a`; its second slot is for `1 / a[0]`.
+    Over(u16, u16),
+    /// Its second slot is for half the root's inverse.
+    Sqrt(u16),
+    /// Its second slot is for the argument's derivative.
+    Exp(u16),
+    /// Its second slot is for its own derivative, its third for `1 / a[0]`.
+    Ln(u16),
+    /// Sine, cosine; the third slot is for the argument's derivative.
+    SinCos(u16),
+    /// Its other slots are for its slope `1 - tanh^2` and the argument's derivative.
+    Tanh(u16),
+    /// The first on the positive side of this surface, else the second.
+    Select(u16, u16, u16),
+}
+
+impl Node {
+    /// How many slots it fills.
+    pub(super) fn slots(self) -> usize {
+        match self {
+            Node::Div(..) | Node::Over(..) | Node::Sqrt(_) | Node::Exp(_) => 2,
+            Node::Ln(_) | Node::SinCos(_) | Node::Tanh(_) => 3,
+            _ => 1,
+        }
+    }
+}
+
+/// An operation and the first slot that it fills.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    pub node: Node,
+    pub to: u16,
+}
+
+/// Evaluates the held values one after the other.
+#[inline(always)]
+pub(super) fn hold<S: Scalar>(list: &[Held], parameters: &[S], sides: &Sides<S>, values: &mut Vec<S>) {
+    values.clear();
+    for &held in list {
+        let of = |i: u16| values[usize::from(i)];
+        let value = match held {
+            Held::Constant(value) => S::constant(value),
+            Held::Parameter(i) => parameters[usize::from(i)],
+            Held::Neg(a) => -of(a),
+            Held::Add(a, b) => of(a) + of(b),
+            Held::Sub(a, b) => of(a) - of(b),
+            Held::Mul(a, b) => of(a) * of(b),
+            Held::Div(a, b) => of(a) / of(b),
+            Held::Apply(function, a) => function.of(of(a)),
+            Held::Select(j, a, b) => S::select(sides[usize::from(j)], of(a), of(b)),
+        };
+        values.push(value);
+    }
+}
+
+/// `1/k`
+pub(super) const INVERSE: [f64; 33] = {
+    let mut table = [1.0; 33];
+    let mut k = 2;
+    while k < 33 {
+        table[k] = 1.0 / k as f64;
+        k += 1;
+    }
+    table
+};
+
+impl Step {
+    /// Coefficient 0.
+    #[inline(always)]
+    pub(super) fn start<S: Scalar, const N: usize>(
+        self,
+        work: &mut [[S; N]],
+        held: &[S],
+        t: S,
+        sides: &Sides<S>,
+    ) {
+        let (done, to) = work.split_at_mut(usize::from(self.to));
+        let of = |i: u16| done[usize::from(i)][0];
+        let h = |i: u16| held[usize::from(i)];
+        to[0][0] = match self.node {
+            Node::Time => t,
+            Node::Hold(c) => h(c),
+            Node::Neg(a) => -of(a),
+            Node::Add(a, b) => of(a) + of(b),
+            Node::Sub(a, b) => of(a) - of(b),
+            Node::Plus(a, c) => of(a) + h(c),
+            Node::Minus(a, c) => of(a) - h(c),
+            Node::From(c, a) => h(c) - of(a),
+            Node::Scale(a, c) => of(a) * h(c),
+            Node::Mul(a, b) => of(a) * of(b),
+            Node::Square(a) => of(a).square(),
+            Node::Div(a, b) => {
+                to[1][0] = S::one() / of(b);
+                of(a) * to[1][0]
+            }
+            Node::Over(c, b) => {
+                to[1][0] = S::one() / of(b);
+                h(c) * to[1][0]
+            }
+            Node::Sqrt(a) => {
+                let root = of(a).sqrt();
+                to[1][0] = S::constant(0.5) / root;
+                root
+            }
+            Node::Exp(a) => of(a).exp(),
+            Node::Ln(a) => {
+                to[2][0] = S::one() / of(a);
+                of(a).ln()
+            }
+            Node::SinCos(a) => {
+                to[1][0] = of(a).cos();
+                of(a).sin()
+            }
+            Node::Tanh(a) => {
+                let value = of(a).tanh();
+                to[1][0] = S::one() - value.square();
+                value
+            }
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of(a), of(b)),
+        };
+    }
+
+    /// Coefficient `k >= 1`, from those of lower order and the operands' coefficients up to `k`.
+    #[inline(always)]
+    pub(super) fn next<S: Scalar, const N: usize>(
+        self,
+        work: &mut [[S; N]],
+        held: &[S],
+        sides: &Sides<S>,
+        k: usize,
+    ) {
+        let (done, to) = work.split_at_mut(usize::from(self.to));
+        let of = |i: u16| &done[usize::from(i)];
+        let h = |i: u16| held[usize::from(i)];
+        let (weight, inverse) = (k as f64, INVERSE[k]);
+        to[0][k] = match self.node {
+            Node::Time if k == 1 => S::one(),
+            Node::Time | Node::Hold(_) => S::zero(),
+            Node::Neg(a) | Node::From(_, a) => -of(a)[k],
+            Node::Add(a, b) => of(a)[k] + of(b)[k],
+            Node::Sub(a, b) => of(a)[k] - of(b)[k],
+            Node::Plus(a, _) | Node::Minus(a, _) => of(a)[k],
+            Node::Scale(a, c) => of(a)[k] * h(c),
+            Node::Mul(a, b) => product(of(a), of(b), k),
+            Node::Square(a) => square(of(a), k),
+            // The quotient q of a = q b.
+            Node::Div(a, b) => {
+                let b = of(b);
+                ((of(a)[k] - inner(&to[0], b, k)) - to[0][0] * b[k]) * to[1][0]
+            }
+            Node::Over(_, b) => {
+                let b = of(b);
+                -((inner(&to[0], b, k) + to[0][0] * b[k]) * to[1][0])
+            }
+            // The root r of a = r^2.
+            Node::Sqrt(a) => (of(a)[k] - inner_square(&to[0], k)) * to[1][0],
+            Node::Exp(a) => {
+                let slope = of(a)[k].scale(weight);
+                to[1][k] = slope;
+                (inner(&to[1], &to[0], k) + slope * to[0][0]).scale(inverse)
+            }
+            // a l' = a'
+            Node::Ln(a) => {
+                let a = of(a);
+                let slope = (a[k].scale(weight) - inner(&to[1], a, k)) * to[2][0];
+                to[1][k] = slope;
+                slope.scale(inverse)
+            }
+            Node::SinCos(a) => {
+                let slope = of(a)[k].scale(weight);
+                to[2][k] = slope;
+                let cosine = (inner(&to[2], &to[0], k) + slope * to[0][0]).scale(-inverse);
+                let sine = (inner(&to[2], &to[1], k) + slope * to[1][0]).scale(inverse);
+                to[1][k] = cosine;
+                sine
+            }
+            Node::Tanh(a) => {
+                let slope = of(a)[k].scale(weight);
+                to[2][k] = slope;
+                let value = (inner(&to[2], &to[1], k) + slope * to[1][0]).scale(inverse);
+                to[0][k] = value;
+                to[1][k] = -square(&to[0], k);
+                value
+            }
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of(a)[k], of(b)[k]),
+        };
+    }
+}

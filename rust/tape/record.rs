@@ -1,0 +1,168 @@
+//! From a model to its tape.
+
+use std::array::from_fn;
+use std::collections::HashMap;
+
+use thiserror::Error;
+
+use super::symbol::{self, Function, Made, Recording, SideOf, Symbol};
+use super::{Held, Node, Step, Tape};
+use crate::model::{Family, MAX_SURFACES, Sides, System};
+use crate::scalar::Scalar;
+
+/// Why a model has no tape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("the model's law depends on comparisons, which no power series follows")]
+pub struct Unrecordable;
+
+impl<const D: usize> Tape<D> {
+    /// Records the rates of the family's systems. Parameters whose value is `fixed` become constants,
+    /// and what they make vanish is left out.
+    ///
+    /// # Errors
+    /// Where the model looks at the value of a number, which a recording does not have.
+    pub fn record<F: Family<D>>(family: &F, fixed: &[Option<f64>]) -> Result<Self, Unrecordable> {
+        symbol::begin();
+        let parameter = |i: usize| match fixed.get(i).copied().flatten() {
+            Some(value) => Symbol::constant(value),
+            None => symbol::make(Made::Parameter(i)),
+        };
+        let parameters: Vec<Symbol> = (0..family.parameters().len()).map(parameter).collect();
+        let system = family.build(&parameters);
+        let x = from_fn(|n| symbol::make(Made::State(n)));
+        let sides: Sides<Symbol> = from_fn(|j| match j < System::<Symbol, D>::surfaces(&system) {
+            true => SideOf::Surface(j),
+            false => SideOf::Known(true),
+        });
+        let rates = system.rates(symbol::make(Made::Time), &x, &sides);
+        let recording = symbol::end();
+        if recording.looked { Err(Unrecordable) } else { Ok(Lowering::new(&recording, D).tape(rates)) }
+    }
+}
+
+/// Turns symbols into nodes, only those that the rates need.
+struct Lowering<'a> {
+    recording: &'a Recording,
+    held: Vec<Held>,
+    steps: Vec<Step>,
+    slots: usize,
+    /// Where each symbol's value is held, or its series stored.
+    held_at: HashMap<Symbol, u16>,
+    slot_of: HashMap<Symbol, u16>,
+    circle_of: HashMap<Symbol, u16>,
+}
+
+fn index(i: usize) -> u16 {
+    u16::try_from(i).expect("fewer than 65536 nodes")
+}
+
+impl<'a> Lowering<'a> {
+    fn new(recording: &'a Recording, states: usize) -> Self {
+        Self {
+            recording,
+            held: Vec::new(),
+            steps: Vec::new(),
+            slots: states,
+            held_at: HashMap::new(),
+            slot_of: HashMap::new(),
+            circle_of: HashMap::new(),
+        }
+    }
+
+    fn tape<const D: usize>(mut self, rates: [Symbol; D]) -> Tape<D> {
+        let rates = rates.map(|s| self.slot(s));
+        assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
+        Tape { held: self.held, steps: self.steps, rates, slots: self.slots }
+    }
+
+    fn varies(&self, s: Symbol) -> bool {
+        self.recording.varies[s.0 as usize]
+    }
+
+    fn made(&self, s: Symbol) -> Made {
+        self.recording.made[s.0 as usize]
+    }
+
+    /// Where the value of a symbol that does not vary is held.
+    fn held(&mut self, s: Symbol) -> u16 {
+        if let Some(&at) = self.held_at.get(&s) {
+            return at;
+        }
+        let held = match self.made(s) {
+            Made::Constant(bits) => Held::Constant(f64::from_bits(bits)),
+            Made::Parameter(i) => Held::Parameter(index(i)),
+            Made::Neg(a) => Held::Neg(self.held(a)),
+            Made::Add(a, b) => Held::Add(self.held(a), self.held(b)),
+            Made::Sub(a, b) => Held::Sub(self.held(a), self.held(b)),
+            Made::Mul(a, b) => Held::Mul(self.held(a), self.held(b)),
+            Made::Div(a, b) => Held::Div(self.held(a), self.held(b)),
+            Made::Apply(f, a) => Held::Apply(f, self.held(a)),
+            Made::Select(j, a, b) => Held::Select(index(j), self.held(a), self.held(b)),
+            Made::Time | Made::State(_) => unreachable!("time and state vary"),
+        };
+        self.held.push(held);
+        let at = index(self.held.len() - 1);
+        self.held_at.insert(s, at);
+        at
+    }
+
+    fn push(&mut self, node: Node) -> u16 {
+        let to = index(self.slots);
+        self.slots += node.slots();
+        self.steps.push(Step { node, to });
+        to
+    }
+
+    /// Where the series of a symbol is stored.
+    fn slot(&mut self, s: Symbol) -> u16 {
+        if let Some(&slot) = self.slot_of.get(&s) {
+            return slot;
+        }
+        let slot = self.lower(s);
+        self.slot_of.insert(s, slot);
+        slot
+    }
+
+    fn lower(&mut self, s: Symbol) -> u16 {
+        if !self.varies(s) {
+            let node = Node::Hold(self.held(s));
+            return self.push(node);
+        }
+        let node = match self.made(s) {
+            Made::State(n) => return index(n),
+            Made::Time => Node::Time,
+            Made::Neg(a) => Node::Neg(self.slot(a)),
+            Made::Add(a, b) if !self.varies(a) => Node::Plus(self.slot(b), self.held(a)),
+            Made::Add(a, b) if !self.varies(b) => Node::Plus(self.slot(a), self.held(b)),
+            Made::Add(a, b) => Node::Add(self.slot(a), self.slot(b)),
+            Made::Sub(a, b) if !self.varies(a) => Node::From(self.held(a), self.slot(b)),
+            Made::Sub(a, b) if !self.varies(b) => Node::Minus(self.slot(a), self.held(b)),
+            Made::Sub(a, b) => Node::Sub(self.slot(a), self.slot(b)),
+            Made::Mul(a, b) if !self.varies(b) => Node::Scale(self.slot(a), self.held(b)),
+            Made::Mul(a, b) if a == b => Node::Square(self.slot(a)),
+            Made::Mul(a, b) => Node::Mul(self.slot(a), self.slot(b)),
+            Made::Div(a, b) if !self.varies(a) => Node::Over(self.held(a), self.slot(b)),
+            Made::Div(a, b) => Node::Div(self.slot(a), self.slot(b)),
+            Made::Apply(Function::Sqrt, a) => Node::Sqrt(self.slot(a)),
+            Made::Apply(Function::Exp, a) => Node::Exp(self.slot(a)),
+            Made::Apply(Function::Ln, a) => Node::Ln(self.slot(a)),
+            Made::Apply(Function::Tanh, a) => Node::Tanh(self.slot(a)),
+            Made::Apply(Function::Sin, a) => return self.circle(a),
+            Made::Apply(Function::Cos, a) => return self.circle(a) + 1,
+            Made::Select(j, a, b) => Node::Select(index(j), self.slot(a), self.slot(b)),
+            Made::Constant(_) | Made::Parameter(_) => unreachable!("constants and parameters do not vary"),
+        };
+        self.push(node)
+    }
+
+    /// Where the sine's series is stored, and that of the cosine after it.
+    fn circle(&mut self, angle: Symbol) -> u16 {
+        if let Some(&slot) = self.circle_of.get(&angle) {
+            return slot;
+        }
+        let node = Node::SinCos(self.slot(angle));
+        let slot = self.push(node);
+        self.circle_of.insert(angle, slot);
+        slot
+    }
+}

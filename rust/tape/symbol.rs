@@ -1,0 +1,425 @@
+//! The number that a model is evaluated over when it is recorded.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use crate::scalar::{Mask, Real, Scalar};
+
+/// What is known of a number while its model is recorded: how it was made, not its value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Symbol(pub(super) u32);
+
+/// On which side of a switching surface the law is taken, while the model is recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SideOf {
+    Known(bool),
+    Surface(usize),
+    /// The other side.
+    Beyond(usize),
+}
+
+/// How a symbol was made. Constants are kept as bits, so that equal symbols can be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Made {
+    Constant(u64),
+    Parameter(usize),
+    Time,
+    State(usize),
+    Neg(Symbol),
+    Add(Symbol, Symbol),
+    Sub(Symbol, Symbol),
+    /// Where only one factor varies along a solution it is the first.
+    Mul(Symbol, Symbol),
+    Div(Symbol, Symbol),
+    Apply(Function, Symbol),
+    /// The first on the surface's positive side, else the second.
+    Select(usize, Symbol, Symbol),
+}
+
+/// An elementary function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Function {
+    Sqrt,
+    Exp,
+    Ln,
+    Sin,
+    Cos,
+    Tanh,
+}
+
+impl Function {
+    #[inline(always)]
+    pub fn of<S: Scalar>(self, x: S) -> S {
+        match self {
+            Function::Sqrt => x.sqrt(),
+            Function::Exp => x.exp(),
+            Function::Ln => x.ln(),
+            Function::Sin => x.sin(),
+            Function::Cos => x.cos(),
+            Function::Tanh => x.tanh(),
+        }
+    }
+}
+
+/// All symbols made so far, equal ones merged. A symbol comes after those it is made of.
+#[derive(Debug, Default)]
+pub(super) struct Recording {
+    pub(super) made: Vec<Made>,
+    /// Whether it changes along a solution.
+    pub(super) varies: Vec<bool>,
+    known: HashMap<Made, Symbol>,
+    /// The model looked at a value, which a recording does not have.
+    pub(super) looked: bool,
+}
+
+thread_local! {
+    static RECORDING: RefCell<Recording> = RefCell::default();
+}
+
+/// Forgets all symbols of this thread.
+pub(super) fn begin() {
+    RECORDING.with_borrow_mut(|r| *r = Recording::default());
+}
+
+/// The recording since [`begin`].
+pub(super) fn end() -> Recording {
+    RECORDING.take()
+}
+
+pub(super) fn make(made: Made) -> Symbol {
+    RECORDING.with_borrow_mut(|r| r.make(made))
+}
+
+fn looked() {
+    RECORDING.with_borrow_mut(|r| r.looked = true);
+}
+
+/// Sums and products do not depend on the order of their operands.
+fn ordered(a: Symbol, b: Symbol) -> (Symbol, Symbol) {
+    if b.0 < a.0 { (b, a) } else { (a, b) }
+}
+
+impl Recording {
+    fn make(&mut self, made: Made) -> Symbol {
+        if let Some(&symbol) = self.known.get(&made) {
+            return symbol;
+        }
+        let varies = |s: Symbol| self.varies[s.0 as usize];
+        let varies = match made {
+            Made::Constant(_) | Made::Parameter(_) => false,
+            Made::Time | Made::State(_) => true,
+            Made::Neg(a) | Made::Apply(_, a) => varies(a),
+            Made::Add(a, b) | Made::Sub(a, b) | Made::Mul(a, b) | Made::Div(a, b) => varies(a) || varies(b),
+            Made::Select(_, a, b) => varies(a) || varies(b),
+        };
+        let symbol = Symbol(u32::try_from(self.made.len()).expect("fewer than 2^32 symbols"));
+        self.made.push(made);
+        self.varies.push(varies);
+        self.known.insert(made, symbol);
+        symbol
+    }
+
+    fn of(&self, s: Symbol) -> Made {
+        self.made[s.0 as usize]
+    }
+
+    fn value(&self, s: Symbol) -> Option<f64> {
+        match self.of(s) {
+            Made::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    fn constant(&mut self, value: f64) -> Symbol {
+        // One zero: its sign tells nothing in a model.
+        self.make(Made::Constant((value + 0.0).to_bits()))
+    }
+
+    /// `x` and `f` where the symbol is `x f` and only `x` varies.
+    fn scaled(&self, s: Symbol) -> Option<(Symbol, Symbol)> {
+        match self.of(s) {
+            Made::Mul(x, f) if self.varies[x.0 as usize] && !self.varies[f.0 as usize] => Some((x, f)),
+            _ => None,
+        }
+    }
+
+    fn neg(&mut self, a: Symbol) -> Symbol {
+        if let Some(value) = self.value(a) {
+            return self.constant(-value);
+        }
+        if let Some((x, f)) = self.scaled(a) {
+            let f = self.neg(f);
+            return self.mul(x, f);
+        }
+        match self.of(a) {
+            Made::Neg(x) => x,
+            Made::Sub(x, y) => self.sub(y, x),
+            _ => self.make(Made::Neg(a)),
+        }
+    }
+
+    fn add(&mut self, a: Symbol, b: Symbol) -> Symbol {
+        match (self.value(a), self.value(b)) {
+            (Some(x), Some(y)) => return self.constant(x + y),
+            (Some(0.0), _) => return b,
+            (_, Some(0.0)) => return a,
+            _ => {}
+        }
+        match (self.of(a), self.of(b)) {
+            (_, Made::Neg(y)) => self.sub(a, y),
+            (Made::Neg(x), _) => self.sub(b, x),
+            _ => {
+                let (a, b) = ordered(a, b);
+                self.make(Made::Add(a, b))
+            }
+        }
+    }
+
+    fn sub(&mut self, a: Symbol, b: Symbol) -> Symbol {
+        match (self.value(a), self.value(b)) {
+            (Some(x), Some(y)) => return self.constant(x - y),
+            (Some(0.0), _) => return self.neg(b),
+            (_, Some(0.0)) => return a,
+            _ => {}
+        }
+        match (self.of(a), self.of(b)) {
+            _ if a == b => self.constant(0.0),
+            (_, Made::Neg(y)) => self.add(a, y),
+            (Made::Neg(x), _) => {
+                let sum = self.add(x, b);
+                self.neg(sum)
+            }
+            _ => self.make(Made::Sub(a, b)),
+        }
+    }
+
+    /// What does not vary is pulled out of products: the same product is found more often, and it
+    /// multiplies once per order.
+    fn mul(&mut self, a: Symbol, b: Symbol) -> Symbol {
+        match (self.value(a), self.value(b)) {
+            (Some(x), Some(y)) => return self.constant(x * y),
+            (Some(0.0), _) | (_, Some(0.0)) => return self.constant(0.0),
+            (Some(1.0), _) => return b,
+            (_, Some(1.0)) => return a,
+            (Some(-1.0), _) => return self.neg(b),
+            (_, Some(-1.0)) => return self.neg(a),
+            _ => {}
+        }
+        if let Made::Neg(x) = self.of(a) {
+            let product = self.mul(x, b);
+            return self.neg(product);
+        }
+        if let Made::Neg(_) = self.of(b) {
+            return self.mul(b, a);
+        }
+        if let Some((x, f)) = self.scaled(a) {
+            return if self.varies[b.0 as usize] {
+                let product = self.mul(x, b);
+                self.mul(product, f)
+            } else {
+                let f = self.mul(f, b);
+                self.mul(x, f)
+            };
+        }
+        if self.scaled(b).is_some() {
+            return self.mul(b, a);
+        }
+        match (self.varies[a.0 as usize], self.varies[b.0 as usize]) {
+            (false, true) => self.make(Made::Mul(b, a)),
+            (true, false) => self.make(Made::Mul(a, b)),
+            _ => {
+                let (a, b) = ordered(a, b);
+                self.make(Made::Mul(a, b))
+            }
+        }
+    }
+
+    fn div(&mut self, a: Symbol, b: Symbol) -> Symbol {
+        match (self.value(a), self.value(b)) {
+            (Some(x), Some(y)) => return self.constant(x / y),
+            (Some(0.0), _) => return a,
+            (_, Some(1.0)) => return a,
+            _ => {}
+        }
+        let one = self.constant(1.0);
+        if !self.varies[b.0 as usize] && a != one {
+            let inverse = self.div(one, b);
+            return self.mul(a, inverse);
+        }
+        match self.of(b) {
+            Made::Neg(y) => {
+                let quotient = self.div(a, y);
+                self.neg(quotient)
+            }
+            _ => self.make(Made::Div(a, b)),
+        }
+    }
+
+    fn apply(&mut self, function: Function, a: Symbol) -> Symbol {
+        match self.value(a) {
+            Some(value) => self.constant(function.of(value)),
+            None => self.make(Made::Apply(function, a)),
+        }
+    }
+}
+
+macro_rules! recorded {
+    ($($Op:ident :: $op:ident),+) => {$(
+        impl $Op for Symbol {
+            type Output = Symbol;
+            fn $op(self, other: Symbol) -> Symbol {
+                RECORDING.with_borrow_mut(|r| r.$op(self, other))
+            }
+        }
+    )+};
+}
+recorded! { Add::add, Sub::sub, Mul::mul, Div::div }
+
+impl Neg for Symbol {
+    type Output = Symbol;
+    fn neg(self) -> Symbol {
+        RECORDING.with_borrow_mut(|r| r.neg(self))
+    }
+}
+
+impl AddAssign for Symbol {
+    fn add_assign(&mut self, other: Symbol) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Symbol {
+    fn sub_assign(&mut self, other: Symbol) {
+        *self = *self - other;
+    }
+}
+
+fn apply(function: Function, a: Symbol) -> Symbol {
+    RECORDING.with_borrow_mut(|r| r.apply(function, a))
+}
+
+impl Scalar for Symbol {
+    type Real = Symbol;
+    type Mask = SideOf;
+
+    fn constant(value: f64) -> Symbol {
+        RECORDING.with_borrow_mut(|r| r.constant(value))
+    }
+    fn lift(value: Symbol) -> Symbol {
+        value
+    }
+    fn real(self) -> Symbol {
+        self
+    }
+    fn scale(self, factor: f64) -> Symbol {
+        self * Symbol::constant(factor)
+    }
+    fn times(self, factor: Symbol) -> Symbol {
+        self * factor
+    }
+    fn less(self, other: Symbol) -> SideOf {
+        match RECORDING.with_borrow(|r| r.value(self).zip(r.value(other))) {
+            Some((a, b)) => SideOf::Known(a < b),
+            None => {
+                looked();
+                SideOf::Known(false)
+            }
+        }
+    }
+    fn select(mask: SideOf, yes: Symbol, no: Symbol) -> Symbol {
+        match mask {
+            _ if yes == no => yes,
+            SideOf::Known(true) => yes,
+            SideOf::Known(false) => no,
+            SideOf::Surface(j) => make(Made::Select(j, yes, no)),
+            SideOf::Beyond(j) => make(Made::Select(j, no, yes)),
+        }
+    }
+    fn mask(value: bool) -> SideOf {
+        SideOf::Known(value)
+    }
+    fn sqrt(self) -> Symbol {
+        apply(Function::Sqrt, self)
+    }
+    fn exp(self) -> Symbol {
+        apply(Function::Exp, self)
+    }
+    fn ln(self) -> Symbol {
+        apply(Function::Ln, self)
+    }
+    fn sin(self) -> Symbol {
+        apply(Function::Sin, self)
+    }
+    fn cos(self) -> Symbol {
+        apply(Function::Cos, self)
+    }
+    fn tanh(self) -> Symbol {
+        apply(Function::Tanh, self)
+    }
+}
+
+/// A symbol stands for a number without derivatives, but has no value to look at: a model that does
+/// cannot be recorded, and [`Tape::record`](super::Tape::record) says so.
+impl Real for Symbol {
+    const LANES: usize = 1;
+
+    fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> Symbol {
+        Symbol::constant(lane(0))
+    }
+    fn lane(self, _i: usize) -> f64 {
+        RECORDING.with_borrow(|r| r.value(self)).unwrap_or_else(|| {
+            looked();
+            f64::NAN
+        })
+    }
+    fn set_lane(&mut self, _i: usize, value: f64) {
+        *self = Symbol::constant(value);
+    }
+    fn each(self, f: impl Fn(f64) -> f64) -> Symbol {
+        Symbol::constant(f(self.lane(0)))
+    }
+    fn zip(self, other: Symbol, f: impl Fn(f64, f64) -> f64) -> Symbol {
+        Symbol::constant(f(self.lane(0), other.lane(0)))
+    }
+}
+
+impl Mask for SideOf {
+    fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> SideOf {
+        SideOf::Known(lane(0))
+    }
+    fn lane(self, _i: usize) -> bool {
+        match self {
+            SideOf::Known(value) => value,
+            _ => {
+                looked();
+                false
+            }
+        }
+    }
+    fn and(self, other: SideOf) -> SideOf {
+        match (self, other) {
+            (SideOf::Known(true), side) | (side, SideOf::Known(true)) => side,
+            _ if self == other => self,
+            _ if self == other.not() => SideOf::Known(false),
+            (SideOf::Known(false), _) | (_, SideOf::Known(false)) => SideOf::Known(false),
+            _ => {
+                looked();
+                self
+            }
+        }
+    }
+    fn or(self, other: SideOf) -> SideOf {
+        self.not().and(other.not()).not()
+    }
+    fn not(self) -> SideOf {
+        match self {
+            SideOf::Known(value) => SideOf::Known(!value),
+            SideOf::Surface(j) => SideOf::Beyond(j),
+            SideOf::Beyond(j) => SideOf::Surface(j),
+        }
+    }
+    fn any(self) -> bool {
+        self.lane(0)
+    }
+}
