@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use proptest::prelude::*;
 use udd::integrate::{Tolerance, propagate};
-use udd::model::effects::{At, Kind, Role, Slot, Slots, Term};
+use udd::model::effects::{At, Contact, Kind, Role, Slot, Slots, Term};
 use udd::model::{Disk, DiskFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of};
 use udd::scalar::{Dual, Scalar};
 
@@ -13,8 +13,8 @@ const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// Every effect, in each way it can enter.
 fn all() -> Vec<Effect> {
     let ways = |kind: Kind| match kind.spec().momenta {
-        [] => vec![Effect { kind, momentum: None }],
-        momenta => momenta.iter().map(|&m| Effect { kind, momentum: Some(m) }).collect(),
+        [] => vec![Effect::new(kind)],
+        momenta => momenta.iter().map(|&m| Effect::new(kind).with_momentum(Some(m))).collect(),
     };
     Kind::ALL.iter().flat_map(|&kind| ways(kind)).collect()
 }
@@ -161,6 +161,7 @@ proptest! {
             let at = At {
                 t: time, omega, speed, y, z, beta, k, inertia,
                 w: N::fixed(w), g: N::fixed(g), radius: N::fixed(radius),
+                contact: Contact::default(),
             };
             let term = &Term::list(&[effect], &own)[0];
             let mut slots = Slots::default();

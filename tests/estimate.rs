@@ -24,7 +24,7 @@ impl Noise {
 }
 
 fn family(effects: &[(Kind, Option<Momentum>)]) -> DiskFamily {
-    let effects = effects.iter().map(|&(kind, momentum)| Effect { kind, momentum }).collect();
+    let effects = effects.iter().map(|&(kind, momentum)| Effect::new(kind).with_momentum(momentum)).collect();
     DiskFamily { effects, edge: false }
 }
 

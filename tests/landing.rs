@@ -247,7 +247,7 @@ fn rest_is_no_obstacle() {
         let end = propagate(&built, 0.0, 60.0, start, &tolerance);
         assert!(end.is_ok(), "{start:?}: {end:?}");
     }
-    let dry = Effect { kind: Kind::Coulomb, momentum: None };
+    let dry = Effect::new(Kind::Coulomb);
     let pendulum = PendulumFamily { effects: vec![dry] }.build(&[0.3, 0.09, 9.81, 0.05, 0.01, 0.05]);
     for k in 0..40 {
         let tolerance = Tolerance { rtol: 1e-8, atol: [1e-9, 1e-12][k % 2] };

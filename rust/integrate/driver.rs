@@ -20,7 +20,13 @@ pub struct Counts {
     pub rejected: u64,
     /// Evaluations of the rates.
     pub evaluations: u64,
+    /// Jumps of the law that the run only just reached: its derivatives are in doubt.
+    pub grazes: u64,
 }
+
+/// More jumps of the law than this while time moves on by less than the part `STILL` of the run chatter.
+const MOST_JUMPS: f64 = 100.0;
+const STILL: f64 = 1e-9;
 
 /// How an accepted step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +80,9 @@ pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>>
     landing: Landing<S::Real>,
     /// Sides changed since time last moved on.
     flips: S::Real,
+    /// When the run began; jumps of the law since the time beside.
+    start: S::Real,
+    jumps: (S::Real, S::Real),
     /// The state is on a surface to within rounding, which leaves its side open.
     undecided: S::Mask,
     /// The work so far.
@@ -102,6 +111,8 @@ where
             size: S::Real::zero(),
             landing: Landing::new(),
             flips: S::Real::zero(),
+            start: t,
+            jumps: (S::Real::zero(), t),
             undecided: S::mask(false),
             counts: Counts::default(),
         };
@@ -131,6 +142,9 @@ where
         self.from = S::Real::select(lanes, t, self.from);
         self.size = S::Real::select(lanes, S::Real::zero(), self.size);
         self.flips = S::Real::select(lanes, S::Real::zero(), self.flips);
+        self.start = S::Real::select(lanes, t, self.start);
+        self.jumps.0 = S::Real::select(lanes, S::Real::zero(), self.jumps.0);
+        self.jumps.1 = S::Real::select(lanes, t, self.jumps.1);
         self.undecided = self.undecided.and(lanes.not());
         self.landing.on = self.landing.on.map(|on| on.and(lanes.not()));
         self.controller.reset(lanes);
@@ -145,6 +159,11 @@ where
     /// The state reached.
     pub fn x(&self) -> &[S; D] {
         &self.at.x
+    }
+
+    /// The sides that the law is taken on.
+    pub fn sides(&self) -> &crate::model::Sides<S> {
+        &self.at.sides
     }
 
     /// The size of the next trial step.
@@ -320,15 +339,27 @@ where
             self.from = S::Real::select(stale, self.at.t, self.from);
             self.size = S::Real::select(stale, S::Real::zero(), self.size);
         }
-        for target in 0..TARGETS {
-            let over = crossed[target].or(found.stale[target]);
+        for (target, &crossed) in crossed.iter().enumerate() {
+            let over = crossed.or(found.stale[target]);
             if !over.any() {
                 continue;
             }
-            let turned = self.cross(target, over);
+            let before = self.at.sides;
+            let turned = self.cross(target, over, end);
             let told = found.stale[target].and(if target == WALL { stale } else { fresh.and(unflipped) });
             progress.moved = progress.moved.or(told);
-            progress.crossed[target] = crossed[target].or(told).and(turned);
+            let mut seen = crossed.or(told).and(turned);
+            if target != WALL && self.system.jumps(target) {
+                // What the switch led to, such as a contact that sticks, says more than where it began.
+                for j in (0..self.system.surfaces()).rev() {
+                    let changed =
+                        before[j].and(self.at.sides[j].not()).or(self.at.sides[j].and(before[j].not()));
+                    progress.crossed[j] = progress.crossed[j].or(seen.and(changed));
+                    seen = seen.and(changed.not());
+                }
+                progress.failed = progress.failed.or(self.chatters());
+            }
+            progress.crossed[target] = progress.crossed[target].or(seen);
         }
     }
 
@@ -346,19 +377,35 @@ where
     }
 
     /// Changes the side of the target that these lanes are on; returns those where it did.
-    fn cross(&mut self, target: usize, lanes: S::Mask) -> S::Mask {
+    fn cross(&mut self, target: usize, lanes: S::Mask, end: S::Real) -> S::Mask {
         if target == WALL {
             return lanes;
         }
         self.flips = S::Real::select(lanes, self.flips + S::Real::one(), self.flips);
-        let stuck = lanes.and(S::Real::constant(2.0 * MAX_SURFACES as f64).less(self.flips));
-        self.undecided = self.undecided.or(stuck);
-        self.flips = S::Real::select(stuck, S::Real::zero(), self.flips);
-        let turned = lanes.and(stuck.not());
+        let mut turned = lanes;
+        if self.system.jumps(target) {
+            // More of them in almost no time are no motion.
+            let span = (end - self.start).abs().scale(STILL);
+            let moved = lanes.and(span.less((self.at.t - self.jumps.1).abs()));
+            self.jumps.1 = S::Real::select(moved, self.at.t, self.jumps.1);
+            self.jumps.0 = S::Real::select(moved, S::Real::zero(), self.jumps.0);
+            self.jumps.0 = S::Real::select(lanes, self.jumps.0 + S::Real::one(), self.jumps.0);
+        } else {
+            let stuck = lanes.and(S::Real::constant(2.0 * MAX_SURFACES as f64).less(self.flips));
+            self.undecided = self.undecided.or(stuck);
+            self.flips = S::Real::select(stuck, S::Real::zero(), self.flips);
+            turned = lanes.and(stuck.not());
+        }
         let Point { t, x, sides } = &mut self.at;
-        pass(&self.system, target, *t, self.size, x, sides, turned);
+        let grazes = pass(&self.system, target, *t, self.size, x, sides, turned);
+        self.counts.grazes += grazes.count();
         self.begin(turned);
         turned
+    }
+
+    /// Lanes where the law switches again and again while time stands still.
+    fn chatters(&self) -> S::Mask {
+        S::Real::constant(MOST_JUMPS).less(self.jumps.0)
     }
 
     fn begin(&mut self, lanes: S::Mask) {
@@ -407,6 +454,9 @@ where
     /// Why a lane cannot go on.
     pub fn failure_of(&self, lane: usize) -> Failure {
         let t = self.at.t.lane(lane);
+        if self.chatters().lane(lane) {
+            return Failure::Chattering { t };
+        }
         let rate = self.system.rates(S::lift(self.at.t), &self.at.x, &self.at.sides);
         let finite = |v: &[S; D]| v.iter().all(|v| v.real().lane(lane).is_finite());
         if finite(&self.at.x) && finite(&rate) && self.h.lane(lane).is_finite() {

@@ -105,6 +105,8 @@ pub enum Failure {
     TooManySteps { t: f64, limit: u64 },
     #[error("the disk left the wheels at t = {t}")]
     LeftDomain { t: f64 },
+    #[error("the law switches without end at t = {t}: the run chatters")]
+    Chattering { t: f64 },
     #[error("interrupted")]
     Interrupted,
 }

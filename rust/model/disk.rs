@@ -1,8 +1,9 @@
 //! The upward-driven disk with friction and effects.
 
-use super::effects::{At, Effect, Slots, Term};
-use super::{Family, Momentum, Parameter, Sides, System, parameter};
-use crate::scalar::{Dual, Scalar};
+use super::effects::{At, Contact, Dry, Effect, Slots, Term};
+use super::stick::{REVERSAL, Slider, Sticking};
+use super::{Family, Momentum, Parameter, Sides, System, choose, parameter};
+use crate::scalar::{Dual, Mask, Scalar};
 
 /// The disk, per unit mass, for the state `[Omega, Y, Z, beta]`:
 ///
@@ -29,6 +30,8 @@ pub struct Disk<S> {
     pub effects: Vec<Term<S>>,
     /// Whether the run ends where the contact reaches the disk's edge, `Y^2 + Z^2 = R^2`.
     pub edge: bool,
+    /// Whether dry friction can hold it at rest.
+    pub sticking: Sticking,
 }
 
 /// The paper's friction law `k = max(k1 - k2 |Omega|, k0)`, in m^2/s.
@@ -50,9 +53,17 @@ impl<S: Scalar> Friction<S> {
     }
 }
 
-/// Surface 0 is `Omega = 0`, where `|Omega|` has its kink; surface 1 is the friction law's kink.
-const REVERSAL: usize = 0;
+/// Surface 0 is `Omega = 0`, where `|Omega|` has its kink; surface 1 is the friction law's kink. A disk
+/// that can stick has two more.
 const KINK: usize = 1;
+
+/// What moves the disk: the torque, all told, on its inertia, and the contact's velocity.
+struct Balance<S> {
+    torque: S,
+    inertia: S,
+    velocity: (S, S),
+    dry: Dry<S>,
+}
 
 #[inline(always)]
 fn speed_of<S: Scalar>(omega: S, sides: &Sides<S>) -> S {
@@ -67,6 +78,7 @@ impl<S: Scalar> Disk<S> {
         lift: impl Fn(S) -> A,
         t: A,
         [omega, y, z, beta]: [A; 4],
+        contact: &Contact<S>,
         sides: &Sides<S>,
     ) -> At<A> {
         let speed = A::select(sides[REVERSAL], omega, -omega);
@@ -74,7 +86,8 @@ impl<S: Scalar> Disk<S> {
         let k = A::select(sides[KINK], lift(f.k1) - lift(f.k2) * speed, lift(f.k0));
         let radius = lift(self.radius);
         let inertia = radius.square().scale(0.5) + y.square() + z.square();
-        At { t, omega, speed, y, z, beta, k, inertia, w: lift(self.w), g: lift(self.g), radius }
+        let contact = Contact { sign: lift(contact.sign), bristle: lift(contact.bristle) };
+        At { t, omega, speed, y, z, beta, k, inertia, w: lift(self.w), g: lift(self.g), radius, contact }
     }
 
     /// `(u, W_c - W)` of the effects that `wanted` selects.
@@ -86,26 +99,21 @@ impl<S: Scalar> Disk<S> {
         }
         slots
     }
-}
 
-impl<S: Scalar> System<S, 4> for Disk<S> {
+    /// The equation of motion with all effects.
     #[inline]
-    fn rates(&self, t: S, x: &[S; 4], sides: &Sides<S>) -> [S; 4] {
+    fn balance(&self, t: S, x: &[S; 4], contact: &Contact<S>, sides: &Sides<S>) -> Balance<S> {
         let &[omega, y, z, _] = x;
-        let at = self.at(|s| s, t, *x, sides);
-        let mut torque = self.g * y;
-        let mut k = at.k;
+        let at = self.at(|s| s, t, *x, contact, sides);
         let (mut dy, mut dz) = (z * omega, self.w - y * omega);
-        if self.effects.is_empty() {
-            return [(torque - k * omega - z * self.w * omega) / at.inertia, dy, dz, omega];
-        }
 
         let mut forces = Slots::default();
         for term in self.effects.iter().filter(|term| term.momentum.is_none()) {
             term.enter(&|s| s, &at, &mut forces);
         }
+        let mut torque = self.g * y;
         torque += forces.torque;
-        k += forces.friction;
+        let k = at.k + forces.friction;
         let constraint = self.slip(|s| s, &at, Momentum::Constraint);
         let consistent = self.slip(|s| s, &at, Momentum::Consistent);
         dy += consistent.lateral + constraint.lateral;
@@ -121,29 +129,83 @@ impl<S: Scalar> System<S, 4> for Disk<S> {
                 Dual::<S, 2>::fixed,
                 along(t, S::one()),
                 [Dual::variable(omega, 1), along(y, dy), along(z, dz), along(x[3], omega)],
+                contact,
                 sides,
             );
             let slip = self.slip(Dual::<S, 2>::fixed, &flow, Momentum::Consistent);
             torque += y * slip.vertical.d[0] - z * slip.lateral.d[0];
             inertia += z * slip.lateral.d[1] - y * slip.vertical.d[1];
         }
-        [(torque - k * omega - (y * u + z * w_c) * omega) / inertia, dy, dz, omega]
+        torque = torque - k * omega - (y * u + z * w_c) * omega;
+        Balance { torque, inertia, velocity: (dy, dz), dry: forces.dry }
+    }
+}
+
+impl<S: Scalar> Slider<S, 4> for Disk<S> {
+    const BAND: usize = 2;
+    const STUCK: usize = 3;
+
+    #[inline(always)]
+    fn sticking(&self) -> Sticking {
+        self.sticking
+    }
+
+    fn at_rest(&self, t: S, &[_, y, z, beta]: &[S; 4], sides: &Sides<S>) -> (S, Dry<S>) {
+        let contact = Contact { sign: S::zero(), bristle: S::zero() };
+        let balance = self.balance(t, &[S::zero(), y, z, beta], &contact, sides);
+        (balance.torque, balance.dry)
+    }
+}
+
+impl<S: Scalar> System<S, 4> for Disk<S> {
+    #[inline]
+    fn rates(&self, t: S, x: &[S; 4], sides: &Sides<S>) -> [S; 4] {
+        let &[omega, y, z, _] = x;
+        if self.effects.is_empty() {
+            let at = self.at(|s| s, t, *x, &Contact::default(), sides);
+            let torque = self.g * y - at.k * omega - z * self.w * omega;
+            return [torque / at.inertia, z * omega, self.w - y * omega, omega];
+        }
+        let Balance { torque, inertia, velocity: (dy, dz), .. } =
+            self.balance(t, x, &self.contact(sides), sides);
+        [self.held(torque / inertia, sides), dy, dz, omega]
     }
 
     fn surfaces(&self) -> usize {
-        2
+        if self.sticking == Sticking::Never { 2 } else { 4 }
     }
 
     #[inline(always)]
-    fn surface(&self, j: usize, _t: S, x: &[S; 4], sides: &Sides<S>) -> S {
+    fn surface(&self, j: usize, t: S, x: &[S; 4], sides: &Sides<S>) -> S {
         match j {
             REVERSAL => x[0],
-            _ => self.friction.kink(speed_of(x[0], sides)),
+            KINK => self.friction.kink(speed_of(x[0], sides)),
+            _ => self.sliding_surface(j, t, x, sides),
         }
     }
 
-    fn surface_name(&self, j: usize) -> &'static str {
-        ["reversal", "friction kink"][j]
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        match j {
+            REVERSAL => "reversal",
+            KINK => "friction kink",
+            _ => self.contact_event(j, side),
+        }
+    }
+
+    fn settle(&self, t: S, x: &[S; 4], sides: &mut Sides<S>) {
+        self.settle_contact(t, x, sides);
+    }
+
+    fn switch(&self, j: usize, t: S, x: &mut [S; 4], sides: &mut Sides<S>, here: S::Mask) {
+        if j == KINK || self.sticking == Sticking::Never {
+            sides[j] = choose(here, sides[j].not(), sides[j]);
+        } else {
+            self.switch_contact(j, t, x, sides, here);
+        }
+    }
+
+    fn jumps(&self, j: usize) -> bool {
+        self.contact_jumps(j)
     }
 
     #[inline(always)]
@@ -184,12 +246,14 @@ impl Family<4> for DiskFamily {
 
     fn build<S: Scalar>(&self, values: &[S]) -> Disk<S> {
         let (plain, rest) = values.split_at(Self::PLAIN);
+        let effects = Term::list(&self.effects, rest);
         Disk {
             w: plain[0],
             radius: plain[1],
             g: plain[2],
             friction: Friction { k0: plain[3], k1: plain[4], k2: plain[5] },
-            effects: Term::list(&self.effects, rest),
+            sticking: Sticking::of(&effects),
+            effects,
             edge: self.edge,
         }
     }

@@ -9,11 +9,13 @@ mod disk;
 mod dle;
 pub mod effects;
 mod pendulum;
+pub mod stick;
 
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
-pub use effects::{Effect, Momentum};
+pub use effects::{Effect, Momentum, Treatment};
 pub use pendulum::{Pendulum, PendulumFamily};
+pub use stick::Sticking;
 
 use crate::scalar::{Mask, Scalar};
 
@@ -39,10 +41,14 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         S::one()
     }
 
-    /// The name of surface `j`, for the record of events.
-    fn surface_name(&self, _j: usize) -> &'static str {
+    /// What it is called when the state gets to this side of surface `j`, for the record of events.
+    fn surface_name(&self, _j: usize, _side: bool) -> &'static str {
         ""
     }
+
+    /// Completes the sides of a state that lies exactly on a surface, where the law says more than the
+    /// surface's sign.
+    fn settle(&self, _t: S, _x: &[S; D], _sides: &mut Sides<S>) {}
 
     /// Passes surface `j`, on which the state lies, in the lanes `here`: changes its side and, where the
     /// law asks for it, other sides and the state (a contact that comes to rest sticks).
@@ -74,8 +80,12 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
         (**self).surface(j, t, x, sides)
     }
-    fn surface_name(&self, j: usize) -> &'static str {
-        (**self).surface_name(j)
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        (**self).surface_name(j, side)
+    }
+    #[inline(always)]
+    fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
+        (**self).settle(t, x, sides);
     }
     #[inline(always)]
     fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
@@ -98,6 +108,7 @@ pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: 
         let value = system.surface(j, t, x, &sides);
         sides[j] = S::zero().less(value);
     }
+    system.settle(t, x, &mut sides);
     sides
 }
 

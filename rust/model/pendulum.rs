@@ -1,8 +1,9 @@
 //! A plain pendulum with a fixed pivot: what the loop is tried on with other people's data.
 
-use super::effects::{At, Effect, Slots, Term};
-use super::{Family, Parameter, Sides, System, parameter};
-use crate::scalar::Scalar;
+use super::effects::{At, Contact, Dry, Effect, Slots, Term};
+use super::stick::{REVERSAL, Slider, Sticking};
+use super::{Family, Parameter, Sides, System, choose, parameter};
+use crate::scalar::{Mask, Scalar};
 
 /// A pendulum, per unit mass, for the state `[Omega, theta]` with `theta = 0` hanging:
 ///
@@ -24,11 +25,14 @@ pub struct Pendulum<S> {
     pub k0: S,
     /// The effects, with their parameter values.
     pub effects: Vec<Term<S>>,
+    /// Whether dry friction can hold it at rest.
+    pub sticking: Sticking,
 }
 
-impl<S: Scalar> System<S, 2> for Pendulum<S> {
+impl<S: Scalar> Pendulum<S> {
+    /// The torque, all told, and what dry friction does beside it.
     #[inline]
-    fn rates(&self, t: S, &[omega, theta]: &[S; 2], sides: &Sides<S>) -> [S; 2] {
+    fn torque(&self, t: S, &[omega, theta]: &[S; 2], contact: Contact<S>, sides: &Sides<S>) -> (S, Dry<S>) {
         let (sin, cos) = theta.sin_cos();
         let y = self.length * sin;
         let mut forces = Slots::default();
@@ -36,7 +40,7 @@ impl<S: Scalar> System<S, 2> for Pendulum<S> {
             let at = At {
                 t,
                 omega,
-                speed: S::select(sides[0], omega, -omega),
+                speed: S::select(sides[REVERSAL], omega, -omega),
                 y,
                 z: -(self.length * cos),
                 beta: theta,
@@ -45,26 +49,67 @@ impl<S: Scalar> System<S, 2> for Pendulum<S> {
                 w: S::zero(),
                 g: self.g,
                 radius: self.length,
+                contact,
             };
             for term in &self.effects {
                 term.enter(&|s| s, &at, &mut forces);
             }
         }
-        let torque = forces.torque - self.g * y;
-        [(torque - (self.k0 + forces.friction) * omega) / self.inertia, omega]
+        (forces.torque - self.g * y - (self.k0 + forces.friction) * omega, forces.dry)
+    }
+}
+
+impl<S: Scalar> Slider<S, 2> for Pendulum<S> {
+    const BAND: usize = 1;
+    const STUCK: usize = 2;
+
+    #[inline(always)]
+    fn sticking(&self) -> Sticking {
+        self.sticking
+    }
+
+    fn at_rest(&self, t: S, x: &[S; 2], sides: &Sides<S>) -> (S, Dry<S>) {
+        self.torque(t, &[S::zero(), x[1]], Contact::default(), sides)
+    }
+}
+
+impl<S: Scalar> System<S, 2> for Pendulum<S> {
+    #[inline]
+    fn rates(&self, t: S, x: &[S; 2], sides: &Sides<S>) -> [S; 2] {
+        let (torque, _) = self.torque(t, x, self.contact(sides), sides);
+        [self.held(torque / self.inertia, sides), x[0]]
     }
 
     fn surfaces(&self) -> usize {
-        usize::from(!self.effects.is_empty())
+        match self.sticking {
+            Sticking::Never => usize::from(!self.effects.is_empty()),
+            _ => 3,
+        }
     }
 
     #[inline(always)]
-    fn surface(&self, _j: usize, _t: S, x: &[S; 2], _sides: &Sides<S>) -> S {
-        x[0]
+    fn surface(&self, j: usize, t: S, x: &[S; 2], sides: &Sides<S>) -> S {
+        if j == REVERSAL { x[0] } else { self.sliding_surface(j, t, x, sides) }
     }
 
-    fn surface_name(&self, _j: usize) -> &'static str {
-        "reversal"
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        if j == REVERSAL { "reversal" } else { self.contact_event(j, side) }
+    }
+
+    fn settle(&self, t: S, x: &[S; 2], sides: &mut Sides<S>) {
+        self.settle_contact(t, x, sides);
+    }
+
+    fn switch(&self, j: usize, t: S, x: &mut [S; 2], sides: &mut Sides<S>, here: S::Mask) {
+        if self.sticking == Sticking::Never {
+            sides[j] = choose(here, sides[j].not(), sides[j]);
+        } else {
+            self.switch_contact(j, t, x, sides, here);
+        }
+    }
+
+    fn jumps(&self, j: usize) -> bool {
+        self.contact_jumps(j)
     }
 }
 
@@ -91,12 +136,14 @@ impl Family<2> for PendulumFamily {
 
     fn build<S: Scalar>(&self, values: &[S]) -> Pendulum<S> {
         let (plain, rest) = values.split_at(4);
+        let effects = Term::list(&self.effects, rest);
         Pendulum {
             length: plain[0],
             inertia: plain[1],
             g: plain[2],
             k0: plain[3],
-            effects: Term::list(&self.effects, rest),
+            sticking: Sticking::of(&effects),
+            effects,
         }
     }
 }

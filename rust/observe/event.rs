@@ -6,8 +6,8 @@ use crate::model::System;
 /// What an event is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
-    /// A switching surface was crossed.
-    Surface(usize),
+    /// A switching surface was crossed to this side.
+    Surface(usize, bool),
     /// The wall of the model's domain was reached.
     Wall,
 }
@@ -29,7 +29,7 @@ impl<const D: usize> Event<D> {
     {
         let kind = match ending {
             Ending::Free => return None,
-            Ending::Surface(j) => EventKind::Surface(j),
+            Ending::Surface(j) => EventKind::Surface(j, driver.sides()[j]),
             Ending::Wall => EventKind::Wall,
         };
         Some(Self { kind, t: driver.t(), x: *driver.x() })
@@ -38,7 +38,7 @@ impl<const D: usize> Event<D> {
     /// Its name, as the model gives it.
     pub fn name(&self, system: &impl System<f64, D>) -> &'static str {
         match self.kind {
-            EventKind::Surface(j) => system.surface_name(j),
+            EventKind::Surface(j, side) => system.surface_name(j, side),
             EventKind::Wall => "edge",
         }
     }

@@ -272,7 +272,7 @@ fn score_ripples<'py>(
     let basis: Vec<f64> = (1..=3).map(|k| highest * f64::from(k) / 3.0).collect();
     let (mut wide, mut wide_values, mut roles) = (family.clone(), values.clone(), Vec::new());
     for &f in &basis {
-        wide.effects.push(Effect { kind: Kind::DriveRipple, momentum: Some(Momentum::Consistent) });
+        wide.effects.push(Effect::new(Kind::DriveRipple));
         roles.extend([Role::Model(wide_values.len()), Role::Model(wide_values.len() + 1)]);
         wide_values.extend([0.0, 0.0, f]);
     }

@@ -98,7 +98,7 @@ fn effect(name: &str, momentum: Option<&str>) -> PyResult<Effect> {
     if velocity != momentum.is_some() || momentum.is_some_and(|m| !kind.spec().momenta.contains(&m)) {
         return Err(ModelError::new_err(format!("the effect {name} cannot enter the momentum that way")));
     }
-    Ok(Effect { kind, momentum })
+    Ok(Effect::new(kind).with_momentum(momentum))
 }
 
 /// The state as an array of the dimension asked for.

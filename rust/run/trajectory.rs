@@ -12,6 +12,8 @@ pub enum Outcome {
     Finished,
     /// On the wall: the disk left the wheels.
     Ejected,
+    /// Cut where the law switched without end.
+    Chattering,
 }
 
 impl Outcome {
@@ -20,6 +22,7 @@ impl Outcome {
         match self {
             Outcome::Finished => "finished",
             Outcome::Ejected => "ejected",
+            Outcome::Chattering => "chattering",
         }
     }
 }
@@ -46,8 +49,8 @@ pub struct Run<const D: usize> {
     pub record: Option<Record<D>>,
 }
 
-/// Runs the system from `x0`, ending on its wall where it has one. A run that ends there is cut: the
-/// wall's point is the last one.
+/// Runs the system from `x0`, ending on its wall where it has one. A run that ends there, or where it
+/// chatters, is cut: that point is the last one.
 pub fn trajectory<M: System<f64, D>, const D: usize>(
     system: &M,
     output: Output<'_>,
@@ -73,7 +76,13 @@ pub fn trajectory<M: System<f64, D>, const D: usize>(
     let mut driver: Driver<_, f64, D> = Driver::new(system, start, x0, None, tolerance).with_wall();
     while driver.t() < end {
         stop.check()?;
-        let ending = driver.advance(end)?;
+        let ending = match driver.advance(end) {
+            Err(Failure::Chattering { .. }) => {
+                outcome = Outcome::Chattering;
+                Ending::Free
+            }
+            ending => ending?,
+        };
         if times.is_empty() {
             // Two events can share a time.
             if driver.t() > steps.0[steps.0.len() - 1] {
@@ -89,6 +98,8 @@ pub fn trajectory<M: System<f64, D>, const D: usize>(
         events.extend(Event::seen(ending, &driver));
         if ending == Ending::Wall {
             outcome = Outcome::Ejected;
+        }
+        if outcome != Outcome::Finished {
             break;
         }
     }
@@ -97,7 +108,7 @@ pub fn trajectory<M: System<f64, D>, const D: usize>(
     if !times.is_empty() {
         t = times[..samples.x.len()].to_vec();
         x = samples.x;
-        if outcome == Outcome::Ejected && t.last().is_none_or(|&last| last < driver.t()) {
+        if outcome != Outcome::Finished && t.last().is_none_or(|&last| last < driver.t()) {
             t.push(driver.t());
             x.push(*driver.x());
         }

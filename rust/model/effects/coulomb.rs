@@ -1,8 +1,8 @@
-//! Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
+//! Dry friction of constant size. The width `eps` smooths it, so that it can be fitted.
 
 use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
-/// Dry friction of constant size, smoothed over the width `eps` so that it can be fitted.
+/// Dry friction of constant size. The width `eps` smooths it, so that it can be fitted.
 pub struct Coulomb;
 
 impl Law for Coulomb {
@@ -20,8 +20,10 @@ impl Law for Coulomb {
         ],
     };
 
+    const DRY: bool = true;
+
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-        slots.torque -= p[0] * (at.omega / p[1]).tanh();
+        slots.rub(p[0], p[0], p[1], at);
     }
 }

@@ -5,6 +5,10 @@
 //! this file. The constructor, the fit, the list of candidates, its documentation and the generic
 //! tests follow from that.
 
+mod dry;
+
+pub use dry::{Contact, Dry, Treatment};
+
 use super::{Parameter, parameter};
 use crate::scalar::Scalar;
 
@@ -33,6 +37,8 @@ pub struct At<S> {
     pub g: S,
     /// Disk radius (a pendulum's length), m.
     pub radius: S,
+    /// What dry friction's contact does.
+    pub contact: Contact<S>,
 }
 
 /// Where effects enter the equations, summed over the effects.
@@ -46,11 +52,17 @@ pub struct Slots<S> {
     pub lateral: S,
     /// Adds to the contact's vertical velocity `W_c`, m/s.
     pub vertical: S,
+    /// How the effect that enters treats dry friction.
+    pub treatment: Treatment,
+    /// What dry friction does beside its torque.
+    pub dry: Dry<S>,
 }
 
 impl<S: Scalar> Default for Slots<S> {
     fn default() -> Self {
-        Self { torque: S::zero(), friction: S::zero(), lateral: S::zero(), vertical: S::zero() }
+        let zero = S::zero();
+        let treatment = Treatment::Smoothed;
+        Self { torque: zero, friction: zero, lateral: zero, vertical: zero, treatment, dry: Dry::default() }
     }
 }
 
@@ -185,6 +197,8 @@ pub struct Spec {
 /// A physical effect: its description and its law.
 pub trait Law {
     const SPEC: Spec;
+    /// Whether it is dry friction, which can be [treated](Treatment) in several ways.
+    const DRY: bool = false;
 
     /// Adds the effect, with parameters `p` in the order of the spec, to its slots.
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>);
@@ -196,9 +210,27 @@ pub struct Effect {
     pub kind: Kind,
     /// `None` for an effect that enters through torque or friction.
     pub momentum: Option<Momentum>,
+    /// [`Treatment::Smoothed`] for all but dry friction, which has the choice.
+    pub treatment: Treatment,
 }
 
 impl Effect {
+    /// The effect, entering as is usual for it.
+    pub fn new(kind: Kind) -> Self {
+        let momentum = kind.spec().momenta.first().copied();
+        Self { kind, momentum, treatment: Treatment::Smoothed }
+    }
+
+    /// Entering the angular momentum this way.
+    pub fn with_momentum(self, momentum: Option<Momentum>) -> Self {
+        Self { momentum, ..self }
+    }
+
+    /// Treating dry friction this way.
+    pub fn with_treatment(self, treatment: Treatment) -> Self {
+        Self { treatment, ..self }
+    }
+
     /// Its parameters, called `effect.name`.
     pub fn parameters(&self) -> Vec<Parameter> {
         let spec = self.kind.spec();
@@ -214,6 +246,7 @@ const MAX_PARAMETERS: usize = 4;
 pub struct Term<S> {
     pub kind: Kind,
     pub momentum: Option<Momentum>,
+    pub treatment: Treatment,
     pub values: [S; MAX_PARAMETERS],
 }
 
@@ -225,7 +258,8 @@ impl<S: Scalar> Term<S> {
             let (own, rest) = values.split_at(effect.kind.spec().parameters.len());
             let mut padded = [S::zero(); MAX_PARAMETERS];
             padded[..own.len()].copy_from_slice(own);
-            terms.push(Term { kind: effect.kind, momentum: effect.momentum, values: padded });
+            let &Effect { kind, momentum, treatment } = effect;
+            terms.push(Term { kind, momentum, treatment, values: padded });
             values = rest;
         }
         terms
@@ -234,7 +268,18 @@ impl<S: Scalar> Term<S> {
     /// Adds the effect to its slots, over the model's scalar or over duals of it.
     #[inline]
     pub fn enter<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
+        slots.treatment = self.treatment;
         self.kind.enter(&self.values.map(lift), at, slots);
+    }
+
+    /// Whether it holds a body at rest.
+    pub fn sticks(&self) -> bool {
+        matches!(self.treatment, Treatment::SetValued | Treatment::Karnopp)
+    }
+
+    /// Whether it takes slow sliding for rest.
+    pub fn has_band(&self) -> bool {
+        self.treatment == Treatment::Karnopp
     }
 }
 
@@ -256,6 +301,11 @@ macro_rules! library {
             /// What is said of it beside its formula.
             pub fn spec(self) -> &'static Spec {
                 match self { $(Kind::$Name => &$Name::SPEC),+ }
+            }
+
+            /// Whether it is dry friction, which can be [treated](Treatment) in several ways.
+            pub fn dry(self) -> bool {
+                match self { $(Kind::$Name => $Name::DRY),+ }
             }
 
             #[inline]

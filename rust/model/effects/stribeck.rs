@@ -1,8 +1,8 @@
-//! Dry friction that fades with the speed over the width `fade`, smoothed over the width `eps`.
+//! Dry friction that fades with the speed over the width `fade`. The width `eps` smooths it.
 
 use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 
-/// Dry friction that fades with the speed over the width `fade`, smoothed over the width `eps`.
+/// Dry friction that fades with the speed over the width `fade`. The width `eps` smooths it.
 pub struct Stribeck;
 
 impl Law for Stribeck {
@@ -21,9 +21,11 @@ impl Law for Stribeck {
         ],
     };
 
+    const DRY: bool = true;
+
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
         let fading = (-(at.omega / p[1]).square()).exp();
-        slots.torque -= p[0] * (at.omega / p[2]).tanh() * fading;
+        slots.rub(p[0] * fading, p[0], p[2], at);
     }
 }

@@ -1,0 +1,102 @@
+//! Dry friction: its force depends on the direction of sliding, not on the speed alone.
+
+use super::{At, Slots};
+use crate::scalar::Scalar;
+
+/// What dry friction does about its jump at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Treatment {
+    /// `tanh(Omega/eps)` stands for the sign. Nothing sticks, but it can be fitted.
+    Smoothed,
+    /// The sign itself, any value from -1 to 1 at rest: it sticks, until the torque exceeds the friction.
+    SetValued,
+    /// The same, with speeds below `eps` taken for rest (Karnopp, J. Dyn. Sys. Meas. Control 107 (1985) 100).
+    Karnopp,
+    /// Bristles that bend by up to about `eps`, an angle, before they slide (Canudas de Wit, Olsson, Åström &
+    /// Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419); needs a model with bristles.
+    Lugre,
+}
+
+impl Treatment {
+    /// All of them, the default first.
+    pub const ALL: &[Treatment] =
+        &[Treatment::Smoothed, Treatment::SetValued, Treatment::Karnopp, Treatment::Lugre];
+
+    /// Its name in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Treatment::Smoothed => "smoothed",
+            Treatment::SetValued => "set-valued",
+            Treatment::Karnopp => "karnopp",
+            Treatment::Lugre => "lugre",
+        }
+    }
+}
+
+/// What the contact does, beside the speed.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact<S> {
+    /// The direction in which it slides: 1 or -1, 0 where it sticks.
+    pub sign: S,
+    /// The bristles' deflection, rad.
+    pub bristle: S,
+}
+
+impl<S: Scalar> Default for Contact<S> {
+    fn default() -> Self {
+        Self { sign: S::zero(), bristle: S::zero() }
+    }
+}
+
+/// What dry friction adds up to, beside a torque.
+#[derive(Clone, Copy, Debug)]
+pub struct Dry<S> {
+    /// The largest torque that holds the contact where it is, m^2/s^2.
+    pub hold: S,
+    /// The speed below which it counts as at rest, rad/s.
+    pub band: S,
+    /// The bristles' torque in steady sliding, m^2/s^2, and per deflection, m^2/s^2/rad.
+    pub grip: S,
+    pub stiffness: S,
+}
+
+impl<S: Scalar> Default for Dry<S> {
+    fn default() -> Self {
+        Self { hold: S::zero(), band: S::zero(), grip: S::zero(), stiffness: S::zero() }
+    }
+}
+
+impl<S: Scalar> Slots<S> {
+    /// Adds dry friction of this size, at the present speed and at rest; it turns round over the width `eps`.
+    #[inline(always)]
+    pub fn rub(&mut self, size: S, at_rest: S, eps: S, at: &At<S>) {
+        match self.treatment {
+            Treatment::Smoothed => self.torque -= size * (at.omega / eps).tanh(),
+            Treatment::SetValued => {
+                self.torque -= size * at.contact.sign;
+                self.dry.hold += size;
+            }
+            Treatment::Karnopp => {
+                self.torque -= size * at.contact.sign;
+                self.dry.hold += size;
+                self.dry.band = S::select(self.dry.band.less(eps), eps, self.dry.band);
+            }
+            Treatment::Lugre => {
+                self.dry.grip += size;
+                self.dry.stiffness += at_rest / eps;
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Dry<S> {
+    /// The bristles' torque on the body and the rate of their deflection:
+    /// `torque = -(s z + d dz/dT)`, `dz/dT = Omega - s |Omega| z/grip`. The damping `d = sqrt(s I)` lets the
+    /// body come to rest on its bristles with little swinging.
+    #[inline(always)]
+    pub fn bristles(&self, at: &At<S>) -> (S, S) {
+        let rate = at.omega - self.stiffness * at.speed * at.contact.bristle / self.grip;
+        let damping = (self.stiffness * at.inertia).sqrt();
+        (-(self.stiffness * at.contact.bristle + damping * rate), rate)
+    }
+}
