@@ -11,6 +11,8 @@ pub mod model;
 pub mod observe;
 pub mod run;
 pub mod scalar;
+pub mod tape;
+mod unroll;
 
 #[cfg(feature = "python")]
 mod python;

@@ -43,8 +43,8 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         // The squared norm of order k.
         let norm = |k: usize| {
             let mut sum = constant(0.0);
-            for n in 0..D {
-                sum += (self.coefficients()[n][k].real() * inverse[n]).square();
+            for (series, inverse) in self.coefficients().iter().zip(inverse) {
+                sum += (series[k].real() * inverse).square();
             }
             sum.scale(1.0 / D as f64)
         };

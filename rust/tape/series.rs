@@ -21,7 +21,7 @@ pub fn inner<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
     let (b_low, b_high) = (&b[1..=pairs], &b[k - pairs..k]);
     let pair = |q: usize| a_low[pairs - 1 - q] * b_high[q] + a_high[q] * b_low[pairs - 1 - q];
     let mut sum = pair(0);
-    if k % 2 == 0 {
+    if k.is_multiple_of(2) {
         sum = a[k / 2] * b[k / 2] + sum;
     }
     sum_of(pairs, sum, pair)
@@ -41,7 +41,7 @@ pub fn inner_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
     let pair = |q: usize| low[pairs - 1 - q] * high[q];
     let half = sum_of(pairs, pair(0), pair);
     let sum = half + half;
-    if k % 2 == 0 { sum + a[k / 2].square() } else { sum }
+    if k.is_multiple_of(2) { sum + a[k / 2].square() } else { sum }
 }
 
 /// The sum of the pairs, of which `first` is the first one.

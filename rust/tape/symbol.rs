@@ -206,11 +206,12 @@ impl Recording {
             (_, Some(-1.0)) => return self.neg(a),
             _ => {}
         }
-        if let Made::Neg(x) = self.of(a) {
+        // The sign of what does not vary stays in the factor.
+        if let (Made::Neg(x), true) = (self.of(a), self.varies[a.0 as usize]) {
             let product = self.mul(x, b);
             return self.neg(product);
         }
-        if let Made::Neg(_) = self.of(b) {
+        if let (Made::Neg(_), true) = (self.of(b), self.varies[b.0 as usize]) {
             return self.mul(b, a);
         }
         if let Some((x, f)) = self.scaled(a) {
