@@ -17,7 +17,8 @@ const KINK: f64 = (0.103 - 0.012) / 0.055;
 #[test]
 fn the_disk_lands_on_its_surfaces_to_1e12() {
     let disk = disk(0.088, false);
-    let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [3.0, 0.005, 0.0, 0.0], None, &Tolerance::default());
+    let mut driver: Driver<_, f64, _> =
+        Driver::new(&disk, 0.0, [3.0, 0.005, 0.0, 0.0], None, &Tolerance::default());
     let mut seen = [0; 2];
     let mut before = 3.0;
     while driver.t() < 60.0 {
@@ -40,7 +41,7 @@ fn the_disk_lands_on_its_surfaces_to_1e12() {
     assert!(seen[0] > 20 && seen[1] > 40, "{seen:?}");
     // Each reversal passes the kink once slowing down and once speeding up.
     assert!((seen[1] as i64 - 2 * seen[0] as i64).abs() <= 2, "{seen:?}");
-    println!("{seen:?} {:?}", driver.counts);
+    println!("{seen:?} {:?}", driver.counts());
 }
 
 #[test]
@@ -94,7 +95,8 @@ fn tangents_pass_the_kinks() {
 fn a_start_on_a_surface_takes_the_flow_s_side() {
     let disk = disk(0.014, false);
     for (y, sign) in [(1e-3, 1.0), (-1e-3, -1.0)] {
-        let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [0.0, y, 0.04, 0.0], None, &Tolerance::default());
+        let mut driver: Driver<_, f64, _> =
+            Driver::new(&disk, 0.0, [0.0, y, 0.04, 0.0], None, &Tolerance::default());
         assert_eq!(driver.advance(1.0).unwrap(), Ending::Free);
         assert!(driver.x()[0] * sign > 0.0);
     }
@@ -116,7 +118,8 @@ fn runs_go_backwards_too() {
 #[test]
 fn the_wall_ends_the_run_at_1e12() {
     let disk = disk(0.039, true);
-    let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [0.0, 1e-3, 0.04, 0.0], None, &Tolerance::default()).with_wall();
+    let mut driver: Driver<_, f64, _> =
+        Driver::new(&disk, 0.0, [0.0, 1e-3, 0.04, 0.0], None, &Tolerance::default()).with_wall();
     let ending = loop {
         match driver.advance(1000.0).unwrap() {
             Ending::Wall => break Ending::Wall,
@@ -210,7 +213,7 @@ proptest! {
                 prop_assert!(off < 2e-12, "surface {j} missed by {off:e}");
             }
             // At 1e-12 a run of 0.5 s takes up to 1000 steps.
-            prop_assert!(driver.counts.evaluations < 20_000, "{:?}", driver.counts);
+            prop_assert!(driver.counts().evaluations < 20_000, "{:?}", driver.counts());
         }
         let tight = propagate(&disk, 0.0, 0.5, x0, &Tolerance { rtol: 1e-13, atol: 1e-16 }).unwrap();
         for n in 0..4 {

@@ -15,8 +15,11 @@ const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// Every effect, in each way it can enter.
 fn all() -> Vec<Effect> {
     let ways = |kind: Kind| match kind.spec().momenta {
-        [] => vec![Effect { kind, momentum: None }],
-        momenta => momenta.iter().map(|&m| Effect { kind, momentum: Some(m) }).collect(),
+        [] => vec![Effect { kind, momentum: None, treatment: Treatment::default() }],
+        momenta => momenta
+            .iter()
+            .map(|&m| Effect { kind, momentum: Some(m), treatment: Treatment::default() })
+            .collect(),
     };
     Kind::ALL.iter().flat_map(|&kind| ways(kind)).collect()
 }
@@ -92,7 +95,7 @@ fn what_a_known_parameter_removes_is_left_out() {
     // y - omega, omega z, omega y, w - omega y.
     assert_eq!((plain.steps().len(), plain.held().len()), (4, 1));
     assert_eq!(damped.steps().len(), 6);
-    let effect = Effect { kind: Kind::EccentricMass, momentum: None };
+    let effect = Effect { kind: Kind::EccentricMass, momentum: None, treatment: Treatment::default() };
     let disk = |effects| DiskFamily { effects, edge: false };
     let without = Tape::record(&disk(vec![]), &[]).unwrap();
     let zero: Vec<Option<f64>> = [None; 6].into_iter().chain([Some(0.0); 2]).collect();

@@ -1,11 +1,10 @@
 //! The size of the steps.
 
-use std::array::from_fn;
-
 use super::method::Point;
 use super::tolerance::Tolerance;
 use crate::model::System;
 use crate::scalar::{Mask, Real, Scalar};
+use crate::unroll::vector;
 
 /// Safety factor, and the narrowest and widest change of the step size.
 const SAFETY: f64 = 0.9;
@@ -67,7 +66,7 @@ pub fn initial_step<S: Scalar, const D: usize>(
     tolerance: &Tolerance,
 ) -> S::Real {
     let constant = S::Real::constant;
-    let real = |v: &[S; D]| from_fn::<S::Real, D, _>(|n| v[n].real());
+    let real = |v: &[S; D]| vector!(S::Real, D; n => v[n].real());
     let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
     let (x_real, f_real) = (real(&at.x), real(&rate));
     let norm = |v: [S::Real; D]| tolerance.norm(v, x_real, x_real);
@@ -75,9 +74,9 @@ pub fn initial_step<S: Scalar, const D: usize>(
     let small = size.less(constant(1e-5)).or(speed.less(constant(1e-5)));
     let h0 = S::Real::select(small, constant(1e-6), size.scale(0.01) / speed);
 
-    let moved = from_fn(|n| at.x[n] + rate[n].times(h0));
+    let moved = vector!(S, D; n => at.x[n] + rate[n].times(h0));
     let later = real(&system.rates(S::lift(at.t + h0), &moved, &at.sides));
-    let bend = norm(from_fn(|n| later[n] - f_real[n])) / h0;
+    let bend = norm(vector!(S::Real, D; n => later[n] - f_real[n])) / h0;
     let steepest = speed.max(bend);
     let flat = constant(1e-15).less(steepest).not();
     let curved = ((constant(0.01) / steepest).ln().scale(1.0 / f64::from(order))).exp();

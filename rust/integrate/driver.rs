@@ -10,6 +10,7 @@ use super::saltation::pass;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
 use crate::model::{MAX_SURFACES, System, choose, sides_of};
 use crate::scalar::{Mask, Real, Scalar};
+use crate::unroll::vector;
 
 /// What the work was, summed over the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,8 +86,17 @@ pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>>
     jumps: (S::Real, S::Real),
     /// The state is on a surface to within rounding, which leaves its side open.
     undecided: S::Mask,
-    /// The work so far.
-    pub counts: Counts,
+    work: Work<S::Real>,
+}
+
+/// The work lane by lane: steps accepted and rejected, trials, and evaluations beside those in trials.
+#[derive(Clone, Copy, Debug)]
+struct Work<R> {
+    accepted: R,
+    rejected: R,
+    trials: R,
+    beside: R,
+    grazes: R,
 }
 
 impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
@@ -99,6 +109,7 @@ where
     /// Starts at time `t` and state `x`. The size and the direction of the first trial step are those
     /// of `h` where given; otherwise the size is estimated and the direction is forward.
     pub fn new(system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
+        let zero = S::Real::zero();
         let mut driver = Self {
             at: Point { t, x, sides: sides_of(&system, S::lift(t), &x) },
             system,
@@ -114,7 +125,7 @@ where
             start: t,
             jumps: (S::Real::zero(), t),
             undecided: S::mask(false),
-            counts: Counts::default(),
+            work: Work { accepted: zero, rejected: zero, trials: zero, beside: zero, grazes: zero },
         };
         driver.start(S::mask(true), t, x, h);
         driver
@@ -129,11 +140,11 @@ where
     /// Starts anew in these lanes, as [`new`](Driver::new) does.
     pub fn start(&mut self, lanes: S::Mask, t: S::Real, x: [S; D], h: Option<S::Real>) {
         self.at.t = S::Real::select(lanes, t, self.at.t);
-        self.at.x = from_fn(|n| S::select(lanes, x[n], self.at.x[n]));
+        self.at.x = vector!(S, D; n => S::select(lanes, x[n], self.at.x[n]));
         let mut fresh = self.at;
         fresh.sides = sides_of(&self.system, S::lift(fresh.t), &fresh.x);
         let h = h.unwrap_or_else(|| {
-            self.counts.evaluations += 2;
+            self.work.beside = tick(lanes, self.work.beside, 2.0);
             initial_step(&self.system, &fresh, K::ORDER, self.norm.state())
         });
         start_sides(&self.system, &mut fresh, h);
@@ -149,6 +160,19 @@ where
         self.landing.on = self.landing.on.map(|on| on.and(lanes.not()));
         self.controller.reset(lanes);
         self.begin(lanes);
+    }
+
+    /// The work so far.
+    pub fn counts(&self) -> Counts {
+        let sum = |count: S::Real| (0..S::Real::LANES).map(|i| count.lane(i) as u64).sum();
+        let Work { accepted, rejected, trials, beside, grazes } = self.work;
+        let evaluations = trials.scale(K::EVALUATIONS as f64) + beside;
+        Counts {
+            accepted: sum(accepted),
+            rejected: sum(rejected),
+            evaluations: sum(evaluations),
+            grazes: sum(grazes),
+        }
     }
 
     /// The time reached.
@@ -195,7 +219,7 @@ where
 
     /// Goes on from another state at the same time, as when tangents are scaled back.
     pub fn set_state(&mut self, lanes: S::Mask, x: [S; D]) {
-        self.at.x = from_fn(|n| S::select(lanes, x[n], self.at.x[n]));
+        self.at.x = vector!(S, D; n => S::select(lanes, x[n], self.at.x[n]));
         self.begin(lanes);
     }
 
@@ -204,7 +228,8 @@ where
     #[inline(always)]
     pub fn trial(&mut self, end: S::Real) -> Progress<S::Mask> {
         let remaining = end - self.at.t;
-        let active = S::Mask::from_lanes(|i| remaining.lane(i) != 0.0);
+        // An end that is not a number leaves its lane active, to fail.
+        let active = is_zero(remaining).not();
         let targets = self.wall || self.system.surfaces() > 0;
         let landing = self.landing.lanes();
 
@@ -219,7 +244,7 @@ where
         }
         let asked = S::Real::select(active, h, S::Real::zero());
         let trial = self.method.attempt(&self.system, &self.at, asked, &self.norm);
-        self.counts.evaluations += K::evaluations() * active.count();
+        self.work.trials = tick(active, self.work.trials, 1.0);
 
         let judged = active.and(landing.not());
         let (good, factor) = self.controller.judge(trial.error, judged);
@@ -248,7 +273,7 @@ where
                 }));
             }
         }
-        self.counts.rejected += rejected.count();
+        self.work.rejected = tick(rejected, self.work.rejected, 1.0);
 
         let mut progress =
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
@@ -303,7 +328,7 @@ where
             if K::SERIES {
                 // The polynomial is as good as the step: it may end there.
                 let x = self.method.at(found.dt);
-                trial.x = from_fn(|n| S::select(crossing, x[n], trial.x[n]));
+                trial.x = vector!(S, D; n => S::select(crossing, x[n], trial.x[n]));
                 trial.size = S::Real::select(crossing, found.dt, trial.size);
                 crossed = from_fn(|j| crossed[j].or(found.crossing[j]));
                 landed.there = landed.there.or(crossing);
@@ -320,7 +345,7 @@ where
         }
 
         let moved = clear.or(landed.there).or(landed.grazed);
-        let fresh = self.size.abs().less(S::Real::constant(f64::MIN_POSITIVE)).not();
+        let fresh = is_zero(self.size).not();
         let unflipped = self.flips.less(S::Real::one());
         self.commit(&trial, moved, (end, last.and(clear)));
         progress.moved = moved;
@@ -366,14 +391,14 @@ where
     #[inline(always)]
     fn commit(&mut self, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
         let t = S::Real::select(last, end, self.at.t + trial.size);
-        let still = S::Mask::from_lanes(|i| t.lane(i) == self.at.t.lane(i));
-        self.flips = S::Real::select(lanes.and(still.not()), S::Real::zero(), self.flips);
+        let elapsed = lanes.and(is_zero(t - self.at.t).not());
+        self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
         self.from = S::Real::select(lanes, self.at.t, self.from);
         self.size = S::Real::select(lanes, trial.size, self.size);
         self.at.t = S::Real::select(lanes, t, self.at.t);
-        self.at.x = from_fn(|n| S::select(lanes, trial.x[n], self.at.x[n]));
+        self.at.x = vector!(S, D; n => S::select(lanes, trial.x[n], self.at.x[n]));
         self.method.accept(lanes);
-        self.counts.accepted += lanes.count();
+        self.work.accepted = tick(lanes, self.work.accepted, 1.0);
     }
 
     /// Changes the side of the target that these lanes are on; returns those where it did.
@@ -398,7 +423,7 @@ where
         }
         let Point { t, x, sides } = &mut self.at;
         let grazes = pass(&self.system, target, *t, self.size, x, sides, turned);
-        self.counts.grazes += grazes.count();
+        self.work.grazes = tick(grazes, self.work.grazes, 1.0);
         self.begin(turned);
         turned
     }
@@ -410,7 +435,7 @@ where
 
     fn begin(&mut self, lanes: S::Mask) {
         self.method.begin(&self.system, &self.at, lanes);
-        self.counts.evaluations += lanes.count();
+        self.work.beside = tick(lanes, self.work.beside, 1.0);
     }
 }
 
@@ -468,6 +493,16 @@ where
 }
 
 #[inline(always)]
+fn is_zero<R: Real>(value: R) -> R::Mask {
+    value.abs().less(R::constant(f64::MIN_POSITIVE))
+}
+
+#[inline(always)]
+fn tick<R: Real>(lanes: R::Mask, count: R, by: f64) -> R {
+    R::select(lanes, count + R::constant(by), count)
+}
+
+#[inline(always)]
 fn union<M: Mask>(masks: &[M; TARGETS]) -> M {
     masks[1..].iter().fold(masks[0], |any, &mask| any.or(mask))
 }
@@ -480,7 +515,7 @@ fn start_sides<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &mut P
         if on.any() {
             let ahead = h.each(|h| 1e-9_f64.copysign(h));
             let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
-            let moved = from_fn(|n| at.x[n] + rate[n].times(ahead));
+            let moved = vector!(S, D; n => at.x[n] + rate[n].times(ahead));
             let there = system.surface(j, S::lift(at.t + ahead), &moved, &at.sides);
             at.sides[j] = choose(on, S::zero().less(there), at.sides[j]);
         }

@@ -28,6 +28,8 @@ pub struct Trial<S: Scalar, const D: usize> {
 pub trait Method<S: Scalar, const D: usize> {
     /// The order of the solution that is carried on.
     const ORDER: i32;
+    /// Evaluations of the rates in a trial.
+    const EVALUATIONS: usize;
     /// Whether the polynomial is as accurate as the new state, so that a step can end anywhere on it.
     const SERIES: bool;
     /// Where within a step switching surfaces are looked at, so that one crossed twice is seen too.
@@ -59,7 +61,4 @@ pub trait Method<S: Scalar, const D: usize> {
 
     /// The same polynomial's unit of time and its coefficients, lowest first: `x = Σ_k c_k (dt/unit)^k`.
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;
-
-    /// Evaluations of the rates in a trial.
-    fn evaluations() -> u64;
 }

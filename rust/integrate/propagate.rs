@@ -57,7 +57,7 @@ where
     let mut driver: Driver<_, S, D> = Driver::new(system, t0, x0, Some(h0), tolerance);
     while driver.t() != t1 {
         driver.advance(t1)?;
-        if driver.counts.accepted > MOST_STEPS {
+        if driver.counts().accepted > MOST_STEPS {
             return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
         }
     }

@@ -1,6 +1,5 @@
 //! Explicit Runge-Kutta pairs.
 
-use std::array::from_fn;
 use std::marker::PhantomData;
 
 use super::method::{Method, Point, Trial};
@@ -8,6 +7,7 @@ use super::tableau::{DormandPrince, Scheme};
 use super::tolerance::ErrorNorm;
 use crate::model::{Sides, System};
 use crate::scalar::Scalar;
+use crate::unroll::{unroll, vector};
 
 /// The rates at all stages and the new state of a step of size `h` from time `t` and state `x`, whose
 /// rate is `first`. The last of the stages that make a step is the rate at the new state.
@@ -25,10 +25,10 @@ pub fn step<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P:
 ) -> ([S; D], [[S; D]; N]) {
     let mut stages = [*first; N];
     let mut new = *x;
-    for i in 1..T::TABLEAU.stages {
+    unroll!(i in 1..T::TABLEAU.stages => {
         new = stage::<T, S, D, N, P>(i, x, &stages, h);
         stages[i] = system.rates(S::lift(t + h.scale(T::TABLEAU.c[i])), &new, sides);
-    }
+    });
     (new, stages)
 }
 
@@ -40,7 +40,7 @@ fn stage<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P: us
     stages: &[[S; D]; N],
     h: S::Real,
 ) -> [S; D] {
-    from_fn(|n| x[n] + combine(&T::TABLEAU.a[i], stages, i, n).times(h))
+    vector!(S, D; n => x[n] + combine(&T::TABLEAU.a[i], stages, i, n).times(h))
 }
 
 /// `Σ_(j < count) weights_j k_j` for component `n`, the zero weights left out.
@@ -52,11 +52,11 @@ fn combine<S: Scalar, const D: usize, const N: usize>(
     n: usize,
 ) -> S {
     let mut sum = stages[0][n].scale(weights[0]);
-    for j in 1..count {
+    unroll!(j in 1..count => {
         if weights[j] != 0.0 {
             sum += stages[j][n].scale(weights[j]);
         }
-    }
+    });
     sum
 }
 
@@ -99,6 +99,7 @@ where
     S: Scalar,
 {
     const ORDER: i32 = T::TABLEAU.order;
+    const EVALUATIONS: usize = T::TABLEAU.stages - 1;
     const SERIES: bool = false;
     const PROBES: &'static [f64] = &[0.25, 0.5, 0.75, 1.0];
 
@@ -110,7 +111,7 @@ where
     #[inline(always)]
     fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {
         let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
-        self.first = from_fn(|n| S::select(lanes, rate[n], self.first[n]));
+        self.first = vector!(S, D; n => S::select(lanes, rate[n], self.first[n]));
     }
 
     #[inline(always)]
@@ -122,7 +123,7 @@ where
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
         let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
-        let error = from_fn(|n| combine(&T::TABLEAU.e, &stages, T::TABLEAU.stages, n).times(h));
+        let error = vector!(S, D; n => combine(&T::TABLEAU.e, &stages, T::TABLEAU.stages, n).times(h));
         let error = norm.of_step(&error, &at.x, &x);
         (self.x, self.h, self.stages) = (at.x, h, stages);
         Trial { x, size: h, error }
@@ -139,7 +140,7 @@ where
     #[inline(always)]
     fn accept(&mut self, lanes: S::Mask) {
         let last = &self.stages[T::TABLEAU.stages - 1];
-        self.first = from_fn(|n| S::select(lanes, last[n], self.first[n]));
+        self.first = vector!(S, D; n => S::select(lanes, last[n], self.first[n]));
     }
 
     #[inline(always)]
@@ -147,7 +148,7 @@ where
         // No step, no way along it.
         let moving = S::Real::zero().less(self.h * self.h);
         let theta = S::Real::select(moving, dt / self.h, S::Real::zero());
-        from_fn(|n| {
+        vector!(S, D; n => {
             let mut sum = S::zero();
             for j in (0..P).rev() {
                 sum = sum.times(theta) + self.power(j, n);
@@ -158,11 +159,7 @@ where
 
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
         coefficients.push(self.x);
-        coefficients.extend((0..P).map(|j| from_fn(|n| self.power(j, n).times(self.h))));
+        coefficients.extend((0..P).map(|j| vector!(S, D; n => self.power(j, n).times(self.h))));
         self.h
-    }
-
-    fn evaluations() -> u64 {
-        T::TABLEAU.stages as u64 - 1
     }
 }

@@ -1,9 +1,8 @@
 //! Tangents through a switch where the law jumps.
 
-use std::array::from_fn;
-
 use crate::model::{Sides, System};
 use crate::scalar::{Mask, Real, Scalar};
+use crate::unroll::vector;
 
 /// A surface's rate of change is a central difference over this time; exact where the surface is linear.
 const AHEAD: f64 = 1e-6;
@@ -39,13 +38,13 @@ pub fn pass<S: Scalar, const D: usize>(
     let (old, before) = (*x, *sides);
     let slope = |t: S::Real, x: &[S; D], rate: &[S; D]| {
         let at = |by: f64| {
-            let moved = from_fn(|n| x[n] + rate[n].scale(by));
+            let moved = vector!(S, D; n => x[n] + rate[n].scale(by));
             system.surface(j, S::lift(t + S::Real::constant(by)), &moved, &before).real()
         };
         (at(AHEAD) - at(-AHEAD)).scale(0.5 / AHEAD)
     };
     let rate = system.rates(time, &old, &before);
-    let earlier = from_fn(|n| old[n] - rate[n].times(size));
+    let earlier = vector!(S, D; n => old[n] - rate[n].times(size));
     let rate_earlier = system.rates(S::lift(t - size), &earlier, &before);
     let speed = slope(t, &old, &rate);
     let usual = slope(t - size, &earlier, &rate_earlier);
@@ -55,9 +54,9 @@ pub fn pass<S: Scalar, const D: usize>(
     let value = system.surface(j, time, &old, &before);
     let delay = (S::lift(value.real()) - value).times(S::Real::one() / speed);
     let delay = S::select(here.and(clear), delay, S::zero());
-    let mut meeting = from_fn(|n| old[n] + rate[n] * delay);
+    let mut meeting = vector!(S, D; n => old[n] + rate[n] * delay);
     system.switch(j, time, &mut meeting, sides, here);
     let after = system.rates(time, &meeting, sides);
-    *x = from_fn(|n| S::select(here, meeting[n] - after[n] * delay, old[n]));
+    *x = vector!(S, D; n => S::select(here, meeting[n] - after[n] * delay, old[n]));
     here.and(clear.not())
 }

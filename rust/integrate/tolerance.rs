@@ -1,10 +1,9 @@
 //! How accurate a run shall be, and how it can fail.
 
-use std::array::from_fn;
-
 use thiserror::Error;
 
 use crate::scalar::{Dual, Mask, Real, Scalar};
+use crate::unroll::{unroll, vector};
 
 /// How large the error of a step is.
 pub trait ErrorNorm<S: Scalar, const D: usize> {
@@ -39,11 +38,11 @@ impl Tolerance {
     #[inline(always)]
     pub fn norm<R: Real, const D: usize>(&self, error: [R; D], before: [R; D], after: [R; D]) -> R {
         let mut sum = R::zero();
-        for n in 0..D {
+        unroll!(n in 0..D => {
             let size = before[n].abs().max(after[n].abs());
             let ratio = error[n] / (size.scale(self.rtol) + R::constant(self.atol));
             sum += ratio * ratio;
-        }
+        });
         sum.scale(1.0 / D as f64).sqrt()
     }
 }
@@ -51,7 +50,7 @@ impl Tolerance {
 impl<S: Scalar, const D: usize> ErrorNorm<S, D> for Tolerance {
     #[inline(always)]
     fn of_step(&self, error: &[S; D], before: &[S; D], after: &[S; D]) -> S::Real {
-        let real = |x: &[S; D]| from_fn::<S::Real, D, _>(|n| x[n].real());
+        let real = |x: &[S; D]| vector!(S::Real, D; n => x[n].real());
         self.norm(real(error), real(before), real(after))
     }
 

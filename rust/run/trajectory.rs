@@ -113,5 +113,5 @@ pub fn trajectory<M: System<f64, D>, const D: usize>(
             x.push(*driver.x());
         }
     }
-    Ok(Run { t, x, events, outcome, counts: driver.counts, record })
+    Ok(Run { t, x, events, outcome, counts: driver.counts(), record })
 }

@@ -1,9 +1,9 @@
 //! Forward-mode derivatives: a value and its derivatives in `N` directions.
 
-use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::Scalar;
+use crate::unroll::vector;
 
 /// `re + Σ_i d[i] ε_i` with `ε_i ε_j = 0`. The inner scalar may itself be a dual (nested
 /// derivatives) or a packet.
@@ -40,7 +40,7 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
     /// The chain rule: a function's value and its slope at `self`.
     #[inline(always)]
     fn chain(self, value: S, slope: S) -> Self {
-        Self { re: value, d: from_fn(|i| self.d[i] * slope) }
+        Self { re: value, d: vector!(S, N; i => self.d[i] * slope) }
     }
 }
 
@@ -48,7 +48,7 @@ impl<S: Scalar, const N: usize> Add for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Self { re: self.re + o.re, d: from_fn(|i| self.d[i] + o.d[i]) }
+        Self { re: self.re + o.re, d: vector!(S, N; i => self.d[i] + o.d[i]) }
     }
 }
 
@@ -56,7 +56,7 @@ impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Self { re: self.re - o.re, d: from_fn(|i| self.d[i] - o.d[i]) }
+        Self { re: self.re - o.re, d: vector!(S, N; i => self.d[i] - o.d[i]) }
     }
 }
 
@@ -65,7 +65,7 @@ impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
     #[inline(always)]
     #[allow(clippy::suspicious_arithmetic_impl, reason = "the product rule is a sum")]
     fn mul(self, o: Self) -> Self {
-        Self { re: self.re * o.re, d: from_fn(|i| self.d[i] * o.re + o.d[i] * self.re) }
+        Self { re: self.re * o.re, d: vector!(S, N; i => self.d[i] * o.re + o.d[i] * self.re) }
     }
 }
 
@@ -75,7 +75,7 @@ impl<S: Scalar, const N: usize> Div for Dual<S, N> {
     fn div(self, o: Self) -> Self {
         let inverse = S::one() / o.re;
         let re = self.re * inverse;
-        Self { re, d: from_fn(|i| (self.d[i] - o.d[i] * re) * inverse) }
+        Self { re, d: vector!(S, N; i => (self.d[i] - o.d[i] * re) * inverse) }
     }
 }
 
@@ -83,7 +83,7 @@ impl<S: Scalar, const N: usize> Neg for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { re: -self.re, d: from_fn(|i| -self.d[i]) }
+        Self { re: -self.re, d: vector!(S, N; i => -self.d[i]) }
     }
 }
 
@@ -119,11 +119,11 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     }
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
-        Self { re: self.re.scale(factor), d: from_fn(|i| self.d[i].scale(factor)) }
+        Self { re: self.re.scale(factor), d: vector!(S, N; i => self.d[i].scale(factor)) }
     }
     #[inline(always)]
     fn times(self, factor: S::Real) -> Self {
-        Self { re: self.re.times(factor), d: from_fn(|i| self.d[i].times(factor)) }
+        Self { re: self.re.times(factor), d: vector!(S, N; i => self.d[i].times(factor)) }
     }
     #[inline(always)]
     fn less(self, other: Self) -> S::Mask {
@@ -131,7 +131,7 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     }
     #[inline(always)]
     fn select(mask: S::Mask, yes: Self, no: Self) -> Self {
-        Self { re: S::select(mask, yes.re, no.re), d: from_fn(|i| S::select(mask, yes.d[i], no.d[i])) }
+        Self { re: S::select(mask, yes.re, no.re), d: vector!(S, N; i => S::select(mask, yes.d[i], no.d[i])) }
     }
     #[inline(always)]
     fn mask(value: bool) -> S::Mask {

@@ -128,6 +128,4 @@ pub trait Mask: Copy + Debug + Send + Sync + PartialEq + 'static {
     fn not(self) -> Self;
     /// Whether any lane is true.
     fn any(self) -> bool;
-    /// How many lanes are true.
-    fn count(self) -> u64;
 }

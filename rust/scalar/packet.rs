@@ -1,6 +1,5 @@
 //! Several numbers at once: the lanes of a SIMD register.
 
-use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::{Mask, Real, Scalar, elementary};
@@ -26,10 +25,28 @@ pub struct Packet<const L: usize>(pub [f64; L]);
 #[repr(C, align(64))]
 pub struct LaneMask<const L: usize>([u64; L]);
 
+#[inline(always)]
+fn lanes<const L: usize>(mut lane: impl FnMut(usize) -> f64) -> [f64; L] {
+    let mut all = [0.0; L];
+    for (i, own) in all.iter_mut().enumerate() {
+        *own = lane(i);
+    }
+    all
+}
+
+#[inline(always)]
+fn bits<const L: usize>(mut lane: impl FnMut(usize) -> u64) -> [u64; L] {
+    let mut all = [0; L];
+    for (i, own) in all.iter_mut().enumerate() {
+        *own = lane(i);
+    }
+    all
+}
+
 impl<const L: usize> Mask for LaneMask<L> {
     #[inline(always)]
     fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> Self {
-        Self(from_fn(|i| if lane(i) { !0 } else { 0 }))
+        Self(bits(|i| if lane(i) { !0 } else { 0 }))
     }
     #[inline(always)]
     fn lane(self, i: usize) -> bool {
@@ -37,23 +54,19 @@ impl<const L: usize> Mask for LaneMask<L> {
     }
     #[inline(always)]
     fn and(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] & other.0[i]))
+        Self(bits(|i| self.0[i] & other.0[i]))
     }
     #[inline(always)]
     fn or(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] | other.0[i]))
+        Self(bits(|i| self.0[i] | other.0[i]))
     }
     #[inline(always)]
     fn not(self) -> Self {
-        Self(self.0.map(|bits| !bits))
+        Self(bits(|i| !self.0[i]))
     }
     #[inline(always)]
     fn any(self) -> bool {
         self.0.iter().fold(0, |any, bits| any | bits) != 0
-    }
-    #[inline(always)]
-    fn count(self) -> u64 {
-        self.0.iter().fold(0, |count, bits| count + (bits & 1))
     }
 }
 
@@ -63,7 +76,7 @@ macro_rules! lanewise {
             type Output = Self;
             #[inline(always)]
             fn $op(self, other: Self) -> Self {
-                Self(from_fn(|i| self.0[i].$op(other.0[i])))
+                Self(lanes(|i| self.0[i].$op(other.0[i])))
             }
         }
     )+};
@@ -97,7 +110,7 @@ impl<const L: usize> Real for Packet<L> {
 
     #[inline(always)]
     fn from_lanes(lane: impl FnMut(usize) -> f64) -> Self {
-        Self(from_fn(lane))
+        Self(lanes(lane))
     }
     #[inline(always)]
     fn lane(self, i: usize) -> f64 {
@@ -109,11 +122,11 @@ impl<const L: usize> Real for Packet<L> {
     }
     #[inline(always)]
     fn each(self, f: impl Fn(f64) -> f64) -> Self {
-        Self(from_fn(|i| f(self.0[i])))
+        Self(lanes(|i| f(self.0[i])))
     }
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(from_fn(|i| f(self.0[i], other.0[i])))
+        Self(lanes(|i| f(self.0[i], other.0[i])))
     }
 }
 
@@ -148,7 +161,7 @@ impl<const L: usize> Scalar for Packet<L> {
     #[inline(always)]
     fn select(mask: LaneMask<L>, yes: Self, no: Self) -> Self {
         let pick = |i: usize| (yes.0[i].to_bits() & mask.0[i]) | (no.0[i].to_bits() & !mask.0[i]);
-        Self(from_fn(|i| f64::from_bits(pick(i))))
+        Self(lanes(|i| f64::from_bits(pick(i))))
     }
     #[inline(always)]
     fn mask(value: bool) -> LaneMask<L> {

@@ -118,8 +118,4 @@ impl Mask for bool {
     fn any(self) -> bool {
         self
     }
-    #[inline(always)]
-    fn count(self) -> u64 {
-        u64::from(self)
-    }
 }
