@@ -325,7 +325,7 @@ def command(spec: udd.SweepSpec, folder: Path) -> list[str]:
 
 def test_killed_at_any_moment_and_resumed_it_gives_the_same_bytes(tmp_path: Path) -> None:
     # Runs so short that nearly all of the time goes into writing.
-    spec = disk_spec(chunk=2, n=20)
+    spec = disk_spec(chunk=2, n=14)
     udd.sweep(spec, store=tmp_path / "whole.zarr")
     call, store = command(spec, tmp_path), tmp_path / "killed.zarr"
     chance = random.Random(3)
@@ -334,7 +334,7 @@ def test_killed_at_any_moment_and_resumed_it_gives_the_same_bytes(tmp_path: Path
         process = subprocess.Popen(call, stderr=subprocess.PIPE)
         # The first two kills are meant for the template.
         begun = flags(store)
-        more = chance.randint(1, 40)
+        more = chance.randint(1, 25)
         if turn < 2:
             wait_for(store.exists, "a folder", process)
             time.sleep(chance.uniform(0, 0.02))
@@ -345,7 +345,7 @@ def test_killed_at_any_moment_and_resumed_it_gives_the_same_bytes(tmp_path: Path
         process.communicate()
         landed.append(flags(store))
     assert sorted(landed) == landed
-    assert landed[-1] < 400  # the last kill came before the end
+    assert landed[-1] < 196  # the last kill came before the end
     assert landed[-1] > landed[2] > 0
     subprocess.run(call, check=True, timeout=120, capture_output=True)
     assert files(store) == files(tmp_path / "whole.zarr")
@@ -438,8 +438,8 @@ if __name__ == "__main__":
 
 @pytest.mark.parametrize("kind", ["here", "threads", "spawn"])
 def test_ctrl_c_keeps_what_is_finished_and_cancels_the_rest(kind: str, tmp_path: Path) -> None:
-    # 80 chunks of a few hundredths of a second each.
-    spec = exponents_spec(n=160, t=1000.0, chunk=2)
+    # 60 chunks of a few hundredths of a second each.
+    spec = exponents_spec(n=60, t=1000.0, chunk=1)
     script, store = tmp_path / "stopped.py", tmp_path / "a.zarr"
     script.write_text(STOPPED.replace("{{", "{").replace("}}", "}"))
     call = [sys.executable, str(script), kind, spec.to_json(), str(store)]
@@ -449,16 +449,16 @@ def test_ctrl_c_keeps_what_is_finished_and_cancels_the_rest(kind: str, tmp_path:
     assert said.startswith("['IncompleteWarning'] ")
     assert "chunks are not finished: stopped by Ctrl-C; the same call goes on from here True" in said
     finished, missing = map(int, counts.split())
-    assert finished >= 2
-    assert missing >= 2
-    assert finished + missing == 160
+    assert finished >= 1
+    assert missing >= 1
+    assert finished + missing == 60
     udd.sweep(spec, store=store)
     udd.sweep(spec, store=tmp_path / "whole.zarr")
     assert files(store) == files(tmp_path / "whole.zarr")
 
 
 def test_the_command_stopped_by_ctrl_c_says_so(tmp_path: Path) -> None:
-    spec = exponents_spec(n=160, t=1000.0, chunk=2)
+    spec = exponents_spec(n=60, t=1000.0, chunk=1)
     call, store = command(spec, tmp_path), tmp_path / "killed.zarr"
     process = subprocess.Popen([*call, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for(lambda: flags(store) > 2, "flags", process)
@@ -523,7 +523,7 @@ def test_a_mistake_in_the_work_is_not_taken_for_a_death() -> None:
 
 
 def test_a_pool_that_breaks_ends_the_sweep_and_another_goes_on(tmp_path: Path) -> None:
-    spec, store = exponents_spec(n=80, chunk=2), tmp_path / "a.zarr"
+    spec, store = exponents_spec(n=50, chunk=1), tmp_path / "a.zarr"
     pool = spawned()
 
     def kill() -> None:
@@ -538,11 +538,23 @@ def test_a_pool_that_breaks_ends_the_sweep_and_another_goes_on(tmp_path: Path) -
     with pytest.raises(BrokenProcessPool):
         pool.submit(int)
     pool.shutdown()
-    assert 0 < (found["outcome"] == 1).sum() < 80
+    assert 0 < (found["outcome"] == 1).sum() < 50
     with spawned() as fresh:
         udd.sweep(spec, fresh, store)
     udd.sweep(spec, store=tmp_path / "whole.zarr")
     assert files(store) == files(tmp_path / "whole.zarr")
+
+
+class Counted:
+    """An executor, and how often it was asked."""
+
+    def __init__(self, executor: Any) -> None:
+        self.executor, self.count = executor, 0
+
+    def submit(self, fn: Any, /, *args: Any) -> Future[Any]:
+        self.count += 1
+        future: Future[Any] = self.executor.submit(fn, *args)
+        return future
 
 
 @pytest.mark.parametrize("failures", [3, 0], ids=["dask tries again", "udd tries again"])
@@ -550,7 +562,7 @@ def test_a_dask_worker_killed_in_the_middle(failures: int, tmp_path: Path) -> No
     """With no failures allowed Dask gives the chunk up at once, and it is handed over again."""
     dask = pytest.importorskip("dask")
     pytest.importorskip("distributed", reason="Dask needs the extra 'scale'")
-    spec, store = exponents_spec(n=120, t=4000.0, chunk=3), tmp_path / "a.zarr"
+    spec, store = exponents_spec(n=90, t=4000.0, chunk=3), tmp_path / "a.zarr"
     with dask.config.set({"distributed.scheduler.allowed-failures": failures}), dask_executor() as workers:
         first = next(iter(workers._client.cluster.workers.values())).pid
         killed = []
@@ -562,9 +574,11 @@ def test_a_dask_worker_killed_in_the_middle(failures: int, tmp_path: Path) -> No
 
         killer = threading.Thread(target=kill)
         killer.start()
-        found = udd.sweep(spec, workers, store)
+        counted = Counted(workers)
+        found = udd.sweep(spec, counted, store)
         killer.join()
-    assert killed[0] < 40
+    assert killed[0] < 30
+    assert counted.count == 30 if failures else counted.count > 30
     assert found.identical(udd.sweep(spec))
     udd.sweep(spec, store=tmp_path / "whole.zarr")
     assert files(store) == files(tmp_path / "whole.zarr")

@@ -66,6 +66,7 @@ class SweepStore:
             _make_template(self._group, spec, grid)
         self._arrays = {v.name: _array(self._group, v.name) for v in variables_of(spec)}
         self._done = _array(self._group, "done")
+        self._reached = False
 
     def arguments(self, chunk: int) -> tuple[Any, ...]:
         """What `work` takes."""
@@ -74,11 +75,12 @@ class SweepStore:
         return part_of(self._spec, self._grid, chunk), target
 
     def keep(self, chunk: int, _nothing: None) -> None:
-        """The worker has written it."""
-        if not self._done[self._grid.place(chunk)]:
+        """The worker has written it; whether to here, the first one shows."""
+        if not self._reached and not self._done[self._grid.place(chunk)]:
             raise UddError(
                 "the workers do not write to the store that was given: it must be one that they reach"
             )
+        self._reached = True
 
     def done(self) -> NDArray[np.bool_]:
         """Which chunks are finished."""

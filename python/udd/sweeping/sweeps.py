@@ -106,7 +106,7 @@ def sweep(
     done = result.done()
     sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
     shown = sys.stderr.isatty() if progress is None else progress
-    why, interrupted = "", False
+    why, interrupted = "some of the workers do not reach the store", False
     with tqdm(total=sum(sizes), initial=int(done @ sizes), unit="run", disable=not shown, leave=False) as bar:
 
         def keep(chunk: int, found: Any) -> None:
