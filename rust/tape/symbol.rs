@@ -423,7 +423,4 @@ impl Mask for SideOf {
     fn any(self) -> bool {
         self.lane(0)
     }
-    fn count(self) -> u64 {
-        u64::from(self.lane(0))
-    }
 }
