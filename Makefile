@@ -16,10 +16,13 @@ export PYO3_PYTHON := $(CURDIR)/$(PY)
 # Python's own settings must not leak into .venv.
 unexport PYTHONPATH PYTHONHOME
 
+# The peers of `bench-peers` live in an environment of their own.
+PEERS := .venv-peers/$(notdir $(BIN))
+
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean
+.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean bench-peers
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +61,9 @@ format: .venv/.deps ## format the Rust and the Python code
 dist: .venv/.deps ## build the wheel and the source distribution into dist/
 	$(BIN)/maturin build --release --locked --strip --sdist --out dist
 
+bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)
+	cd benches/python && PYTHONPATH=. $(CURDIR)/$(PEERS)/python -m peers $(ARGS)
+
 lock: .venv/.deps ## write requirements.lock anew, with today's versions
 	rm -rf .venv/lock
 	$(PY) -m venv .venv/lock
@@ -67,7 +73,7 @@ lock: .venv/.deps ## write requirements.lock anew, with today's versions
 	  --custom-compile-command "make lock" --output-file requirements.lock
 
 clean: ## remove .venv and everything that was built
-	rm -rf .venv dist demo target .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers dist demo target .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 
@@ -93,4 +99,23 @@ clean: ## remove .venv and everything that was built
 
 .venv/.udd: .venv/.deps $(SOURCES)
 	MATURIN_PEP517_ARGS=--locked $(PY) -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable . --verbose
+	@touch $@
+
+# --- the same for `bench-peers`; a peer that cannot be installed here is a note in the table
+
+.venv-peers/.deps: benches/python/requirements-peers.txt
+	rm -rf .venv-peers
+	@for p in $(PYTHONS); do \
+	  if "$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then "$$p" -m venv .venv-peers; exit; fi; \
+	done; \
+	echo "make: no Python 3.11 or newer found among: $(PYTHONS)" >&2; exit 1
+	sed -e 's/ *#.*//' -e '/^$$/d' $< | while read -r package; do \
+	  $(PEERS)/python -m pip install --disable-pip-version-check --progress-bar off --quiet "$$package" -c $< || \
+	    echo "make: $$package cannot be installed here; the table goes without it" >&2; \
+	done
+	@touch $@
+
+.venv-peers/.udd: .venv-peers/.deps $(SOURCES)
+	PYO3_PYTHON=$(CURDIR)/$(PEERS)/python MATURIN_PEP517_ARGS=--locked \
+	  $(PEERS)/python -m pip install --disable-pip-version-check --force-reinstall --no-deps .
 	@touch $@

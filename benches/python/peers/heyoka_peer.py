@@ -1,0 +1,46 @@
+"""heyoka.py, as its authors write it: compact mode off, high accuracy off, batches as wide as the SIMD registers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+Equations = list[tuple[Any, Any]]
+
+OPTIONS = {"compact_mode": False, "high_accuracy": False}
+
+
+def dle() -> Equations:
+    x, y, z = hy.make_vars("x", "y", "z")
+    return [(x, y - x), (y, x * z), (z, hy.par[0] - x * y)]
+
+
+def dle_tangent() -> Equations:
+    """With one tangent vector after the state."""
+    x, y, z = hy.make_vars("x", "y", "z")
+    u, v, s = hy.make_vars("u", "v", "s")
+    return [*dle(), (u, v - u), (v, u * z + x * s), (s, -(u * y + x * v))]
+
+
+def single(
+    equations: Equations, dim: int, parameters: list[float], tol: float, fast_math: bool = True, **more: Any
+) -> Any:
+    """An integrator of one trajectory."""
+    return hy.taylor_adaptive(
+        equations, [0.0] * dim, pars=parameters, tol=tol, fast_math=fast_math, **OPTIONS, **more
+    )
+
+
+def batch(equations: Equations, dim: int, parameters: int, width: int, tol: float, **more: Any) -> Any:
+    """An integrator of `width` trajectories in step."""
+    return hy.taylor_adaptive_batch(
+        equations,
+        np.zeros((dim, width)),
+        pars=np.zeros((parameters, width)),
+        tol=tol,
+        fast_math=True,
+        **OPTIONS,
+        **more,
+    )

@@ -1,0 +1,111 @@
+"""numba: DOP853 hand-written for one system, one trajectory at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from peers import dop853
+
+FAST = {"fastmath": True, "error_model": "numpy", "nogil": True}
+
+
+def compiled(name: str, arguments: str, lines: list[str], result: str) -> Callable[..., Any]:
+    """A function of straight-line source, compiled and inlined where it is called."""
+    source = f"def {name}({arguments}):\n{dop853.indented(lines, 1)}\n    return {result}\n"
+    scope: dict[str, Any] = {}
+    exec(source, scope)
+    compiled: Callable[..., Any] = njit(forceinline=True, **FAST)(scope[name])
+    return compiled
+
+
+def tuple_of(names: list[str]) -> str:
+    return "(" + ", ".join(names) + ",)"
+
+
+def unpacked(dim: int, parameters: int) -> list[str]:
+    names = dop853.names
+    return [
+        tuple_of(names("y", dim)) + " = y",
+        tuple_of(names("k0_", dim)) + " = k",
+        tuple_of(names("p", parameters)) + " = p",
+    ]
+
+
+@cache
+def rates_of(rates: dop853.Rates, dim: int, parameters: int) -> Callable[..., Any]:
+    """``rates(y, p)`` on tuples."""
+    names = dop853.names
+    lines = unpacked(dim, parameters)
+    values = list(rates(names("y", dim), names("p", parameters)))
+    return compiled("rates", "y, p", [lines[0], lines[2]], tuple_of(values))
+
+
+@cache
+def step_of(rates: dop853.Rates, dim: int, parameters: int, controlled: int) -> Callable[..., Any]:
+    """``step(y, k, h, rtol, atol, p)``: the new state, its rates, the error's square, the stages."""
+    names = dop853.names
+    stages = [f"k{i}_{c}" for i in range(1, 12) for c in range(dim)]
+    lines = unpacked(dim, parameters) + dop853.step(rates, dim, parameters, controlled)
+    result = f"{tuple_of(names('n', dim))}, {tuple_of(names('k12_', dim))}, err2, {tuple_of(stages)}"
+    return compiled("step", "y, k, h, rtol, atol, p", lines, result)
+
+
+@cache
+def dense_of(rates: dop853.Rates, dim: int, parameters: int) -> Callable[..., Any]:
+    """``dense(y, k, n, kn, stages, h, p)``: per component the coefficients of the interpolant."""
+    names = dop853.names
+    stages = [f"k{i}_{c}" for i in range(1, 12) for c in range(dim)]
+    lines = [
+        *unpacked(dim, parameters),
+        tuple_of(names("n", dim)) + " = n",
+        tuple_of(names("k12_", dim)) + " = kn",
+        tuple_of(stages) + " = stages",
+        *dop853.dense(rates, dim, parameters),
+    ]
+    result = tuple_of([tuple_of([f"y{c}"] + [f"f{i}_{c}" for i in range(7)]) for c in range(dim)])
+    return compiled("dense", "y, k, n, kn, stages, h, p", lines, result)
+
+
+@njit(forceinline=True, **FAST)
+def factor(err2: float) -> float:
+    """By how much the next step is longer, before limits: 0.9 err^(-1/8)."""
+    return 0.9 / np.sqrt(np.sqrt(np.sqrt(np.sqrt(err2 + 1e-24))))
+
+
+@njit(forceinline=True, **FAST)
+def interpolated(f: tuple[float, ...], x: float) -> float:
+    """A component at the fraction x of the step."""
+    z = 1.0 - x
+    inner = f[4] + x * (f[5] + z * (f[6] + x * f[7]))
+    return f[0] + x * (f[1] + z * (f[2] + x * (f[3] + z * inner)))
+
+
+@njit(**FAST)
+def crossing(f: tuple[float, ...], level: float) -> float:
+    """The fraction of the step at which a component that changes sides passes `level`."""
+    low, high = 0.0, 1.0
+    below, above = f[0] - level, f[0] + f[1] - level
+    x = 1.0
+    side = 0
+    for _ in range(60):
+        x = low + (high - low) * below / (below - above)
+        value = interpolated(f, x) - level
+        if abs(value) < 1e-13 or high - low < 1e-14:
+            break
+        # Illinois: the secant, with an end's weight halved when it stays twice.
+        if (value < 0.0) == (below < 0.0):
+            low, below = x, value
+            if side == 1:
+                above *= 0.5
+            side = 1
+        else:
+            high, above = x, value
+            if side == -1:
+                below *= 0.5
+            side = -1
+    return x
