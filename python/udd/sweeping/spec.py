@@ -219,7 +219,7 @@ def _axis(model: Model, name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 def _values_to_dict(values: NDArray[np.float64]) -> dict[str, Any]:
     first, last, n = float(values[0]), float(values[-1]), len(values)
-    if n > 2 and np.linspace(first, last, n).tobytes() == values.tobytes():
+    if n > 2 and (np.linspace(first, last, n).view(np.uint64) == values.view(np.uint64)).all():  # to the bit
         return {"from": first, "to": last, "n": n}
     return {"values": values.tolist()}
 
