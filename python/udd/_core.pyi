@@ -25,6 +25,7 @@ class _Effect(TypedDict):
     bodies: list[str]
     slots: list[str]
     momenta: list[str]
+    treatments: list[str]
     parameters: list[_Parameter]
 
 class _Run(TypedDict):

@@ -30,6 +30,9 @@ from udd.errors import ModelError
 
 __all__ = ["Effect", "Parameter", "Spec", "library"]
 
+#: What stands in a formula for the smoothed sign of the speed.
+_SIGNS = {"set-valued": "Sgn(Omega)", "karnopp": "Karnopp(Omega, eps)", "lugre": "LuGre(Omega, eps)"}
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -87,6 +90,12 @@ class Spec:
         How it may enter the angular momentum, the default first: ``"consistent"`` (the contact's
         velocity and its rate of change exert a torque) or ``"constraint"`` (only the rolling constraint
         changes, as in the paper). Empty for torque and friction.
+    treatments : tuple of str
+        What may become of dry friction's jump at rest, the default first: ``"smoothed"`` (over the width
+        `eps`; nothing sticks, but it can be fitted), ``"set-valued"`` (it sticks until the torque exceeds the
+        friction), ``"karnopp"`` (the same, and speeds below `eps` count as rest) or ``"lugre"`` (bristles
+        bend by about `eps`, in rad, before they slide; their deflection is one more state). Empty for
+        what is not dry friction.
     parameters : tuple of Parameter
         In the order of the formula.
     """
@@ -98,22 +107,24 @@ class Spec:
     bodies: tuple[str, ...]
     slots: tuple[str, ...]
     momenta: tuple[str, ...]
+    treatments: tuple[str, ...]
     parameters: tuple[Parameter, ...]
 
-    def make(self, *, momentum: str | None = None, **values: float) -> Effect:
+    def make(self, *, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
         """The effect with these parameter values; the others take their defaults.
 
         Raises
         ------
         ModelError
-            An unknown parameter, a value outside its range, or a momentum that the effect does not have.
+            An unknown parameter, a value outside its range, or a momentum or treatment that the effect
+            does not have.
         """
         known = {p.name: p for p in self.parameters}
         for name in values:
             if name not in known:
                 raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
         given = tuple(p.check(self.name, values.get(p.name, p.default), strict=True) for p in self.parameters)
-        return Effect(self.name, given, momentum)
+        return Effect(self.name, given, momentum, treatment)
 
 
 @functools.cache
@@ -127,8 +138,9 @@ def _specs() -> Mapping[str, Spec]:
         )
         name = entry["name"]
         texts = entry["title"], entry["equation"], entry["meaning"]
-        lists = tuple(entry["bodies"]), tuple(entry["slots"]), tuple(entry["momenta"])
-        specs[name] = Spec(name, *texts, *lists, parameters)
+        bodies, slots = tuple(entry["bodies"]), tuple(entry["slots"])
+        choices = tuple(entry["momenta"]), tuple(entry["treatments"])
+        specs[name] = Spec(name, *texts, bodies, slots, *choices, parameters)
     return MappingProxyType(specs)
 
 
@@ -159,16 +171,33 @@ class Effect:
         the way of a fit; shapes and frequencies may not.
     momentum : str, optional
         ``"consistent"`` or ``"constraint"``, where the effect has the choice; by default its first.
+    treatment : str, optional
+        ``"smoothed"``, ``"set-valued"``, ``"karnopp"`` or ``"lugre"`` for dry friction; by default
+        the first. See :class:`Spec`.
 
     Raises
     ------
     ModelError
-        An unknown name, a number that is not finite or out of range, a momentum that does not apply.
+        An unknown name, a number that is not finite or out of range, a momentum or a treatment that does
+        not apply.
+
+    Examples
+    --------
+    A pendulum with dry friction comes to rest within the dead band, where friction holds it:
+
+    >>> import udd
+    >>> dry = udd.effects.coulomb(c=0.05, treatment="set-valued")
+    >>> run = udd.simulate(udd.Pendulum(0.5, effects=dry), 20.0, [0.0, 0.1])
+    >>> run.events.kind
+    ('reversal', 'reversal', 'reversal', 'reversal', 'stick')
+    >>> float(run.Omega[-1]), bool(9.81 * 0.5 * abs(run.theta[-1]) < 0.05)
+    (0.0, True)
     """
 
     name: str
     values: tuple[float, ...]
     momentum: str | None = None
+    treatment: str | None = None
 
     def __post_init__(self) -> None:
         if self.name not in _specs():
@@ -185,6 +214,11 @@ class Effect:
         if self.momentum is not None and self.momentum not in spec.momenta:
             allowed = " or ".join(map(repr, spec.momenta)) or "left out: it enters no velocity"
             raise ModelError(f"momentum of {self.name} must be {allowed}, not {self.momentum!r}")
+        if self.treatment is None and spec.treatments:
+            object.__setattr__(self, "treatment", spec.treatments[0])
+        if self.treatment is not None and self.treatment not in spec.treatments:
+            allowed = " or ".join(map(repr, spec.treatments)) or "left out: it is not dry friction"
+            raise ModelError(f"treatment of {self.name} must be {allowed}, not {self.treatment!r}")
 
     @property
     def spec(self) -> Spec:
@@ -199,7 +233,8 @@ class Effect:
     @property
     def equation(self) -> str:
         """Its formula."""
-        return self.spec.equation
+        sign = _SIGNS.get(self.treatment or "", "tanh(Omega/eps)")
+        return self.spec.equation.replace("tanh(Omega/eps)", sign)
 
     @property
     def meaning(self) -> str:
@@ -253,12 +288,14 @@ class Effect:
             if name not in new:
                 raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(new)}")
             new[name] = value
-        return Effect(self.name, tuple(new.values()), self.momentum)
+        return Effect(self.name, tuple(new.values()), self.momentum, self.treatment)
 
     def __repr__(self) -> str:
         items = [f"{name}={value!r}" for name, value in self.parameters.items()]
         if self.momentum is not None:
             items.append(f"momentum={self.momentum!r}")
+        if self.treatment not in (None, "smoothed"):
+            items.append(f"treatment={self.treatment!r}")
         return f"{self.name}({', '.join(items)})"
 
 
@@ -268,9 +305,11 @@ def _constructor(spec: Spec) -> Callable[..., Effect]:
     arguments = [inspect.Parameter(p.name, kind, default=p.default) for p in spec.parameters]
     if spec.momenta:
         arguments.append(inspect.Parameter("momentum", kind, default=spec.momenta[0]))
+    if spec.treatments:
+        arguments.append(inspect.Parameter("treatment", kind, default=spec.treatments[0]))
 
-    def make(*, momentum: str | None = None, **values: float) -> Effect:
-        return spec.make(momentum=momentum, **values)
+    def make(*, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
+        return spec.make(momentum=momentum, treatment=treatment, **values)
 
     lines = [f"{spec.title[0].upper()}{spec.title[1:]}: ``{spec.equation}``.", ""]
     lines += [f"{spec.meaning[0].upper()}{spec.meaning[1:]}.", "", "Parameters", "----------"]
@@ -279,6 +318,8 @@ def _constructor(spec: Spec) -> Callable[..., Effect]:
         lines += [f"{p.name} : float", f"    {p.role.capitalize()} [{p.unit or '1'}], {low:g} to {high:g}."]
     if spec.momenta:
         lines += [f"momentum : {{{', '.join(map(repr, spec.momenta))}}}", "    How it enters the momentum."]
+    if spec.treatments:
+        lines += [f"treatment : {{{', '.join(map(repr, spec.treatments))}}}", "    What it does at rest."]
     lines += ["", "Returns", "-------", "Effect"]
     make.__name__ = make.__qualname__ = spec.name
     make.__doc__ = "\n".join(lines)

@@ -44,9 +44,9 @@ class Model:
         return dict(_core.model_parameters(self))
 
     @property
-    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None]], bool]:
+    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None, str | None]], bool]:
         """What the core needs to know."""
-        effects = [(effect.name, effect.momentum) for effect in self.effects]
+        effects = [(effect.name, effect.momentum, effect.treatment) for effect in self.effects]
         return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
@@ -102,7 +102,16 @@ class Model:
             positive = 0.0 if name in ("R", "length", "inertia") else None
             object.__setattr__(new, name, number(name, value, above=positive))
         object.__setattr__(new, "effects", effects)
+        new._add_bristles()
         return new
+
+    def _add_bristles(self) -> None:
+        """Friction treated as LuGre has a state of its own, the bristles' deflection."""
+        names, units = type(self).state_names, type(self).state_units
+        if any(effect.treatment == "lugre" for effect in self.effects):
+            names, units = (*names, "bristle"), (*units, "rad")
+        object.__setattr__(self, "state_names", names)
+        object.__setattr__(self, "state_units", units)
 
     def _effects(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
         if isinstance(effects, Effect):
@@ -310,6 +319,7 @@ class Disk(Model):
         for name in ("W", "g", "k0", "k1", "k2"):
             object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
         object.__setattr__(self, "effects", self._effects(self.effects))
+        self._add_bristles()
         if self.edge not in ("stop", "ignore"):
             raise ModelError(f'edge must be "stop" or "ignore", not {self.edge!r}')
 
@@ -376,3 +386,4 @@ class Pendulum(Model):
         object.__setattr__(self, "g", number("g", g, least=0.0))
         object.__setattr__(self, "k0", number("k0", k0, least=0.0))
         object.__setattr__(self, "effects", self._effects(effects))
+        self._add_bristles()

@@ -25,7 +25,8 @@ class Event(NamedTuple):
     ----------
     kind : str
         ``"reversal"`` (Omega = 0), ``"friction kink"`` (k reaches its floor), ``"edge"`` (the disk leaves
-        the wheels).
+        the wheels); with dry friction that is not smoothed also ``"stick"`` (it comes to rest and is held),
+        ``"slip"`` (it is let go) and ``"band"`` (the speed passes the edge of Karnopp's band).
     t : float
         When.
     state : ndarray, shape (dim,)
@@ -90,8 +91,9 @@ class Trajectory:
         States, in the order of ``model.state_names``. The components are attributes too: ``run.Omega``.
     events : Events
         Crossings of the surfaces where the law changes, and of the disk's edge.
-    outcome : {"finished", "ejected"}
-        An ejected run ends on the disk's edge; its last time and state are there.
+    outcome : {"finished", "ejected", "chattering"}
+        An ejected run ends on the disk's edge, a chattering one where the law switches again and again while
+        time stands still; the last time and state are there.
     stats : Stats
         Accepted and rejected steps, evaluations of the rates.
     model : Model

@@ -58,11 +58,11 @@ impl<S: Scalar> Friction<S> {
 const KINK: usize = 1;
 
 /// What moves the disk: the torque, all told, on its inertia, and the contact's velocity.
-struct Balance<S> {
-    torque: S,
-    inertia: S,
-    velocity: (S, S),
-    dry: Dry<S>,
+pub(super) struct Balance<S> {
+    pub torque: S,
+    pub inertia: S,
+    pub velocity: (S, S),
+    pub dry: Dry<S>,
 }
 
 #[inline(always)]
@@ -102,7 +102,7 @@ impl<S: Scalar> Disk<S> {
 
     /// The equation of motion with all effects.
     #[inline]
-    fn balance(&self, t: S, x: &[S; 4], contact: &Contact<S>, sides: &Sides<S>) -> Balance<S> {
+    pub(super) fn balance(&self, t: S, x: &[S; 4], contact: &Contact<S>, sides: &Sides<S>) -> Balance<S> {
         let &[omega, y, z, _] = x;
         let at = self.at(|s| s, t, *x, contact, sides);
         let (mut dy, mut dz) = (z * omega, self.w - y * omega);

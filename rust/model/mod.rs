@@ -5,12 +5,14 @@
 //! zero there; the integrator freezes the side of each surface within a step, so that every step sees
 //! a smooth law, and lands on the surface before it changes the side.
 
+mod bristle;
 mod disk;
 mod dle;
 pub mod effects;
 mod pendulum;
 pub mod stick;
 
+pub use bristle::Bristled;
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
 pub use effects::{Effect, Momentum, Treatment};

@@ -32,7 +32,13 @@ pub struct Pendulum<S> {
 impl<S: Scalar> Pendulum<S> {
     /// The torque, all told, and what dry friction does beside it.
     #[inline]
-    fn torque(&self, t: S, &[omega, theta]: &[S; 2], contact: Contact<S>, sides: &Sides<S>) -> (S, Dry<S>) {
+    pub(super) fn torque(
+        &self,
+        t: S,
+        &[omega, theta]: &[S; 2],
+        contact: Contact<S>,
+        sides: &Sides<S>,
+    ) -> (S, Dry<S>) {
         let (sin, cos) = theta.sin_cos();
         let y = self.length * sin;
         let mut forces = Slots::default();

@@ -14,7 +14,7 @@ use crate::estimate::{
 };
 use crate::integrate::Tolerance;
 use crate::model::effects::Kind;
-use crate::model::{Effect, Family, Momentum};
+use crate::model::{Effect, Family};
 
 /// Frame by frame: time, what was seen, its information, and whether the next frame is linked.
 type Data<'py> = (
@@ -138,7 +138,7 @@ macro_rules! each_family {
         match $model {
             AnyModel::Disk(family, values) => $call((family, values, DiskCamera), $($argument),*),
             AnyModel::Pendulum(family, values) => $call((family, values, AngleSensor), $($argument),*),
-            AnyModel::Dle(..) => Err(PyValueError::new_err("no camera sees the dimensionless equations")),
+            _ => Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
         }
     };
 }
@@ -181,7 +181,7 @@ fn solve<'py>(
         result.set_item("iterations", s.iterations)?;
         Ok(result)
     }
-    each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
+    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
 }
 
 /// A wider family with its values, and the roles of what it adds.
@@ -229,13 +229,13 @@ fn score<'py>(
         own: impl Fn(AnyModel) -> Option<(F, Vec<f64>)>,
     ) -> PyResult<Vec<Group<F>>> {
         let one = |(model, indices): (Bound<'_, PyAny>, Vec<usize>)| {
-            let (family, values) = own(AnyModel::from_python(&model)?)
+            let (family, values) = own(AnyModel::to_fit(&model)?)
                 .ok_or_else(|| PyValueError::new_err("a candidate is a model of another kind"))?;
             Ok((family, values, indices.into_iter().map(Role::Model).collect()))
         };
         candidates.into_iter().map(one).collect()
     }
-    match AnyModel::from_python(model)? {
+    match AnyModel::to_fit(model)? {
         AnyModel::Disk(family, values) => {
             let groups = groups(candidates, |m| match m {
                 AnyModel::Disk(family, values) => Some((family, values)),
@@ -250,7 +250,7 @@ fn score<'py>(
             })?;
             run((family, values, AngleSensor), py, (&data, &start), &free, &diffusion, &groups)
         }
-        AnyModel::Dle(..) => Err(PyValueError::new_err("no camera sees the dimensionless equations")),
+        _ => Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
     }
 }
 
@@ -265,7 +265,7 @@ fn score_ripples<'py>(
     diffusion: Vec<f64>,
     frequencies: Vec<f64>,
 ) -> PyResult<Three<'py>> {
-    let AnyModel::Disk(family, values) = AnyModel::from_python(model)? else {
+    let AnyModel::Disk(family, values) = AnyModel::to_fit(model)? else {
         return Err(PyValueError::new_err("only a disk has a drive"));
     };
     let highest = frequencies.iter().copied().fold(0.0, f64::max);
@@ -321,7 +321,7 @@ fn filter<'py>(
             )?,
         ))
     }
-    each_family!(AnyModel::from_python(model)?, run(py, (&data, &start), &diffusion, &windows))
+    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &diffusion, &windows))
 }
 
 /// What would be seen at `times[k]`, increasing, after start `k` at `t0[k]`, by the model alone.
@@ -361,7 +361,7 @@ fn predict<'py>(
         let seen = interrupt::run(py, |_| estimator.predict(&point, &starts, &times))?;
         array(py, [k, h, M], seen.into_iter().flatten().flatten())
     }
-    each_family!(AnyModel::from_python(model)?, run(py, clock, (&camera, &t0, &states, &times)))
+    each_family!(AnyModel::to_fit(model)?, run(py, clock, (&camera, &t0, &states, &times)))
 }
 
 /// Names and units of a camera's parameters, for measurements of the `"disk"` or a `"pendulum"`.

@@ -5,8 +5,10 @@ use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 
 use super::errors::ModelError;
-use crate::model::effects::{Body, Kind, Slot};
-use crate::model::{DiskFamily, DleFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of};
+use crate::model::effects::{Body, Kind, Slot, Treatment};
+use crate::model::{
+    Bristled, DiskFamily, DleFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of,
+};
 
 /// Any model with its parameter values, in the order of its family's parameters.
 #[derive(Clone, Debug)]
@@ -14,6 +16,9 @@ pub enum AnyModel {
     Dle(DleFamily, Vec<f64>),
     Disk(DiskFamily, Vec<f64>),
     Pendulum(PendulumFamily, Vec<f64>),
+    /// With LuGre friction, whose bristles are one more state.
+    BristledDisk(Bristled<DiskFamily>, Vec<f64>),
+    BristledPendulum(Bristled<PendulumFamily>, Vec<f64>),
 }
 
 /// Runs the expression with the model's family and values, whatever its dimension.
@@ -23,13 +28,17 @@ macro_rules! with_model {
             $crate::python::model::AnyModel::Dle($family, $values) => $body,
             $crate::python::model::AnyModel::Disk($family, $values) => $body,
             $crate::python::model::AnyModel::Pendulum($family, $values) => $body,
+            $crate::python::model::AnyModel::BristledDisk($family, $values) => $body,
+            $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
         }
     };
 }
 pub(crate) use with_model;
 
-/// What a Python model's `_spec` holds: kind, values, effects as (name, momentum), edge.
-type Spec = (String, Vec<f64>, Vec<(String, Option<String>)>, bool);
+/// An effect's name, momentum and treatment.
+type EffectSpec = (String, Option<String>, Option<String>);
+/// What a Python model's `_spec` holds: kind, values, effects, edge.
+type Spec = (String, Vec<f64>, Vec<EffectSpec>, bool);
 
 impl AnyModel {
     /// Reads the attribute `_spec` of a Python model.
@@ -50,10 +59,11 @@ impl AnyModel {
             // A Ctrl-C, for example, stays one.
             Err(error) => return Err(error),
         };
-        let effects = effects.iter().map(|(name, momentum)| effect(name, momentum.as_deref()));
-        let effects = effects.collect::<PyResult<Vec<_>>>()?;
+        let effects = effects.iter().map(effect).collect::<PyResult<Vec<_>>>()?;
+        let bristles = bristled(&effects)?;
         let model = match kind.as_str() {
             "dle" => AnyModel::Dle(DleFamily, values),
+            "disk" if bristles => AnyModel::BristledDisk(Bristled(DiskFamily { effects, edge }), values),
             "disk" => AnyModel::Disk(DiskFamily { effects, edge }, values),
             "pendulum" => {
                 if let Some(other) =
@@ -63,7 +73,11 @@ impl AnyModel {
                     let message = format!("the effect {name} acts on a disk, not on a pendulum");
                     return Err(ModelError::new_err(message));
                 }
-                AnyModel::Pendulum(PendulumFamily { effects }, values)
+                let family = PendulumFamily { effects };
+                match bristles {
+                    true => AnyModel::BristledPendulum(Bristled(family), values),
+                    false => AnyModel::Pendulum(family, values),
+                }
             }
             _ => return Err(ModelError::new_err(format!("unknown kind of model: {kind}"))),
         };
@@ -75,16 +89,53 @@ impl AnyModel {
         Ok(model)
     }
 
+    /// The same for a fit, which needs laws without jumps.
+    pub fn to_fit(model: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let model = Self::from_python(model)?;
+        let effects: &[Effect] = match &model {
+            AnyModel::Dle(..) => &[],
+            AnyModel::Disk(family, _) | AnyModel::BristledDisk(Bristled(family), _) => &family.effects,
+            AnyModel::Pendulum(family, _) | AnyModel::BristledPendulum(Bristled(family), _) => {
+                &family.effects
+            }
+        };
+        if let Some(effect) = effects.iter().find(|effect| effect.treatment != Treatment::Smoothed) {
+            let (name, treatment) = (effect.kind.spec().name, effect.treatment.name());
+            return Err(ModelError::new_err(format!(
+                "a fit needs smoothed friction: give {name} the treatment smoothed, not {treatment}"
+            )));
+        }
+        Ok(model)
+    }
+
     /// The parameter values.
     pub fn values(&self) -> &[f64] {
         with_model!(self, |_family, values| values)
     }
 }
 
-fn effect(name: &str, momentum: Option<&str>) -> PyResult<Effect> {
+/// Whether the effects' friction comes from bristles.
+fn bristled(effects: &[Effect]) -> PyResult<bool> {
+    let bristles = |effect: &&Effect| effect.treatment == Treatment::Lugre;
+    if !effects.iter().any(|effect| bristles(&effect)) {
+        return Ok(false);
+    }
+    if effects.iter().any(|effect| effect.kind.dry() && !bristles(&effect)) {
+        let message =
+            "where one effect has the treatment lugre all dry friction must have it: it shares the bristles";
+        return Err(ModelError::new_err(message));
+    }
+    if !effects.iter().filter(bristles).any(|effect| effect.kind == Kind::Coulomb) {
+        let message = "stribeck with the treatment lugre needs coulomb beside it: without friction at speed the bristles would follow any motion at once";
+        return Err(ModelError::new_err(message));
+    }
+    Ok(true)
+}
+
+fn effect((name, momentum, treatment): &EffectSpec) -> PyResult<Effect> {
     let kind = Kind::ALL.iter().copied().find(|kind| kind.spec().name == name);
     let kind = kind.ok_or_else(|| ModelError::new_err(format!("no effect is called {name}")))?;
-    let momentum = match momentum {
+    let momentum = match momentum.as_deref() {
         None => None,
         Some("consistent") => Some(Momentum::Consistent),
         Some("constraint") => Some(Momentum::Constraint),
@@ -98,7 +149,16 @@ fn effect(name: &str, momentum: Option<&str>) -> PyResult<Effect> {
     if velocity != momentum.is_some() || momentum.is_some_and(|m| !kind.spec().momenta.contains(&m)) {
         return Err(ModelError::new_err(format!("the effect {name} cannot enter the momentum that way")));
     }
-    Ok(Effect::new(kind).with_momentum(momentum))
+    let treatment = match treatment.as_deref() {
+        None => Treatment::Smoothed,
+        Some(given) => {
+            let found = Treatment::ALL.iter().copied().find(|treatment| treatment.name() == given);
+            found.filter(|_| kind.dry()).ok_or_else(|| {
+                ModelError::new_err(format!("the effect {name} has no treatment called {given}"))
+            })?
+        }
+    };
+    Ok(Effect::new(kind).with_momentum(momentum).with_treatment(treatment))
 }
 
 /// The state as an array of the dimension asked for.

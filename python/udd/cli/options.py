@@ -81,11 +81,11 @@ def effects(texts: list[str]) -> tuple[Effect, ...]:
         if name not in specs:
             raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
         values: dict[str, float] = {}
-        momentum = None
+        choices: dict[str, str] = {}
         for item in filter(None, rest.split(",")):
             key, equals, value = item.partition("=")
-            if key.strip() == "momentum":
-                momentum = value.strip()
+            if key.strip() in ("momentum", "treatment"):
+                choices[key.strip()] = value.strip()
                 continue
             try:
                 values[key.strip()] = float(value)
@@ -93,7 +93,8 @@ def effects(texts: list[str]) -> tuple[Effect, ...]:
                 raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number") from None
             if not equals:
                 raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number")
-        result.append(specs[name].make(momentum=momentum, **values))
+        momentum, treatment = choices.get("momentum"), choices.get("treatment")
+        result.append(specs[name].make(momentum=momentum, treatment=treatment, **values))
     return tuple(result)
 
 

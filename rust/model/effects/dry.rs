@@ -1,6 +1,8 @@
 //! Dry friction: its force depends on the direction of sliding, not on the speed alone.
 
 use super::{At, Slots};
+use crate::model::Sides;
+use crate::model::stick::REVERSAL;
 use crate::scalar::Scalar;
 
 /// What dry friction does about its jump at rest.
@@ -13,7 +15,8 @@ pub enum Treatment {
     /// The same, with speeds below `eps` taken for rest (Karnopp, J. Dyn. Sys. Meas. Control 107 (1985) 100).
     Karnopp,
     /// Bristles that bend by up to about `eps`, an angle, before they slide (Canudas de Wit, Olsson, Åström &
-    /// Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419); needs a model with bristles.
+    /// Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419). Only a [`Bristled`](crate::model::Bristled)
+    /// model has them; in others the effect does nothing.
     Lugre,
 }
 
@@ -90,13 +93,16 @@ impl<S: Scalar> Slots<S> {
 }
 
 impl<S: Scalar> Dry<S> {
-    /// The bristles' torque on the body and the rate of their deflection:
-    /// `torque = -(s z + d dz/dT)`, `dz/dT = Omega - s |Omega| z/grip`. The damping `d = sqrt(s I)` lets the
-    /// body come to rest on its bristles with little swinging.
+    /// The bristles' torque on a body of this inertia, and the rate of their deflection; see
+    /// [`Bristled`](crate::model::Bristled). The damping lets the body come to rest on them with little
+    /// swinging.
     #[inline(always)]
-    pub fn bristles(&self, at: &At<S>) -> (S, S) {
-        let rate = at.omega - self.stiffness * at.speed * at.contact.bristle / self.grip;
-        let damping = (self.stiffness * at.inertia).sqrt();
-        (-(self.stiffness * at.contact.bristle + damping * rate), rate)
+    pub fn bristles(&self, omega: S, deflection: S, inertia: S, sides: &Sides<S>) -> (S, S) {
+        let speed = S::select(sides[REVERSAL], omega, -omega);
+        // Without friction there is nothing to bend: the constant only prevents 0/0.
+        let grip = self.grip + S::constant(f64::MIN_POSITIVE);
+        let rate = omega - self.stiffness * speed * deflection / grip;
+        let damping = (self.stiffness * inertia + S::constant(f64::MIN_POSITIVE)).sqrt();
+        (-(self.stiffness * deflection + damping * rate), rate)
     }
 }
