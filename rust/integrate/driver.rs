@@ -65,8 +65,7 @@ impl<M: Mask> Progress<M> {
 /// one starts on the other side. Everything derived from a run (samples, events, tangents, sections,
 /// exponents) is built on this loop.
 pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>> {
-    /// What is integrated.
-    pub system: M,
+    system: M,
     method: K,
     norm: E,
     controller: Controller<S::Real>,
@@ -108,12 +107,20 @@ where
 {
     /// Starts at time `t` and state `x`. The size and the direction of the first trial step are those
     /// of `h` where given; otherwise the size is estimated and the direction is forward.
-    pub fn new(system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
+    pub fn new(system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self
+    where
+        K: Default,
+    {
+        Self::by(K::default(), system, t, x, h, norm)
+    }
+
+    /// The same by a method made beforehand.
+    pub fn by(method: K, system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
         let zero = S::Real::zero();
         let mut driver = Self {
             at: Point { t, x, sides: sides_of(&system, S::lift(t), &x) },
             system,
-            method: K::new(),
+            method,
             norm: *norm,
             controller: Controller::new(K::ORDER),
             wall: false,
@@ -144,6 +151,10 @@ where
         let mut fresh = self.at;
         fresh.sides = sides_of(&self.system, S::lift(fresh.t), &fresh.x);
         let h = h.unwrap_or_else(|| {
+            if K::SERIES {
+                // A series knows how far it reaches.
+                return S::Real::constant(f64::INFINITY);
+            }
             self.work.beside = tick(lanes, self.work.beside, 2.0);
             initial_step(&self.system, &fresh, K::ORDER, self.norm.state())
         });
@@ -173,6 +184,18 @@ where
             evaluations: sum(evaluations),
             grazes: sum(grazes),
         }
+    }
+
+    /// Goes on with another system, to whose parameters these values belong; lanes whose parameters
+    /// change are to be [started](Driver::start) anew.
+    pub fn set_system(&mut self, system: M, values: &[S]) {
+        self.system = system;
+        self.method.set_parameters(values);
+    }
+
+    /// What is integrated.
+    pub fn system(&self) -> &M {
+        &self.system
     }
 
     /// The time reached.
@@ -212,7 +235,7 @@ where
         self.method.at(dt)
     }
 
-    /// The same for every other step.
+    /// The method, whose polynomial is that of the last trial.
     pub fn method(&self) -> &K {
         &self.method
     }
@@ -484,7 +507,7 @@ where
         }
         let rate = self.system.rates(S::lift(self.at.t), &self.at.x, &self.at.sides);
         let finite = |v: &[S; D]| v.iter().all(|v| v.real().lane(lane).is_finite());
-        if finite(&self.at.x) && finite(&rate) && self.h.lane(lane).is_finite() {
+        if finite(&self.at.x) && finite(&rate) && (K::SERIES || self.h.lane(lane).is_finite()) {
             Failure::StepUnderflow { t }
         } else {
             Failure::NotFinite { t }

@@ -35,8 +35,8 @@ pub trait Method<S: Scalar, const D: usize> {
     /// Where within a step switching surfaces are looked at, so that one crossed twice is seen too.
     const PROBES: &'static [f64];
 
-    /// A method at rest.
-    fn new() -> Self;
+    /// Takes over changed values of the system's parameters, where it works with them itself.
+    fn set_parameters(&mut self, _values: &[S]) {}
 
     /// Gets ready to step from `at`, in these lanes; the others keep what they have.
     fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask);

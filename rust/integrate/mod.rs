@@ -13,6 +13,7 @@ pub mod root;
 mod runge_kutta;
 mod saltation;
 pub mod tableau;
+mod taylor;
 mod tolerance;
 
 pub use driver::{Counts, Driver, Ending, Progress};
@@ -21,4 +22,5 @@ pub use method::{Method, Point, Trial};
 pub use propagate::{propagate, propagate_from};
 pub use runge_kutta::{Dopri5, RungeKutta, step};
 pub use saltation::pass;
+pub use taylor::Taylor;
 pub use tolerance::{ErrorNorm, Failure, Tolerance, WithTangents};

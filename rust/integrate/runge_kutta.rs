@@ -75,6 +75,13 @@ pub struct RungeKutta<T, S: Scalar, const D: usize, const N: usize, const P: usi
 /// Dormand & Prince's pair of order 5(4).
 pub type Dopri5<S, const D: usize> = RungeKutta<DormandPrince, S, D, 7, 4>;
 
+impl<T, S: Scalar, const D: usize, const N: usize, const P: usize> Default for RungeKutta<T, S, D, N, P> {
+    fn default() -> Self {
+        let zero = [S::zero(); D];
+        Self { x: zero, h: S::Real::zero(), stages: [zero; N], first: zero, scheme: PhantomData }
+    }
+}
+
 impl<T, S, const D: usize, const N: usize, const P: usize> RungeKutta<T, S, D, N, P>
 where
     T: Scheme<N, P>,
@@ -102,11 +109,6 @@ where
     const EVALUATIONS: usize = T::TABLEAU.stages - 1;
     const SERIES: bool = false;
     const PROBES: &'static [f64] = &[0.25, 0.5, 0.75, 1.0];
-
-    fn new() -> Self {
-        let zero = [S::zero(); D];
-        Self { x: zero, h: S::Real::zero(), stages: [zero; N], first: zero, scheme: PhantomData }
-    }
 
     #[inline(always)]
     fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {

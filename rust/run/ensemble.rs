@@ -1,0 +1,147 @@
+//! The same model from many states, or with many values of its parameters.
+
+use super::fleet::{Crew, Fleet, Queue, sail};
+use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::ship::{Ship, Start};
+use super::trajectory::Outcome;
+use crate::integrate::{Failure, Tolerance};
+use crate::model::Family;
+use crate::scalar::{Mask, Real, Scalar};
+use crate::tape::Tape;
+
+/// How steps are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stepper {
+    Dopri5,
+    Taylor,
+}
+
+/// Many runs of one model.
+#[derive(Clone, Copy, Debug)]
+pub struct Ensemble<'a, F, const D: usize> {
+    pub family: &'a F,
+    /// The parameters' values, one row for each run, or a single row for all.
+    pub values: &'a [Vec<f64>],
+    /// The initial states, one for each run, or a single one for all.
+    pub starts: &'a [[f64; D]],
+    /// When states are wanted, increasing; the first is the time of the initial state.
+    pub times: &'a [f64],
+    pub tolerance: Tolerance,
+    pub stepper: Stepper,
+}
+
+/// One run of an ensemble.
+#[derive(Clone, Debug)]
+pub struct Passage<const D: usize> {
+    /// The states at the times wanted, as many as it reached.
+    pub states: Vec<[f64; D]>,
+    /// When and where it ended, and how.
+    pub t: f64,
+    pub x: [f64; D],
+    pub outcome: Result<Outcome, Failure>,
+}
+
+impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
+    /// Runs them all. `None` stands for runs that were not finished when the work was stopped.
+    pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Passage<D>>> {
+        let runs = self.values.len().max(self.starts.len());
+        match self.stepper {
+            Stepper::Dopri5 => sail(&Sampled { ensemble: self, recipe: ByDopri5 }, runs, crew),
+            Stepper::Taylor => match Tape::record(self.family, &known(self.values)) {
+                Ok(tape) => sail(&Sampled { ensemble: self, recipe: ByTaylor(&tape) }, runs, crew),
+                // A law that no series follows.
+                Err(_) => sail(&Sampled { ensemble: self, recipe: ByDopri5 }, runs, crew),
+            },
+        }
+    }
+
+    fn start<S: Scalar>(&self, run: usize) -> Start<'_, S, D> {
+        let x = self.starts[run.min(self.starts.len() - 1)];
+        Start {
+            values: &self.values[run.min(self.values.len() - 1)],
+            t: self.times[0],
+            x: x.map(S::constant),
+            end: self.times[self.times.len() - 1],
+        }
+    }
+}
+
+/// The parameters that vanish in all rows: what they multiply need not be computed.
+///
+/// Others stay open, so that a run's bits do not depend on what else is run.
+pub fn known(rows: &[Vec<f64>]) -> Vec<Option<f64>> {
+    let width = rows.first().map_or(0, Vec::len);
+    (0..width).map(|i| rows.iter().all(|row| row[i] == 0.0).then_some(0.0)).collect()
+}
+
+struct Sampled<'a, F, const D: usize, T> {
+    ensemble: &'a Ensemble<'a, F, D>,
+    recipe: T,
+}
+
+impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
+    type Yield = Passage<D>;
+
+    #[inline(always)]
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Passage<D>)>) {
+        let Ensemble { family, times, tolerance, .. } = self.ensemble;
+        let Some(first) = queue.take() else { return };
+        let start = |run| self.ensemble.start::<R>(run);
+        let mut ship = Ship::new(*family, |values| self.recipe.make(values), start(first), tolerance);
+        let mut states: Vec<Vec<[f64; D]>> = vec![Vec::new(); R::LANES];
+        // The time of each lane's next sample.
+        let mut wanted = R::constant(f64::INFINITY);
+        let after = |taken: usize| times.get(taken).copied().unwrap_or(f64::INFINITY);
+        let load = |ship: &mut Ship<'_, F, R, D, _, _>, states: &mut [Vec<[f64; D]>], lane: usize, run| {
+            let start = start(run);
+            states[lane] = Vec::with_capacity(times.len());
+            states[lane].push(start.x.map(|x| x.lane(lane)));
+            ship.load(lane, run, start);
+            after(1)
+        };
+        for lane in 0..R::LANES {
+            let run = if lane == 0 { Some(first) } else { queue.take() };
+            if let Some(run) = run {
+                wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));
+            }
+        }
+        while !ship.is_empty() && !queue.stopped() {
+            let progress = ship.trial();
+            loop {
+                let due = progress.moved.and(ship.driver.t().less(wanted).not());
+                if !due.any() {
+                    break;
+                }
+                let inside = ship.driver.dense(wanted - ship.driver.from());
+                for lane in (0..R::LANES).filter(|&lane| due.lane(lane)) {
+                    let at_end = wanted.lane(lane) == ship.driver.t().lane(lane);
+                    let x = if at_end { ship.driver.x() } else { &inside };
+                    states[lane].push(x.map(|x| x.lane(lane)));
+                    wanted.set_lane(lane, after(states[lane].len()));
+                }
+            }
+            let over = ship.arrived().or(progress.walled()).or(progress.failed);
+            if !over.any() {
+                continue;
+            }
+            for lane in (0..R::LANES).filter(|&lane| over.lane(lane)) {
+                let outcome = if progress.failed.lane(lane) {
+                    Err(ship.driver.failure_of(lane))
+                } else if progress.walled().lane(lane) {
+                    Ok(Outcome::Ejected)
+                } else {
+                    Ok(Outcome::Finished)
+                };
+                let Some(run) = ship.unload(lane) else { continue };
+                wanted.set_lane(lane, f64::INFINITY);
+                let own = std::mem::take(&mut states[lane]);
+                let (t, x) = (ship.driver.t().lane(lane), ship.driver.x().map(|x| x.lane(lane)));
+                yields.push((run, Passage { states: own, t, x, outcome }));
+                queue.finish();
+                if let Some(run) = queue.take() {
+                    wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));
+                }
+            }
+        }
+    }
+}

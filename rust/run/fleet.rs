@@ -1,0 +1,105 @@
+//! Many trajectories: a queue that packets on all cores take from.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::ThreadPoolBuilder;
+
+use super::Stop;
+use crate::scalar::{Isa, Packet, Real, Work};
+
+/// Jobs numbered from 0, each taken once.
+#[derive(Debug)]
+pub struct Queue<'a> {
+    next: AtomicUsize,
+    jobs: usize,
+    /// How many are done, for whoever watches.
+    done: &'a AtomicUsize,
+    stop: &'a Stop,
+}
+
+impl Queue<'_> {
+    /// The next job; none once all are taken.
+    pub fn take(&self) -> Option<usize> {
+        let job = self.next.fetch_add(1, Ordering::Relaxed);
+        (job < self.jobs).then_some(job)
+    }
+
+    /// Counts a job as done.
+    pub fn finish(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Whether the work is to end, finished or not.
+    pub fn stopped(&self) -> bool {
+        self.stop.check().is_err()
+    }
+}
+
+/// What is to be done with every job of a queue.
+pub trait Fleet: Sync {
+    /// What a job yields.
+    type Yield: Send;
+
+    /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
+    /// To be `#[inline(always)]`, as [`Work`] asks.
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Self::Yield)>);
+}
+
+/// How the work is spread; none of it changes a bit of the results.
+#[derive(Clone, Copy, Debug)]
+pub struct Crew<'a> {
+    /// Threads; 0 for one per core.
+    pub threads: usize,
+    pub isa: Isa,
+    /// Counts the jobs that are done.
+    pub done: &'a AtomicUsize,
+    pub stop: &'a Stop,
+}
+
+/// What the jobs yield, in their order; `None` for those that were not finished when the work was
+/// stopped.
+pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
+    let queue = Queue { next: AtomicUsize::new(0), jobs, done: crew.done, stop: crew.stop };
+    let mut all: Vec<Option<T::Yield>> = Vec::new();
+    all.resize_with(jobs, || None);
+    let watch = |queue: &Queue<'_>| {
+        let mut yields = Vec::new();
+        if jobs == 1 {
+            fleet.sail::<f64>(queue, &mut yields);
+        } else {
+            crew.isa.run(Sail { fleet, queue, yields: &mut yields });
+        }
+        yields
+    };
+    let threads = if crew.threads == 0 { rayon::current_num_threads() } else { crew.threads };
+    // One packet's worth of jobs is the least that a thread is worth.
+    let threads = threads.min(jobs.div_ceil(8)).max(1);
+    let parts = if threads == 1 {
+        vec![watch(&queue)]
+    } else {
+        match ThreadPoolBuilder::new().num_threads(threads).build() {
+            Ok(pool) => pool.broadcast(|_| watch(&queue)),
+            // No threads to be had: the caller's own will do.
+            Err(_) => vec![watch(&queue)],
+        }
+    };
+    for (job, result) in parts.into_iter().flatten() {
+        all[job] = Some(result);
+    }
+    all
+}
+
+struct Sail<'a, T: Fleet> {
+    fleet: &'a T,
+    queue: &'a Queue<'a>,
+    yields: &'a mut Vec<(usize, T::Yield)>,
+}
+
+impl<T: Fleet> Work for Sail<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const L: usize>(self) {
+        self.fleet.sail::<Packet<L>>(self.queue, self.yields);
+    }
+}

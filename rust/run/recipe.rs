@@ -1,0 +1,37 @@
+//! Which method takes the steps, before it is known over which scalar.
+
+use crate::integrate::{Dopri5, Method, Taylor};
+use crate::scalar::Scalar;
+use crate::tape::Tape;
+
+/// Makes a method for systems of `D` equations over any scalar.
+pub trait Recipe<const D: usize>: Sync {
+    type Method<S: Scalar>: Method<S, D>;
+
+    /// The method for systems whose parameters have these values.
+    fn make<S: Scalar>(&self, values: Vec<S>) -> Self::Method<S>;
+}
+
+/// Dormand & Prince's pair.
+#[derive(Clone, Copy, Debug)]
+pub struct ByDopri5;
+
+impl<const D: usize> Recipe<D> for ByDopri5 {
+    type Method<S: Scalar> = Dopri5<S, D>;
+
+    fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
+        Dopri5::default()
+    }
+}
+
+/// The Taylor method on this tape.
+#[derive(Clone, Copy, Debug)]
+pub struct ByTaylor<'a, const D: usize>(pub &'a Tape<D>);
+
+impl<'a, const D: usize> Recipe<D> for ByTaylor<'a, D> {
+    type Method<S: Scalar> = Taylor<'a, S, D>;
+
+    fn make<S: Scalar>(&self, values: Vec<S>) -> Taylor<'a, S, D> {
+        Taylor::new(self.0, values)
+    }
+}
