@@ -6,8 +6,9 @@ use crate::unroll::vector;
 
 /// A surface's rate of change is a central difference over this time; exact where the surface is linear.
 const AHEAD: f64 = 1e-6;
-/// A flow that arrives slower than this part of its speed a step before grazes the surface.
-const GRAZE: f64 = 1e-6;
+/// A flow that arrives slower than this part of its speed a step before grazes the surface: landing to 1e-13
+/// then leaves that speed, and with it the derivatives, uncertain by 1e-3.
+const GRAZE: f64 = 1e-5;
 
 /// Passes surface `j` in the lanes `here`, on which they landed with a step of size `size`, and corrects the
 /// derivatives for the time at which a neighbour passes it. Returns the lanes where the flow grazes
