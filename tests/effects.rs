@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use proptest::prelude::*;
 use udd::integrate::{Tolerance, propagate};
-use udd::model::effects::{At, Contact, Kind, Role, Slot, Slots, Term};
+use udd::model::effects::{At, Contact, Kind, Role, Slot, Slots, Term, Treatment};
 use udd::model::{Disk, DiskFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of};
 use udd::scalar::{Dual, Scalar};
 
@@ -13,6 +13,9 @@ const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// Every effect, in each way it can enter.
 fn all() -> Vec<Effect> {
     let ways = |kind: Kind| match kind.spec().momenta {
+        [] if kind.dry() => [Treatment::Smoothed, Treatment::SetValued, Treatment::Karnopp]
+            .map(|treatment| Effect::new(kind).with_treatment(treatment))
+            .to_vec(),
         [] => vec![Effect::new(kind)],
         momenta => momenta.iter().map(|&m| Effect::new(kind).with_momentum(Some(m))).collect(),
     };
@@ -161,7 +164,7 @@ proptest! {
             let at = At {
                 t: time, omega, speed, y, z, beta, k, inertia,
                 w: N::fixed(w), g: N::fixed(g), radius: N::fixed(radius),
-                contact: Contact::default(),
+                contact: Contact { sign: N::fixed(x[0].signum()), bristle: N::fixed(0.0) },
             };
             let term = &Term::list(&[effect], &own)[0];
             let mut slots = Slots::default();

@@ -4,13 +4,14 @@ use std::array::from_fn;
 use std::f64::consts::{PI, TAU};
 
 use approx::assert_relative_eq;
-use udd::integrate::{Driver, Tolerance, propagate};
+use udd::integrate::{Driver, Ending, Taylor, Tolerance, propagate};
 use udd::model::effects::{At, Contact, Dry, Effect, Kind, Slots, Term, Treatment};
 use udd::model::stick::{REVERSAL, Slider, Sticking};
 use udd::model::{Bristled, Disk, DiskFamily, Family, Pendulum, PendulumFamily, Sides, System, choose};
 use udd::observe::Event;
 use udd::run::{Outcome, Output, Run, Stop, trajectory};
 use udd::scalar::{Mask, Packet, Real, Scalar};
+use udd::tape::Tape;
 
 const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
 
@@ -390,6 +391,45 @@ fn lanes_have_the_bits_of_single_runs() {
         let lane: [f64; 2] = from_fn(|n| driver.x()[n].lane(i));
         assert_eq!(lane.map(f64::to_bits), single.x().map(f64::to_bits), "{start:?}");
         assert_eq!(lane[0], 0.0);
+    }
+}
+
+/// The series knows the modes: the Taylor method sticks, slips and goes on as Dormand & Prince's does.
+#[test]
+fn methods_agree_on_when_it_sticks() {
+    fn events<F: Family<D>, const D: usize>(family: &F, values: &[f64], x0: [f64; D]) -> (usize, f64) {
+        let (system, tape) = (family.build(values), Tape::record(family, &[]).unwrap());
+        let mut one: Driver<_, f64, D> = Driver::new(&system, 0.0, x0, None, &TIGHT);
+        let series = Taylor::new(&tape, values.to_vec());
+        let mut other: Driver<_, f64, D, _, _> = Driver::by(series, &system, 0.0, x0, None, &TIGHT);
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        while one.t() < 10.0 {
+            if let Ending::Surface(j) = one.advance(10.0).unwrap() {
+                a.push((j, one.t()));
+            }
+        }
+        while other.t() < 10.0 {
+            if let Ending::Surface(j) = other.advance(10.0).unwrap() {
+                b.push((j, other.t()));
+            }
+        }
+        assert_eq!(a.iter().map(|e| e.0).collect::<Vec<_>>(), b.iter().map(|e| e.0).collect::<Vec<_>>());
+        let apart = a.iter().zip(&b).map(|(a, b)| (a.1 - b.1).abs()).fold(0.0, f64::max);
+        let ends = one.x().iter().zip(other.x()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        (a.len(), apart.max(ends))
+    }
+    for treatment in [Treatment::SetValued, Treatment::Karnopp] {
+        let dry = [Kind::Coulomb, Kind::Stribeck].map(|kind| Effect::new(kind).with_treatment(treatment));
+        let pendulum = PendulumFamily { effects: dry.to_vec() };
+        let (count, apart) =
+            events(&pendulum, &[0.5, 0.25, 9.81, 0.002, 0.05, 0.05, 0.05, 1.0, 0.05], [0.0, 1.0]);
+        // Errors of 1e-12 a step, some hundred steps.
+        assert!(count > 10 && apart < 1e-9, "{treatment:?}: {count} events, {apart:e}");
+        let ripple = Effect::new(Kind::DriveRipple);
+        let disk = DiskFamily { effects: vec![dry[0], ripple], edge: false };
+        let values = [&DISK[..], &[0.02, 0.05, -0.9, 0.0, 10.0]].concat();
+        let (count, apart) = events(&disk, &values, [0.0, 1.7e-3, 0.0, 0.0]);
+        assert!(count > 50 && apart < 1e-9, "{treatment:?}: {count} events, {apart:e}");
     }
 }
 

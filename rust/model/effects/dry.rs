@@ -56,7 +56,7 @@ impl<S: Scalar> Default for Contact<S> {
 pub struct Dry<S> {
     /// The largest torque that holds the contact where it is, m^2/s^2.
     pub hold: S,
-    /// The speed below which it counts as at rest, rad/s.
+    /// The speed below which it counts as at rest, rad/s; of several effects the last one's holds.
     pub band: S,
     /// The bristles' torque in steady sliding, m^2/s^2, and per deflection, m^2/s^2/rad.
     pub grip: S,
@@ -82,7 +82,7 @@ impl<S: Scalar> Slots<S> {
             Treatment::Karnopp => {
                 self.torque -= size * at.contact.sign;
                 self.dry.hold += size;
-                self.dry.band = S::select(self.dry.band.less(eps), eps, self.dry.band);
+                self.dry.band = eps;
             }
             Treatment::Lugre => {
                 self.dry.grip += size;
