@@ -64,24 +64,28 @@ def step(rates: Rates, dim: int, parameters: int, controlled: int) -> list[str]:
     Only the first `controlled` components take part in the error, in SciPy's norm with rtol, atol.
     """
     p = names("p", parameters)
-    lines = []
+    lines: list[str] = []
+    errors: list[str] = []
     for stage in range(1, 12):
         row = table.A[stage, :stage]
         lines += [f"s{c} = y{c} + h * ({combination(row, c)})" for c in range(dim)]
         lines += [f"k{stage}_{c} = {rate}" for c, rate in enumerate(rates(names("s", dim), p))]
     lines += [f"n{c} = y{c} + h * ({combination(table.B, c)})" for c in range(dim)]
     lines += [f"k12_{c} = {rate}" for c, rate in enumerate(rates(names("n", dim), p))]
+    # With the scales multiplied out there is one division instead of one per component.
     for c in range(controlled):
-        lines += [
-            f"scale = 1.0 / (atol + rtol * max(abs(y{c}), abs(n{c})))",
-            f"e5_{c} = ({combination(table.E5, c)}) * scale",
-            f"e3_{c} = ({combination(table.E3, c)}) * scale",
-        ]
-    five = " + ".join(f"e5_{c} * e5_{c}" for c in range(controlled))
-    three = " + ".join(f"e3_{c} * e3_{c}" for c in range(controlled))
+        others = " * ".join([f"scale{j}" for j in range(controlled) if j != c])
+        lines += [f"scale{c} = atol + rtol * max(abs(y{c}), abs(n{c}))"]
+        five = f"e5_{c} = ({combination(table.E5, c)}) * ({others})"
+        three = f"e3_{c} = ({combination(table.E3, c)}) * ({others})"
+        errors += [five, three]
+    all_scales = " * ".join(f"scale{c}" for c in range(controlled))
     lines += [
-        f"five = {five}",
-        f"err2 = h * h * five * five / ((five + 0.01 * ({three}) + 1e-300) * {controlled}.0)",
+        *errors,
+        "five = " + " + ".join(f"e5_{c} * e5_{c}" for c in range(controlled)),
+        "three = " + " + ".join(f"e3_{c} * e3_{c}" for c in range(controlled)),
+        f"scales = {all_scales}",
+        f"err2 = h * h * five * five / ((five + 0.01 * three) * (scales * scales * {controlled}.0) + 1e-300)",
     ]
     return lines
 

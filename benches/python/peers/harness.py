@@ -102,6 +102,10 @@ def prepare(row: Row, only: set[str]) -> list[Result]:
             result.error = entry.probe()
         except (Missing, ImportError) as problem:
             result = Result(name, None, f"not measured: {problem}")
+        except (Exception, SystemExit) as problem:
+            if name == "udd":
+                raise
+            result = Result(name, None, f"failed: {type(problem).__name__}: {problem}".splitlines()[0])
         results.append(result)
     return results
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import numpy as np
 from numba import njit
 
 from peers import dop853
-from peers.numba_scalar import FAST, compiled, tuple_of
+from peers.numba_scalar import FAST, compiled, factor, tuple_of
 
 LANES = 16
 """Two AVX-512 registers per quantity: two independent chains hide the latencies of one."""
@@ -55,7 +54,7 @@ def layout(
     body += ["h = min(h, end - t)"]
     body += dop853.step(rates, dim, parameters, controlled)
     body += [
-        "change = 0.9 / np.sqrt(np.sqrt(np.sqrt(np.sqrt(err2 + 1e-24))))",
+        "change = factor(err2)",
         "ok = err2 < 1.0",
         f"{at('t')} = t + h if ok else t",
         f"{at('h')} = h * min(most, max(0.2, change))",
@@ -81,7 +80,7 @@ def layout(
         "def step(s, rtol, atol):\n    hits = 0.0\n"
         f"    for l in range({LANES}):\n{dop853.indented(body, 2)}\n    return hits\n"
     )
-    scope: dict[str, Any] = {"np": np}
+    scope: dict[str, Any] = {"factor": factor}
     exec(source, scope)
     load = None
     if level is not None:

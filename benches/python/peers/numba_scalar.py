@@ -7,7 +7,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import njit
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
 
 from peers import dop853
 
@@ -71,10 +73,37 @@ def dense_of(rates: dop853.Rates, dim: int, parameters: int) -> Callable[..., An
     return compiled("dense", "y, k, n, kn, stages, h, p", lines, result)
 
 
+@intrinsic
+def bits_of(context: Any, value: Any) -> Any:
+    """The bits of a float as an integer."""
+
+    def emit(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        return builder.bitcast(given[0], ir.IntType(64))
+
+    return types.int64(types.float64), emit
+
+
+@intrinsic
+def float_of(context: Any, value: Any) -> Any:
+    """The float with these bits."""
+
+    def emit(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        return builder.bitcast(given[0], ir.DoubleType())
+
+    return types.float64(types.int64), emit
+
+
+ONE = int(np.float64(1.0).view(np.int64))
+
+
 @njit(forceinline=True, **FAST)
 def factor(err2: float) -> float:
-    """By how much the next step is longer, before limits: 0.9 err^(-1/8)."""
-    return 0.9 / np.sqrt(np.sqrt(np.sqrt(np.sqrt(err2 + 1e-24))))
+    """By how much the next step is longer, before limits: 0.9 err^(-1/8).
+
+    A float's bits are its logarithm, nearly: the root is a shift, good to half a percent, and a step's length
+    needs no more. It vectorises and takes a cycle where four square roots take a hundred.
+    """
+    return 0.9 * float_of((ONE + (ONE >> 4)) - (bits_of(err2 + 1e-24) >> 4))
 
 
 @njit(forceinline=True, **FAST)

@@ -73,9 +73,7 @@ def reference_states() -> Array:
         a, b, c = y.reshape(3, -1)
         return np.concatenate([b - a, a * c, 1.0 - a * b])
 
-    run = solve_ivp(
-        together, (0.0, SPAN), probe_starts().T.ravel(), method="DOP853", rtol=3e-14, atol=1e-15
-    )
+    run = solve_ivp(together, (0.0, SPAN), probe_starts().T.ravel(), method="DOP853", rtol=3e-14, atol=1e-15)
     return np.ascontiguousarray(run.y[:, -1].reshape(3, -1).T)
 
 

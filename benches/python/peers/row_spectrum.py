@@ -1,4 +1,8 @@
-"""The full Lyapunov spectrum at w = 1, one trajectory, one thread."""
+"""The full Lyapunov spectrum at w = 1, one trajectory at rtol 1e-9, one thread.
+
+The error of a step is that of the state, where a code can be told so: with it the exponents over t = 30 are good
+to 5e-9.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ import numpy as np
 from peers import problems, udd_rows
 from peers.harness import Entry, Row
 
-EVERY = 5.0  # time between two reorthonormalisations; the frame shears by a factor 10^3 in it
+EVERY = 10.0  # time between two reorthonormalisations; the frame shears by a factor 10^6 in it
 
 
 def inspect(answer: Any) -> str:
@@ -51,7 +55,7 @@ def orthonormalise(frame: Any, logs: Any) -> None:
             frame[c, i] /= length
 
 
-def numba(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
+def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
     from numba import njit
 
     from peers import dop853
@@ -126,31 +130,31 @@ def heyoka(tol: float = 1e-7) -> Entry:
     return entry(f"Taylor, var_ode_sys, tol {tol:g}", run)
 
 
-def jitcode(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
+def jitcode(rtol: float = 9e-9, atol: float = 9e-12) -> Entry:
     from peers import jitcode_peer
 
     return entry(f"jitcode_lyap, dop853, rtol {rtol:g}", jitcode_peer.spectrum(rtol, atol, EVERY))
 
 
-def diffrax(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
+def diffrax(rtol: float = 8e-9, atol: float = 8e-12) -> Entry:
     from peers import diffrax_peer
 
     return entry(f"Dopri8, scan, rtol {rtol:g}", diffrax_peer.spectrum(rtol, atol, EVERY))
 
 
-def pydiffsol(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
+def pydiffsol(rtol: float = 8e-9, atol: float = 8e-12) -> Entry:
     from peers import pydiffsol_peer
 
     return entry(f"tsit45, rtol {rtol:g}", pydiffsol_peer.spectrum(rtol, atol, EVERY))
 
 
-def pynamicalsys(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
+def pynamicalsys(rtol: float = 3e-10, atol: float = 3e-13) -> Entry:
     from peers import pynamicalsys_peer
 
     return entry(f"rk45, rtol {rtol:g}", pynamicalsys_peer.spectrum(rtol, atol))
 
 
-def scipy(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
+def scipy(rtol: float = 5e-9, atol: float = 5e-12) -> Entry:
     from scipy.integrate import solve_ivp
 
     def rates(t: float, y: Any) -> Any:
@@ -172,9 +176,9 @@ def scipy(rtol: float = 1e-8, atol: float = 1e-11) -> Entry:
 
 ROW = Row(
     number=2,
-    title="full Lyapunov spectrum, w = 1, one thread",
+    title="full Lyapunov spectrum, w = 1, rtol 1e-9, one thread",
     unit="time units/s",
-    bound=1.2e-6,
+    bound=1.2e-7,
     error="state at t = 30",
     full=5_000_000,
     smallest=100,

@@ -123,7 +123,7 @@ def lanes(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
     return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", finals, least=2000)
 
 
-def heyoka(tol: float = 1e-6, width: int = 16) -> Entry:
+def heyoka(tol: float = 3e-5, width: int = 16) -> Entry:
     from peers import heyoka_peer
 
     def integrator() -> Any:
@@ -155,7 +155,7 @@ def heyoka(tol: float = 1e-6, width: int = 16) -> Entry:
 def diffrax(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
     from peers import diffrax_peer
 
-    return entry(f"Dopri8, vmap, rtol {rtol:g}, atol {atol:g}", diffrax_peer.finals(rtol, atol))
+    return entry(f"Dopri8, vmap, rtol {rtol:g}, atol {atol:g}", diffrax_peer.finals(rtol, atol), least=256)
 
 
 def scipy(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:

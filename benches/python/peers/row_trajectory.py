@@ -94,19 +94,19 @@ def jitcode(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
     return entry(f"dop853, rtol {rtol:g}, atol {atol:g}", jitcode_peer.final(rtol, atol))
 
 
-def diffrax(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+def diffrax(rtol: float = 2e-9, atol: float = 2e-12) -> Entry:
     from peers import diffrax_peer
 
     return entry(f"Dopri8, rtol {rtol:g}, atol {atol:g}", diffrax_peer.final(rtol, atol))
 
 
-def pydiffsol(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+def pydiffsol(rtol: float = 2e-9, atol: float = 2e-12) -> Entry:
     from peers import pydiffsol_peer
 
     return entry(f"tsit45, rtol {rtol:g}, atol {atol:g}", pydiffsol_peer.final(rtol, atol))
 
 
-def pynamicalsys(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+def pynamicalsys(rtol: float = 3e-10, atol: float = 3e-13) -> Entry:
     from peers import pynamicalsys_peer
 
     return entry(f"rk45, rtol {rtol:g}, atol {atol:g}", pynamicalsys_peer.final(rtol, atol))

@@ -16,7 +16,9 @@ def trajectory() -> tuple[str, Any]:
     model = udd.DLE(1.0)
 
     def final(start: Any, t: float) -> Any:
-        return udd.simulate(model, np.array([0.0, t]), start, rtol=1e-9, atol=1e-12, method="dopri5").state[-1]
+        return udd.simulate(model, np.array([0.0, t]), start, rtol=1e-9, atol=1e-12, method="dopri5").state[
+            -1
+        ]
 
     return "dopri5, rtol 1e-9, atol 1e-12", final
 
@@ -54,6 +56,8 @@ def disk() -> tuple[str, Any]:
     model = udd.Disk(problems.W, edge="ignore")
 
     def final(start: Any, t: float) -> Any:
-        return udd.simulate(model, np.array([0.0, t]), start, rtol=1e-9, atol=1e-12, method="dopri5").state[-1]
+        return udd.simulate(model, np.array([0.0, t]), start, rtol=1e-9, atol=1e-12, method="dopri5").state[
+            -1
+        ]
 
     return "dopri5, rtol 1e-9, atol 1e-12", final
