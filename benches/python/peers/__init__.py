@@ -1,1 +1,1 @@
-"""udd beside its peers, on the same work in one interleaved run: ``python -m peers`` (from benches/python)."""
+"""udd beside its peers, on the same work in one interleaved run: ``python -m peers``."""

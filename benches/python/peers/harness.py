@@ -34,8 +34,8 @@ class Entry:
 class Row:
     """One line of the table.
 
-    `inspect` looks at an answer and returns what is wrong with it, or nothing. `bound` is the error that every
-    entry must meet to be compared.
+    `inspect` looks at an answer and returns what is wrong with it, or nothing. `bound` is the error that
+    every entry must meet to be compared.
     """
 
     number: int

@@ -1,4 +1,4 @@
-"""heyoka.py, as its authors write it: compact mode off, high accuracy off, batches as wide as the SIMD registers."""
+"""heyoka.py, as its authors write it: compact mode and high accuracy off, fast math, batches for SIMD."""
 
 from __future__ import annotations
 

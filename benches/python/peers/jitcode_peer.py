@@ -1,4 +1,4 @@
-"""JiTCODE: symbolic equations compiled to C (with its own flags), stepped by SciPy's wrapped Fortran dop853."""
+"""JiTCODE: symbolic equations compiled to C with its own flags, stepped by SciPy's wrapped dop853."""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 
 The lanes' state is one flat array, LANES numbers per quantity, and a step of all lanes is one loop over them
 with a straight-line body and selects instead of branches. With constant distances between the quantities the
-compiler sees that nothing overlaps and turns the loop into SIMD code. A lane that has finished gets the next piece of work from the caller.
+compiler sees that nothing overlaps and turns the loop into SIMD code. A lane that has finished gets the next
+piece of work from the caller.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class Layout:
     """Where in the array the lanes' t, end, ... begin, and the compiled step."""
 
     step: Any
-    """``step(s, rtol, atol)`` tries one step in every lane; with `level` it returns how many lanes crossed."""
+    """``step(s, rtol, atol)`` tries one step in every lane; how many crossed (with `level`)."""
     load: Any
     """``load(s, l)``: y, k, n, kn, stages, h, p of the step just made in lane l (only with `level`)."""
     dim: int

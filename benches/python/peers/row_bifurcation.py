@@ -1,4 +1,4 @@
-"""A bifurcation diagram: 200 + 200 points of the section z = 0, z' > 0 at 1000 drives and rtol 1e-9, two threads.
+"""A bifurcation diagram: 200 + 200 points of z = 0, z' > 0 at 1000 drives, rtol 1e-9, two threads.
 
 The first 200 points of a drive are the transient: they are counted, and only the others are found and kept.
 """
@@ -109,28 +109,28 @@ def lanes(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
         upcoming, live, hits = first, width, 1.0
         while live > 0:
             if hits > 0.0:
-                for l in range(width):
-                    if owner[l] == -2 or (owner[l] >= 0 and s[CROSSED + l] == 0.0):
+                for lane in range(width):
+                    if owner[lane] == -2 or (owner[lane] >= 0 and s[CROSSED + lane] == 0.0):
                         continue
-                    if owner[l] >= 0:
-                        if have[l] >= 0:
-                            f = dense(*load(s, l))
+                    if owner[lane] >= 0:
+                        if have[lane] >= 0:
+                            f = dense(*load(s, lane))
                             x = crossing(f[2], 0.0)
                             for c in range(3):
-                                points[owner[l], have[l], c] = interpolated(f[c], x)
-                        have[l] += 1
-                        if have[l] < kept:
+                                points[owner[lane], have[lane], c] = interpolated(f[c], x)
+                        have[lane] += 1
+                        if have[lane] < kept:
                             continue
                     if upcoming < len(w):
                         i = upcoming
-                        owner[l], have[l] = i, -transient
-                        begin(s, l, (starts[i, 0], starts[i, 1], starts[i, 2]), (w[i],))
-                        s[T + l], s[STOP + l], s[H + l], s[MOST + l] = 0.0, 1e300, 0.05, 5.0
+                        owner[lane], have[lane] = i, -transient
+                        begin(s, lane, (starts[i, 0], starts[i, 1], starts[i, 2]), (w[i],))
+                        s[T + lane], s[STOP + lane], s[H + lane], s[MOST + lane] = 0.0, 1e300, 0.05, 5.0
                         upcoming += 2
                     else:
-                        s[STOP + l] = 0.0
-                        s[T + l] = 0.0
-                        owner[l] = -2
+                        s[STOP + lane] = 0.0
+                        s[T + lane] = 0.0
+                        owner[lane] = -2
                         live -= 1
             hits = step(s, rtol, atol)
 

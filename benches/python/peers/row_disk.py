@@ -1,4 +1,4 @@
-"""The disk with its friction at W = 0.039 m/s, the edge ignored, the kinks of the friction located, rtol 1e-9."""
+"""The disk with friction at W = 0.039 m/s, the edge ignored, the friction's kinks located, rtol 1e-9."""
 
 from __future__ import annotations
 

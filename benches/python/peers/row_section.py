@@ -1,4 +1,4 @@
-"""100,000 points of the section z = 0, z' > 0 at w = 1, every one on it to 1e-12, at rtol 1e-9, one thread."""
+"""100,000 points of the section z = 0, z' > 0 at w = 1, each on it to 1e-12, rtol 1e-9, one thread."""
 
 from __future__ import annotations
 

@@ -96,19 +96,19 @@ def lanes(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
         owner = np.full(width, -1)
         upcoming, live = first, width
         while live > 0:
-            for l in range(width):
-                if s[T + l] < s[STOP + l] or owner[l] == -2:
+            for lane in range(width):
+                if s[T + lane] < s[STOP + lane] or owner[lane] == -2:
                     continue
-                if owner[l] >= 0:
+                if owner[lane] >= 0:
                     for c in range(3):
-                        finals[owner[l], c] = s[c * width + l]
+                        finals[owner[lane], c] = s[c * width + lane]
                 if upcoming < len(starts):
-                    owner[l] = upcoming
-                    begin(s, l, (starts[upcoming, 0], starts[upcoming, 1], starts[upcoming, 2]), (1.0,))
-                    s[T + l], s[STOP + l], s[H + l], s[MOST + l] = 0.0, end, 0.05, 5.0
+                    owner[lane] = upcoming
+                    begin(s, lane, (starts[upcoming, 0], starts[upcoming, 1], starts[upcoming, 2]), (1.0,))
+                    s[T + lane], s[STOP + lane], s[H + lane], s[MOST + lane] = 0.0, end, 0.05, 5.0
                     upcoming += 2
                 else:
-                    owner[l] = -2
+                    owner[lane] = -2
                     live -= 1
             step(s, rtol, atol)
 

@@ -35,7 +35,7 @@ def inspect(answer: Any) -> str:
 
 
 def entry(setting: str, run: Any, note: str = "", least: int = 0) -> Entry:
-    """From ``run(w, start, transient, t)``: exponents and the states at t; `start` has shape (3,) or (n, 3)."""
+    """From ``run(w, starts, transient, t)``: the exponents and the states at t."""
 
     def work(n: int) -> tuple[float, Any]:
         w = drives(n)
@@ -113,11 +113,11 @@ def lanes(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
     T, STOP, H, MOST = own.t, own.end, own.h, own.most
 
     @njit(**FAST)
-    def rescaled(s: Any, l: int) -> float:
+    def rescaled(s: Any, lane: int) -> float:
         """The logarithm of the tangent vector's length, which becomes 1."""
-        length = np.sqrt(s[3 * width + l] ** 2 + s[4 * width + l] ** 2 + s[5 * width + l] ** 2)
+        length = np.sqrt(s[3 * width + lane] ** 2 + s[4 * width + lane] ** 2 + s[5 * width + lane] ** 2)
         for c in (3, 4, 5, 9, 10, 11):  # the vector and its rates
-            s[c * width + l] /= length
+            s[c * width + lane] /= length
         return np.log(length)
 
     @njit(**FAST)
@@ -136,28 +136,28 @@ def lanes(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
         logs, owner, upcoming, live, count = np.zeros(width), np.full(width, -1), first, width, 0
         while live > 0:
             count += 1
-            for l in range(width):
-                if owner[l] >= 0 and count % 64 == 0:
-                    logs[l] += rescaled(s, l)
-                if s[T + l] < s[STOP + l] or owner[l] == -2:
+            for lane in range(width):
+                if owner[lane] >= 0 and count % 64 == 0:
+                    logs[lane] += rescaled(s, lane)
+                if s[T + lane] < s[STOP + lane] or owner[lane] == -2:
                     continue
-                if owner[l] >= 0:
-                    logs[l] += rescaled(s, l)
-                    if s[STOP + l] < end:
-                        logs[l], s[STOP + l], s[H + l] = 0.0, end, 0.05
+                if owner[lane] >= 0:
+                    logs[lane] += rescaled(s, lane)
+                    if s[STOP + lane] < end:
+                        logs[lane], s[STOP + lane], s[H + lane] = 0.0, end, 0.05
                         continue
-                    out[owner[l]] = logs[l] / (end - transient)
+                    out[owner[lane]] = logs[lane] / (end - transient)
                     for c in range(3):
-                        finals[owner[l], c] = s[c * width + l]
+                        finals[owner[lane], c] = s[c * width + lane]
                 if upcoming < len(w):
                     i = upcoming
-                    owner[l], logs[l] = i, 0.0
-                    begin(s, l, (starts[i, 0], starts[i, 1], starts[i, 2], 1.0, 0.0, 0.0), (w[i],))
-                    s[T + l], s[H + l], s[MOST + l] = 0.0, 0.05, 5.0
-                    s[STOP + l] = transient if transient > 0.0 else end
+                    owner[lane], logs[lane] = i, 0.0
+                    begin(s, lane, (starts[i, 0], starts[i, 1], starts[i, 2], 1.0, 0.0, 0.0), (w[i],))
+                    s[T + lane], s[H + lane], s[MOST + lane] = 0.0, 0.05, 5.0
+                    s[STOP + lane] = transient if transient > 0.0 else end
                     upcoming += 2
                 else:
-                    owner[l] = -2
+                    owner[lane] = -2
                     live -= 1
             step(s, rtol, atol)
 

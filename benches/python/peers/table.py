@@ -59,9 +59,8 @@ def details(row: Row, results: list[Result]) -> str:
         if result.entry and not result.error <= row.bound:
             notes.append("not accurate enough to be compared")
         error = f"{result.error:.1e}" if result.entry else "-"
-        lines.append(
-            f"| {result.name} | {figure(result.rate)} | {error} | {setting} | {'; '.join(n for n in notes if n)} |"
-        )
+        note = "; ".join(n for n in notes if n)
+        lines.append(f"| {result.name} | {figure(result.rate)} | {error} | {setting} | {note} |")
     return "\n".join(lines)
 
 
