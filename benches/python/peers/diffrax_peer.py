@@ -121,21 +121,22 @@ def largest(rtol: float, atol: float) -> Any:
 
 
 def points(rtol: float, atol: float) -> Any:
-    """``points(start, n)``: the first n points on z = 0, z' > 0."""
+    """``points(start, n, w=1)``: the first n points on z = 0, z' > 0."""
     section = dfx.Event(lambda t, y, args, **_: y[2], optx.Newton(rtol=1e-13, atol=1e-13), direction=True)
 
-    def point(state: Any, _: Any) -> Any:
-        found = solved(dle, state, 1e4, 1.0, rtol, atol, event=section)
+    def point(carried: Any, _: Any) -> Any:
+        state, w = carried
+        found = solved(dle, state, 1e4, w, rtol, atol, event=section)
         # Past the section, not to be found again.
-        return found.at[2].set(1e-13), found
+        return (found.at[2].set(1e-13), w), found
 
     most = 20
-    several = jax.jit(lambda state: jax.lax.scan(point, state, length=most))
+    several = jax.jit(lambda state, w: jax.lax.scan(point, (state, w), length=most))
 
-    def run(start: Any, n: int) -> Any:
+    def run(start: Any, n: int, w: float = 1.0) -> Any:
         parts, state = [], jnp.asarray(start)
         while len(parts) * most < n:
-            state, found = several(state)
+            (state, _), found = several(state, w)
             parts.append(np.asarray(found))
         return np.concatenate(parts)[:n]
 

@@ -15,15 +15,17 @@ u_i { x = x0, y = y0, z = z0 }
 F_i { y - x, x * z, w - x * y }
 """
 
-FRAME = "abcdefghi"  # three tangent vectors one after the other
+FRAME = "abcdefghi"  # the components of up to three tangent vectors
 
 
-def tangent_code() -> str:
-    inputs = ", ".join(f"{c}0 = 0" for c in FRAME)
-    states = ", ".join(f"{c} = {c}0" for c in FRAME)
+def tangent_code(vectors: int) -> str:
+    """The equations with tangent vectors, one after the other."""
+    frame = FRAME[: 3 * vectors]
+    inputs = ", ".join(f"{c}0 = 0" for c in frame)
+    states = ", ".join(f"{c} = {c}0" for c in frame)
     rates = ", ".join(
         f"{u[1]} - {u[0]}, {u[0]} * z + x * {u[2]}, 0.0 - ({u[0]} * y + x * {u[1]})"
-        for u in (FRAME[:3], FRAME[3:6], FRAME[6:])
+        for u in (frame[i : i + 3] for i in range(0, len(frame), 3))
     )
     return (
         f"in_i {{ w = 1, x0 = 1, y0 = 1, z0 = 0, {inputs} }}\nu_i {{ x = x0, y = y0, z = z0, {states} }}\n"
@@ -59,7 +61,7 @@ def disk(rtol: float, atol: float) -> Any:
 
 def spectrum(rtol: float, atol: float, every: float) -> Any:
     """``run(start, t)``: the exponents and the state at t."""
-    ode = system(tangent_code(), rtol, atol)
+    ode = system(tangent_code(3), rtol, atol)
 
     def run(start: Any, t: float) -> Any:
         logs, state, frame = np.zeros(3), np.array(start), np.eye(3)
@@ -71,6 +73,28 @@ def spectrum(rtol: float, atol: float, every: float) -> Any:
             frame, r = np.linalg.qr(end[3:].reshape(3, 3).T)
             logs += np.log(np.abs(np.diag(r)))
         return logs / t, state
+
+    return run
+
+
+def largest(rtol: float, atol: float) -> Any:
+    """``run(w, starts, transient, t)``: the largest exponents and the states at t."""
+    ode = system(tangent_code(1), rtol, atol)
+
+    def one(w: float, start: Any, transient: float, end: float) -> Any:
+        pieces = max(1, round((end - transient) / 50.0))
+        spans = [transient] * (transient > 0.0) + [(end - transient) / pieces] * pieces
+        logs, state = 0.0, np.array([*start, 1.0, 0.0, 0.0])
+        for i, span in enumerate(spans):
+            state = ode.solve_dense(np.array([w, *state]), np.array([span])).ys[:, -1].copy()
+            length = np.linalg.norm(state[3:])
+            state[3:] /= length
+            logs += np.log(length) if i > 0 or transient <= 0.0 else 0.0
+        return logs / (end - transient), state[:3]
+
+    def run(w: Any, starts: Any, transient: float, end: float) -> Any:
+        found = [one(float(a), s, transient, end) for a, s in zip(w, starts, strict=True)]
+        return np.array([x for x, _ in found]), np.array([s for _, s in found])
 
     return run
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from peers import problems, udd_rows
+from peers import problems, row_section, udd_rows
 from peers.harness import Entry, Row
 from peers.row_sweep import drives
 
@@ -227,6 +227,17 @@ def pydiffsol(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
     return per_drive(f"tsit45, stop, rtol {rtol:g}", pydiffsol_peer.points(rtol, atol), "one thread")
 
 
+def diffrax(rtol: float = 8e-10, atol: float = 8e-13) -> Entry:
+    from peers import diffrax_peer
+
+    return per_drive(f"Dopri8, Event, rtol {rtol:g}", diffrax_peer.points(rtol, atol), "one thread")
+
+
+def scipy(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+    points = row_section.scipy_points(rtol, atol)
+    return per_drive(f"DOP853, events, rtol {rtol:g}", points, "one thread")
+
+
 ROW = Row(
     number=6,
     title="bifurcation diagram, 1000 drives x (200 + 200) points, rtol 1e-9, two threads",
@@ -234,14 +245,17 @@ ROW = Row(
     bound=1.2e-7,
     error="5th point",
     full=COUNT,
-    smallest=2,
+    smallest=1,
     entries={
         "udd": lambda: entry(*udd_rows.bifurcation()),
         "lanes": lanes,
         "numba": numba,
         "heyoka": heyoka,
+        "JiTCODE": row_section.jitcode,
+        "diffrax": diffrax,
         "pydiffsol": pydiffsol,
         "pynamicalsys": pynamicalsys,
+        "SciPy": scipy,
     },
     inspect=inspect,
 )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from peers import problems, udd_rows
-from peers.harness import Entry, Row
+from peers.harness import Entry, Missing, Row
 
 COUNT = 100_000
 
@@ -102,30 +102,38 @@ def heyoka(tol: float = 1e-7) -> Entry:
     return entry(f"Taylor, nt_event, tol {tol:g}", points)
 
 
-def scipy(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+def scipy_points(rtol: float, atol: float) -> Any:
+    """``points(start, n, w=1)`` with SciPy's events."""
     from scipy.integrate import solve_ivp
 
-    def height(t: float, y: Any) -> float:
+    def height(t: float, y: Any, w: float) -> float:
         return float(y[2])
 
     height.direction = 1.0  # type: ignore[attr-defined]
 
-    def points(start: Any, n: int) -> Any:
+    def points(start: Any, n: int, w: float = 1.0) -> Any:
         found: list[Any] = []
+        options = {"method": "DOP853", "rtol": rtol, "atol": atol, "events": height, "args": (w,)}
         while len(found) < n:
             height.terminal = min(100, n - len(found))  # type: ignore[attr-defined]
-            run = solve_ivp(
-                problems.dle, (0.0, 1e9), start, method="DOP853", rtol=rtol, atol=atol, events=height
-            )
+            run = solve_ivp(problems.dle, (0.0, 1e9), start, **options)
             found += list(run.y_events[0])
             start = run.y[:, -1]
             start[2] = 1e-300  # past the section, not to be found again
         return np.array(found)
 
-    return entry(f"DOP853, events, rtol {rtol:g}", points)
+    return points
 
 
-def diffrax(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+def scipy(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+    return entry(f"DOP853, events, rtol {rtol:g}", scipy_points(rtol, atol))
+
+
+def jitcode() -> Entry:
+    raise Missing("JiTCODE finds no events")
+
+
+def diffrax(rtol: float = 8e-10, atol: float = 8e-13) -> Entry:
     from peers import diffrax_peer
 
     return entry(f"Dopri8, Event, rtol {rtol:g}", diffrax_peer.points(rtol, atol))
@@ -155,6 +163,7 @@ ROW = Row(
         "udd": lambda: entry(*udd_rows.section()),
         "numba": numba,
         "heyoka": heyoka,
+        "JiTCODE": jitcode,
         "diffrax": diffrax,
         "pydiffsol": pydiffsol,
         "pynamicalsys": pynamicalsys,

@@ -171,6 +171,29 @@ def scipy(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
     return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", finals, "one thread: Python does not run in two")
 
 
+def one_by_one(setting: str, final: Any) -> Entry:
+    """From ``final(start, t)``, one start after the other."""
+    return entry(setting, lambda s, t: np.array([final(start, t) for start in s]), "one thread")
+
+
+def jitcode(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
+    from peers import jitcode_peer
+
+    return one_by_one(f"dop853, rtol {rtol:g}, atol {atol:g}", jitcode_peer.final(rtol, atol))
+
+
+def pydiffsol(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
+    from peers import pydiffsol_peer
+
+    return one_by_one(f"tsit45, rtol {rtol:g}, atol {atol:g}", pydiffsol_peer.final(rtol, atol))
+
+
+def pynamicalsys(rtol: float = 3e-7, atol: float = 3e-10) -> Entry:
+    from peers import pynamicalsys_peer
+
+    return one_by_one(f"rk45, rtol {rtol:g}, atol {atol:g}", pynamicalsys_peer.final(rtol, atol))
+
+
 ROW = Row(
     number=4,
     title="100,000 random starts to t = 100, rtol 1e-6, two threads",
@@ -185,6 +208,9 @@ ROW = Row(
         "heyoka": heyoka,
         "numba": numba,
         "diffrax": diffrax,
+        "JiTCODE": jitcode,
+        "pydiffsol": pydiffsol,
+        "pynamicalsys": pynamicalsys,
         "SciPy": scipy,
     },
     inspect=inspect,

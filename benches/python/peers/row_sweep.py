@@ -221,6 +221,12 @@ def jitcode(rtol: float = 5e-6, atol: float = 5e-9) -> Entry:
     return entry(f"jitcode_lyap, dop853, rtol {rtol:g}", jitcode_peer.largest(rtol, atol), "one thread")
 
 
+def pydiffsol(rtol: float = 3e-6, atol: float = 3e-9) -> Entry:
+    from peers import pydiffsol_peer
+
+    return entry(f"tsit45, rtol {rtol:g}", pydiffsol_peer.largest(rtol, atol), "one thread")
+
+
 def pynamicalsys(rtol: float = 2e-7, atol: float = 2e-10) -> Entry:
     from peers import pynamicalsys_peer
 
@@ -266,6 +272,7 @@ ROW = Row(
         "numba": numba,
         "diffrax": diffrax,
         "JiTCODE": jitcode,
+        "pydiffsol": pydiffsol,
         "pynamicalsys": pynamicalsys,
         "SciPy": scipy,
     },
