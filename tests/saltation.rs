@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use approx::assert_relative_eq;
 use udd::integrate::{Driver, Ending, Failure, Tolerance, pass, propagate};
 use udd::model::effects::{Effect, Kind, Treatment};
-use udd::model::{Family, PendulumFamily, Sides, System, choose, sides_of};
+use udd::model::{Disk, DiskFamily, Family, PendulumFamily, Sides, System, choose, sides_of};
 use udd::scalar::{Dual, Mask, Scalar};
 
 const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
@@ -261,6 +261,78 @@ fn grazing_is_flagged() {
             assert_eq!(driver.x()[1].d[0], 0.0);
         }
     }
+}
+
+/// A disk on tilted wheels with dry friction, which sticks now and then and moves chaotically in between.
+/// Without `corrected` tangents pass the jumps of the law as if there were none.
+struct Sticky<S> {
+    disk: Disk<S>,
+    corrected: bool,
+}
+
+impl<S: Scalar> Sticky<S> {
+    fn new(corrected: bool) -> Self {
+        let effects =
+            vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued), Effect::new(Kind::Tilt)];
+        let values = [0.03, 0.08, 9.81, 0.012, 0.103, 0.055, 0.02, 0.05, 0.3].map(S::constant);
+        Self { disk: DiskFamily { effects, edge: false }.build(&values), corrected }
+    }
+}
+
+impl<S: Scalar> System<S, 4> for Sticky<S> {
+    fn rates(&self, t: S, x: &[S; 4], sides: &Sides<S>) -> [S; 4] {
+        self.disk.rates(t, x, sides)
+    }
+    fn surfaces(&self) -> usize {
+        self.disk.surfaces()
+    }
+    fn surface(&self, j: usize, t: S, x: &[S; 4], sides: &Sides<S>) -> S {
+        self.disk.surface(j, t, x, sides)
+    }
+    fn settle(&self, t: S, x: &[S; 4], sides: &mut Sides<S>) {
+        self.disk.settle(t, x, sides);
+    }
+    fn switch(&self, j: usize, t: S, x: &mut [S; 4], sides: &mut Sides<S>, here: S::Mask) {
+        self.disk.switch(j, t, x, sides, here);
+    }
+    fn jumps(&self, j: usize) -> bool {
+        self.corrected && self.disk.jumps(j)
+    }
+}
+
+/// The mean growth rate of a tangent along one orbit is that of a neighbouring orbit's distance.
+#[test]
+fn exponents_through_stick_and_slip_are_those_of_neighbours() {
+    type N = Dual<f64, 1>;
+    let (start, piece, pieces) = ([3.0, 0.005, 0.0, 0.0], 0.25, 1200);
+    let growth = |corrected: bool| {
+        let (system, wide) = (Sticky::<f64>::new(true), Sticky::<N>::new(corrected));
+        let (mut x, mut tangent) = (start, [0.5; 4]);
+        let mut shadow: [f64; 4] = from_fn(|n| x[n] + 1e-8 * tangent[n]);
+        let (mut by_tangent, mut by_shadow, mut stuck) = (0.0, 0.0, 0);
+        for i in 0..pieces {
+            let (t, end) = (piece * f64::from(i), piece * f64::from(i + 1));
+            let dual =
+                propagate(&wide, t, end, from_fn(|n| N { re: x[n], d: [tangent[n]] }), &TIGHT).unwrap();
+            shadow = propagate(&system, t, end, shadow, &TIGHT).unwrap();
+            x = propagate(&system, t, end, x, &TIGHT).unwrap();
+            // Lengths in which the components count alike; the orientation does not act back.
+            let length = |d: [f64; 4]| (d[0].powi(2) + (1e2 * d[1]).powi(2) + (1e2 * d[2]).powi(2)).sqrt();
+            let (grown, apart) = (length(dual.map(|v| v.d[0])), length(from_fn(|n| shadow[n] - x[n])));
+            tangent = dual.map(|v| v.d[0] / grown);
+            by_tangent += grown.ln();
+            by_shadow += (apart / 1e-8).ln();
+            shadow = from_fn(|n| x[n] + (shadow[n] - x[n]) * 1e-8 / apart);
+            stuck += usize::from(x[0] == 0.0);
+        }
+        let time = piece * f64::from(pieces);
+        (by_tangent / time, by_shadow / time, stuck)
+    };
+    let (tangent, shadow, stuck) = growth(true);
+    assert!(stuck > 20 && tangent > 0.2, "{tangent}, stuck {stuck} times");
+    // The shadow feels the second order, 1e-8 of the first but for near grazes.
+    assert_relative_eq!(tangent, shadow, max_relative = 1e-3);
+    assert!((growth(false).0 - shadow).abs() > 0.01 * shadow);
 }
 
 /// A law that pushes back from either side of a surface, and knows no way to stay on it.
