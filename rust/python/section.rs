@@ -1,0 +1,220 @@
+//! `udd.poincare`, and what is built upon it.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::errors::ModelError;
+use super::interrupt;
+use super::jobs;
+use super::model::{AnyModel, with_model};
+use crate::integrate::{Failure, Tolerance};
+use crate::model::Family;
+use crate::run::{Crew, Crossings, Ended, Section, Sections, Stop};
+use crate::scalar::Isa;
+use crate::tape::{Expression, Names};
+
+const TIME_RAN_OUT: u8 = 2;
+const ESCAPED: u8 = 5;
+
+fn code(ended: Ended) -> u8 {
+    match ended {
+        Ended::Finished => jobs::FINISHED,
+        Ended::Ejected => jobs::EJECTED,
+        Ended::TimeRanOut => TIME_RAN_OUT,
+        Ended::Failed(Failure::Chattering { .. }) => jobs::CHATTERING,
+        Ended::Failed(_) => jobs::FAILED,
+        Ended::Interrupted => jobs::INTERRUPTED,
+        Ended::Escaped => ESCAPED,
+    }
+}
+
+/// The names of the state's components.
+fn state_names(model: &AnyModel) -> Vec<String> {
+    let names: &[&str] = match model {
+        AnyModel::Dle(..) => &["omega", "y", "z"],
+        AnyModel::Disk(..) => &["Omega", "Y", "Z", "beta"],
+        AnyModel::Pendulum(..) => &["Omega", "theta"],
+        AnyModel::BristledDisk(..) => &["Omega", "Y", "Z", "beta", "bristle"],
+        AnyModel::BristledPendulum(..) => &["Omega", "theta", "bristle"],
+    };
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+/// Angles grow without end.
+fn bounded(name: &str) -> bool {
+    !matches!(name, "beta" | "theta")
+}
+
+fn parse(text: &str, direction: i32, states: &[String], parameters: &[String]) -> PyResult<Section> {
+    let names = Names { states, parameters };
+    let wrong = |what: String| Err(ModelError::new_err(format!("the section {text:?} {what}")));
+    match Expression::parse(text, names) {
+        Err(mistake) => wrong(mistake.to_string()),
+        Ok(function) if !function.varies() => {
+            wrong(format!("never changes: it contains neither the state ({}) nor t", states.join(", ")))
+        }
+        Ok(function) => Ok(Section { function, rising: direction >= 0, falling: direction <= 0 }),
+    }
+}
+
+/// Columns, one row for each trajectory.
+struct Table {
+    count: usize,
+    points: Vec<f64>,
+    t: Vec<f64>,
+    which: Vec<u8>,
+    found: Vec<u64>,
+    residual: Vec<f64>,
+    end: Vec<f64>,
+    t_end: Vec<f64>,
+    outcome: Vec<u8>,
+}
+
+impl Table {
+    fn new(rows: usize, count: usize, dimension: usize) -> PyResult<Self> {
+        let mut table = Self {
+            count,
+            points: Vec::new(),
+            t: Vec::new(),
+            which: Vec::new(),
+            found: Vec::new(),
+            residual: Vec::new(),
+            end: Vec::new(),
+            t_end: Vec::new(),
+            outcome: Vec::new(),
+        };
+        let points = rows.saturating_mul(count);
+        let room = table.points.try_reserve_exact(points.saturating_mul(dimension));
+        let room = room.and(table.t.try_reserve_exact(points)).and(table.which.try_reserve_exact(points));
+        room.map_err(|_| PyMemoryError::new_err(format!("there is no room for {points} points")))?;
+        Ok(table)
+    }
+
+    fn push<const D: usize>(&mut self, crossings: Option<Crossings<D>>) {
+        let Some(crossings) = crossings else {
+            self.fill::<D>(0);
+            self.end.extend([f64::NAN; D]);
+            self.t_end.push(f64::NAN);
+            self.residual.push(0.0);
+            self.outcome.push(jobs::INTERRUPTED);
+            return;
+        };
+        self.points.extend(crossings.x.as_flattened());
+        self.t.extend(&crossings.t);
+        self.which.extend(&crossings.which);
+        self.fill::<D>(crossings.t.len());
+        self.end.extend(crossings.end.1);
+        self.t_end.push(crossings.end.0);
+        self.residual.push(crossings.residual);
+        self.outcome.push(code(crossings.ended));
+    }
+
+    /// Completes a row in which there are so many points.
+    fn fill<const D: usize>(&mut self, found: usize) {
+        let missing = self.count - found;
+        self.points.extend((0..missing).flat_map(|_| [f64::NAN; D]));
+        self.t.extend((0..missing).map(|_| f64::NAN));
+        self.which.extend((0..missing).map(|_| 0));
+        self.found.push(found as u64);
+    }
+}
+
+fn collect<F: Family<D>, const D: usize>(
+    sections: &Sections<'_, F, D>,
+    threads: usize,
+    done: &AtomicUsize,
+    mut table: Table,
+    stop: &Stop,
+) -> Table {
+    let crew = Crew { threads, isa: Isa::best(), done, stop };
+    sections.run(crew).into_iter().for_each(|crossings| table.push(crossings));
+    table
+}
+
+/// Where trajectories cross surfaces, on `threads` threads (0 for one per core).
+///
+/// `values` has one row of parameter values for each trajectory, or a single row for all; `starts`
+/// likewise. A section is the zero of an expression of the state, its rates, the time and the parameters,
+/// crossed where it rises (direction 1), falls (-1), or either (0). The first `skip` crossings are left out.
+/// `progress` is called with the number of trajectories done. Returns a dict of columns; on Ctrl-C with
+/// what there is.
+#[pyfunction]
+#[pyo3(signature = (model, values, starts, section, direction, skip, count, t_max, rtol, atol, threads, progress = None))]
+#[allow(clippy::too_many_arguments)]
+fn sections<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    values: PyReadonlyArray2<'py, f64>,
+    starts: PyReadonlyArray2<'py, f64>,
+    section: Vec<String>,
+    direction: Vec<i32>,
+    skip: usize,
+    count: usize,
+    t_max: f64,
+    rtol: f64,
+    atol: f64,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let model = AnyModel::from_python(model)?;
+    if section.is_empty() || section.len() > usize::from(u8::MAX) || section.len() != direction.len() {
+        let (sections, directions) = (section.len(), direction.len());
+        let message = format!("{sections} sections with {directions} directions cannot be used");
+        return Err(ModelError::new_err(message));
+    }
+    if count == 0 {
+        return Err(ModelError::new_err("at least one point must be asked for"));
+    }
+    let names = state_names(&model);
+    let rows = jobs::values(&model, &values)?;
+    let done = AtomicUsize::new(0);
+    let tick = || match &progress {
+        Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
+        None => Ok(()),
+    };
+    let (table, signal) = with_model!(&model, |family, _values| {
+        let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
+        let pairs = section.iter().zip(&direction);
+        let surfaces = pairs.map(|(text, &direction)| parse(text, direction, &names, &parameters));
+        let surfaces = surfaces.collect::<PyResult<Vec<_>>>()?;
+        let starts = jobs::starts(&starts)?;
+        jobs::agree(rows.len(), starts.len())?;
+        let table = Table::new(rows.len().max(starts.len()), count, names.len())?;
+        let sections = Sections {
+            family,
+            values: &rows,
+            starts: &starts,
+            sections: &surfaces,
+            skip,
+            count,
+            end: t_max,
+            bounded: std::array::from_fn(|n| bounded(&names[n])),
+            tolerance: Tolerance { rtol, atol },
+        };
+        interrupt::watch(py, tick, |stop| collect(&sections, threads, &done, table, stop))?
+    });
+    if let Err(error) = signal
+        && !error.is_instance_of::<PyKeyboardInterrupt>(py)
+    {
+        return Err(error);
+    }
+    let jobs = table.outcome.len();
+    let dict = PyDict::new(py);
+    dict.set_item("points", PyArray1::from_vec(py, table.points).reshape([jobs, count, names.len()])?)?;
+    dict.set_item("t", PyArray1::from_vec(py, table.t).reshape([jobs, count])?)?;
+    dict.set_item("which", PyArray1::from_vec(py, table.which).reshape([jobs, count])?)?;
+    dict.set_item("found", PyArray1::from_vec(py, table.found))?;
+    dict.set_item("residual", PyArray1::from_vec(py, table.residual))?;
+    dict.set_item("end", PyArray1::from_vec(py, table.end).reshape([jobs, names.len()])?)?;
+    dict.set_item("t_end", PyArray1::from_vec(py, table.t_end))?;
+    dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
+    Ok(dict)
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(sections, module)?)
+}

@@ -1,0 +1,201 @@
+//! Poincaré sections: where trajectories cross a surface.
+
+use super::crossing::{Crossed, Scan};
+use super::ensemble::known;
+use super::fleet::{Crew, Fleet, Queue, sail};
+use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::ship::{Ship, Start};
+use crate::integrate::{Failure, Tolerance};
+use crate::model::Family;
+use crate::scalar::{Mask, Real};
+use crate::tape::{Expression, Tape};
+
+/// A component of the state beyond this has escaped to infinity.
+pub const FAR: f64 = 1e6;
+
+/// A surface, the zeros of a function, and the way in which it is to be crossed.
+#[derive(Clone, Debug)]
+pub struct Section {
+    pub function: Expression,
+    /// Whether crossings count where the function rises, and where it falls.
+    pub rising: bool,
+    pub falling: bool,
+}
+
+/// How a job of collecting crossings ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ended {
+    /// With as many as were wanted.
+    Finished,
+    /// On the wall: the disk left the wheels.
+    Ejected,
+    /// At the last time allowed.
+    TimeRanOut,
+    Failed(Failure),
+    /// Stopped from outside.
+    Interrupted,
+    /// Far away from where anything happens.
+    Escaped,
+}
+
+/// The crossings of one trajectory.
+#[derive(Clone, Debug)]
+pub struct Crossings<const D: usize> {
+    /// In the order of time: when, where, and of which surface.
+    pub t: Vec<f64>,
+    pub x: Vec<[f64; D]>,
+    pub which: Vec<u8>,
+    /// The largest absolute value of the surfaces' functions at these points.
+    pub residual: f64,
+    /// When and where the trajectory ended: on the last crossing wanted, or where it went out.
+    pub end: (f64, [f64; D]),
+    pub ended: Ended,
+}
+
+impl<const D: usize> Crossings<D> {
+    fn new(capacity: usize) -> Self {
+        Self {
+            t: Vec::with_capacity(capacity),
+            x: Vec::with_capacity(capacity),
+            which: Vec::with_capacity(capacity),
+            residual: 0.0,
+            end: (0.0, [0.0; D]),
+            ended: Ended::Finished,
+        }
+    }
+
+    fn push(&mut self, crossed: &Crossed<D>) {
+        self.t.push(crossed.t);
+        self.x.push(crossed.x);
+        self.which.push(crossed.which);
+        self.residual = self.residual.max(crossed.residual.abs());
+    }
+}
+
+/// Collects crossings along many trajectories of one model.
+#[derive(Clone, Copy, Debug)]
+pub struct Sections<'a, F, const D: usize> {
+    pub family: &'a F,
+    /// The parameters' values, one row for each trajectory, or a single row for all.
+    pub values: &'a [Vec<f64>],
+    /// The initial states, at time 0, one for each trajectory, or a single one for all.
+    pub starts: &'a [[f64; D]],
+    /// The surfaces.
+    pub sections: &'a [Section],
+    /// How many crossings are left out, and how many, at least one, are wanted after them.
+    pub skip: usize,
+    pub count: usize,
+    /// The last time.
+    pub end: f64,
+    /// Which components of the state are bounded: unlike angles, they [escape](FAR).
+    pub bounded: [bool; D],
+    pub tolerance: Tolerance,
+}
+
+impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
+    /// Collects them all. `None` stands for trajectories that were not begun when the work was stopped.
+    pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Crossings<D>>> {
+        let jobs = self.values.len().max(self.starts.len());
+        match Tape::record(self.family, &known(self.values)) {
+            Ok(tape) => sail(&Collect { sections: self, recipe: ByTaylor(&tape) }, jobs, crew),
+            // A law that no series follows.
+            Err(_) => sail(&Collect { sections: self, recipe: ByDopri5 }, jobs, crew),
+        }
+    }
+
+    fn start<R: Real>(&self, job: usize) -> Start<'_, R, D> {
+        let x = self.starts[job.min(self.starts.len() - 1)];
+        Start {
+            values: &self.values[job.min(self.values.len() - 1)],
+            t: 0.0,
+            x: x.map(R::constant),
+            end: self.end,
+        }
+    }
+}
+
+struct Collect<'a, F, const D: usize, T> {
+    sections: &'a Sections<'a, F, D>,
+    recipe: T,
+}
+
+impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> {
+    type Yield = Crossings<D>;
+
+    const PACKETS: bool = F::PACKETS && T::PACKETS;
+
+    #[inline(always)]
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Crossings<D>)>) {
+        let Sections { family, sections, skip, count, bounded, tolerance, .. } = *self.sections;
+        let Some(first) = queue.take() else { return };
+        let start = |job| self.sections.start::<R>(job);
+        let mut ship = Ship::new(family, |values| self.recipe.make(values), start(first), &tolerance);
+        let mut scan: Scan<'_, R, D> = Scan::new(sections);
+        // What each lane has found, and how many it still leaves out.
+        let mut catches: Vec<(Crossings<D>, usize)> = vec![(Crossings::new(0), skip); R::LANES];
+        for lane in 0..R::LANES {
+            let job = if lane == 0 { Some(first) } else { queue.take() };
+            if let Some(job) = job {
+                ship.load(lane, job, start(job));
+                catches[lane] = (Crossings::new(count), skip);
+            }
+        }
+        scan.begin(&ship, R::mask(true));
+        while !ship.is_empty() {
+            let progress = ship.trial();
+            let stopped = queue.stopped();
+            let mut full = R::mask(false);
+            if scan.look(&ship, progress.moved) {
+                full = R::Mask::from_lanes(|lane| {
+                    let (found, skip) = &mut catches[lane];
+                    for crossed in scan.crossed(lane) {
+                        if *skip > 0 {
+                            *skip -= 1;
+                        } else if found.t.len() < count {
+                            found.push(crossed);
+                        }
+                    }
+                    ship.job(lane).is_some() && found.t.len() == count
+                });
+            }
+            let mut far = R::mask(false);
+            for (x, _) in ship.driver.x().iter().zip(bounded).filter(|(_, bounded)| *bounded) {
+                far = far.or(R::constant(FAR).less(x.abs()));
+            }
+            let walled = progress.walled();
+            let over = full.or(ship.arrived()).or(walled).or(progress.failed).or(far);
+            if !(over.any() || stopped) {
+                continue;
+            }
+            let mut fresh = false;
+            for lane in (0..R::LANES).filter(|&lane| stopped || over.lane(lane)) {
+                let ended = match () {
+                    () if full.lane(lane) => Ended::Finished,
+                    () if progress.failed.lane(lane) => Ended::Failed(ship.driver.failure_of(lane)),
+                    () if walled.lane(lane) => Ended::Ejected,
+                    () if far.lane(lane) => Ended::Escaped,
+                    () if over.lane(lane) => Ended::TimeRanOut,
+                    () => Ended::Interrupted,
+                };
+                let Some(job) = ship.unload(lane) else { continue };
+                let (mut found, _) = std::mem::replace(&mut catches[lane], (Crossings::new(0), 0));
+                found.ended = ended;
+                found.end = match ended {
+                    Ended::Finished => (found.t[count - 1], found.x[count - 1]),
+                    _ => (ship.driver.t().lane(lane), ship.driver.x().map(|x| x.lane(lane))),
+                };
+                yields.push((job, found));
+                queue.finish();
+                let next = if stopped { None } else { queue.take() };
+                if let Some(job) = next {
+                    ship.load(lane, job, start(job));
+                    catches[lane] = (Crossings::new(count), skip);
+                    fresh = true;
+                }
+            }
+            if fresh {
+                scan.begin(&ship, over);
+            }
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! From a formula's text to its operations.
+//!
+//! ```text
+//! equation = sum ["=" sum]
+//! sum      = product {("+" | "-") product}
+//! product  = signed {("*" | "/") signed}
+//! signed   = ("-" | "+") signed | power
+//! power    = atom [("^" | "**") signed]
+//! atom     = number | name ["'"] | function "(" sum ")" | "(" sum ")"
+//! ```
+
+use super::expression::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Unary};
+
+const FUNCTIONS: [(&str, Unary); 7] = [
+    ("sqrt", Unary::Sqrt),
+    ("exp", Unary::Exp),
+    ("ln", Unary::Ln),
+    ("sin", Unary::Sin),
+    ("cos", Unary::Cos),
+    ("tanh", Unary::Tanh),
+    ("abs", Unary::Abs),
+];
+
+type Parsed = Result<Vec<Op>, Mistake>;
+
+fn mistake<T>(what: impl Into<String>) -> Result<T, Mistake> {
+    Err(Mistake(what.into()))
+}
+
+/// The operations of a formula.
+pub(super) fn parse(text: &str, names: Names<'_>) -> Parsed {
+    let length = text.chars().count();
+    if length > LONGEST {
+        return mistake(format!("is longer than {LONGEST} characters, {length}"));
+    }
+    let tokens = tokens(text)?;
+    if tokens.is_empty() {
+        return mistake("is empty");
+    }
+    let mut parser = Parser { tokens: &tokens, at: 0, depth: 0, names };
+    let mut ops = parser.sum()?;
+    if parser.takes("=") {
+        let right = parser.sum()?;
+        // What is zero already needs no difference.
+        if number(&right) != Some(0.0) {
+            ops = binary(Binary::Sub, ops, right);
+        }
+    }
+    match parser.peek() {
+        None => Ok(ops),
+        Some(Token::Sign("=")) => mistake("has more than one ="),
+        Some(token) => mistake(format!("has {} where an operator is needed", token.shown())),
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Token<'a> {
+    Number(f64),
+    Name(&'a str),
+    Sign(&'static str),
+}
+
+impl Token<'_> {
+    fn shown(&self) -> String {
+        match self {
+            Token::Number(value) => value.to_string(),
+            Token::Name(name) => (*name).to_owned(),
+            Token::Sign(sign) => (*sign).to_owned(),
+        }
+    }
+}
+
+const SIGNS: [&str; 10] = ["**", "+", "-", "*", "/", "^", "(", ")", "=", "'"];
+
+fn tokens(text: &str) -> Result<Vec<Token<'_>>, Mistake> {
+    let mut list = Vec::new();
+    let mut rest = text.trim_start();
+    while let Some(first) = rest.chars().next() {
+        let length = if first.is_ascii_digit() || first == '.' {
+            let length = digits(rest);
+            match rest[..length].parse::<f64>() {
+                Ok(value) if value.is_finite() => list.push(Token::Number(value)),
+                _ => return mistake(format!("has {}, which is no number", &rest[..length])),
+            }
+            length
+        } else if first.is_alphabetic() || first == '_' {
+            let inside = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
+            let length = rest.find(|c| !inside(c)).unwrap_or(rest.len());
+            list.push(Token::Name(&rest[..length]));
+            length
+        } else if let Some(sign) = SIGNS.iter().find(|sign| rest.starts_with(**sign)) {
+            list.push(Token::Sign(sign));
+            sign.len()
+        } else {
+            return mistake(format!("has the character {first:?}, which means nothing in a formula"));
+        };
+        rest = rest[length..].trim_start();
+    }
+    Ok(list)
+}
+
+/// How long the number is that the text begins with.
+fn digits(text: &str) -> usize {
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    let skip = |mut at: usize| {
+        while bytes.get(at).is_some_and(|c| c.is_ascii_digit() || *c == b'.') {
+            at += 1;
+        }
+        at
+    };
+    at = skip(at);
+    if matches!(bytes.get(at), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(at + 1), Some(b'+' | b'-')));
+        if bytes.get(at + 1 + sign).is_some_and(u8::is_ascii_digit) {
+            at = skip(at + 1 + sign);
+        }
+    }
+    at
+}
+
+struct Parser<'a> {
+    tokens: &'a [Token<'a>],
+    at: usize,
+    depth: usize,
+    names: Names<'a>,
+}
+
+impl Parser<'_> {
+    fn peek(&self) -> Option<&Token<'_>> {
+        self.tokens.get(self.at)
+    }
+
+    fn takes(&mut self, sign: &'static str) -> bool {
+        let taken = self.tokens.get(self.at) == Some(&Token::Sign(sign));
+        self.at += usize::from(taken);
+        taken
+    }
+
+    fn deeper(&mut self) -> Result<(), Mistake> {
+        self.depth += 1;
+        if self.depth > DEEPEST { mistake(format!("is nested deeper than {DEEPEST}")) } else { Ok(()) }
+    }
+
+    fn sum(&mut self) -> Parsed {
+        let mut left = self.product()?;
+        loop {
+            let function = match () {
+                () if self.takes("+") => Binary::Add,
+                () if self.takes("-") => Binary::Sub,
+                () => return Ok(left),
+            };
+            left = binary(function, left, self.product()?);
+        }
+    }
+
+    fn product(&mut self) -> Parsed {
+        let mut left = self.signed()?;
+        loop {
+            let function = match () {
+                () if self.takes("*") => Binary::Mul,
+                () if self.takes("/") => Binary::Div,
+                () => return Ok(left),
+            };
+            left = binary(function, left, self.signed()?);
+        }
+    }
+
+    fn signed(&mut self) -> Parsed {
+        self.deeper()?;
+        let parsed = if self.takes("-") {
+            unary(Unary::Neg, self.signed()?)
+        } else if self.takes("+") {
+            self.signed()?
+        } else {
+            self.power()?
+        };
+        self.depth -= 1;
+        Ok(parsed)
+    }
+
+    fn power(&mut self) -> Parsed {
+        let base = self.atom()?;
+        if !self.takes("^") && !self.takes("**") {
+            return Ok(base);
+        }
+        let exponent = self.signed()?;
+        match number(&exponent) {
+            Some(whole) if whole == whole.trunc() => {
+                if whole.abs() > f64::from(HIGHEST) {
+                    return mistake(format!("has a whole exponent beyond {HIGHEST}"));
+                }
+                Ok(unary(Unary::Power(whole as i32), base))
+            }
+            Some(0.5) => Ok(unary(Unary::Sqrt, base)),
+            _ => Ok(binary(Binary::Power, base, exponent)),
+        }
+    }
+
+    fn atom(&mut self) -> Parsed {
+        let Some(token) = self.tokens.get(self.at) else {
+            return mistake("ends where a number or a name is needed");
+        };
+        self.at += 1;
+        match *token {
+            Token::Number(value) => Ok(vec![Op::Push(Leaf::Number(value))]),
+            Token::Sign("(") => {
+                let inner = self.sum()?;
+                self.close()?;
+                Ok(inner)
+            }
+            Token::Sign(sign) => mistake(format!("has {sign} where a number or a name is needed")),
+            Token::Name(name) => self.name(name),
+        }
+    }
+
+    fn close(&mut self) -> Result<(), Mistake> {
+        if self.takes(")") { Ok(()) } else { mistake("lacks a closing bracket") }
+    }
+
+    fn name(&mut self, name: &str) -> Parsed {
+        let find = |list: &[String]| list.iter().position(|own| own == name);
+        let leaf = if let Some(n) = find(self.names.states) {
+            if self.takes("'") { Leaf::Rate(n) } else { Leaf::State(n) }
+        } else if let Some(i) = find(self.names.parameters) {
+            Leaf::Parameter(i)
+        } else if name == "t" {
+            Leaf::Time
+        } else if name == "pi" {
+            Leaf::Number(std::f64::consts::PI)
+        } else if let Some(&(_, function)) = FUNCTIONS.iter().find(|(own, _)| *own == name) {
+            if !self.takes("(") {
+                return mistake(format!("needs a bracket after {name}, as in {name}(x)"));
+            }
+            let argument = self.sum()?;
+            self.close()?;
+            return Ok(unary(function, argument));
+        } else {
+            return mistake(format!("has the unknown name {name}; {}", allowed(self.names)));
+        };
+        if self.peek() == Some(&Token::Sign("'")) {
+            return mistake(format!("has {name}', but only the state's components have rates"));
+        }
+        Ok(vec![Op::Push(leaf)])
+    }
+}
+
+/// What a formula may use.
+fn allowed(names: Names<'_>) -> String {
+    let rates: Vec<String> = names.states.iter().map(|name| format!("{name}'")).collect();
+    let functions = FUNCTIONS.map(|(name, _)| name).join(", ");
+    let parameters = match names.parameters {
+        [] => String::new(),
+        list => format!(", the parameters {}", list.join(", ")),
+    };
+    format!(
+        "allowed are the state {}, its rates {}, the time t{parameters}, numbers, pi and {functions}",
+        names.states.join(", "),
+        rates.join(", ")
+    )
+}
+
+fn number(ops: &[Op]) -> Option<f64> {
+    match ops {
+        [Op::Push(Leaf::Number(value))] => Some(*value),
+        _ => None,
+    }
+}
+
+/// What is known already is computed at once.
+fn unary(function: Unary, mut ops: Vec<Op>) -> Vec<Op> {
+    if let Some(a) = number(&ops) {
+        return vec![Op::Push(Leaf::Number(function.of(a)))];
+    }
+    if function != Unary::Power(1) {
+        ops.push(Op::Unary(function));
+    }
+    ops
+}
+
+fn binary(function: Binary, mut left: Vec<Op>, right: Vec<Op>) -> Vec<Op> {
+    if let (Some(a), Some(b)) = (number(&left), number(&right)) {
+        return vec![Op::Push(Leaf::Number(function.of(a, b)))];
+    }
+    left.extend(right);
+    left.push(Op::Binary(function));
+    left
+}
