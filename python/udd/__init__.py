@@ -23,6 +23,8 @@ _PUBLIC = {
     "SweepSpec": "udd.sweeping",
     "Trajectory": "udd.trajectory",
     "UddError": "udd.errors",
+    "basins": "udd.branching",
+    "bifurcation": "udd.branching",
     "discover": "udd.discovery",
     "effects": "udd.effects",
     "errors": "udd.errors",
@@ -42,6 +44,8 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd import effects as effects
     from udd import errors as errors
     from udd import plot as plot
+    from udd.branching.diagram import bifurcation as bifurcation
+    from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
     from udd.errors import ConvergenceWarning as ConvergenceWarning

@@ -9,10 +9,13 @@ from __future__ import annotations
 from .evidence import errors, evidence
 from .fits import misfit, residuals
 from .friction import friction
+from .maps import basins, bifurcation
 from .motion import orbit, phase_space, time_series
 from .picture import overlay
 
 __all__ = [
+    "basins",
+    "bifurcation",
     "errors",
     "evidence",
     "friction",

@@ -1,0 +1,95 @@
+"""Checks of what is asked of a diagram or of basins."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd._validate import array, number
+from udd.crew import thread_count
+from udd.errors import ModelError
+from udd.exponents import default_start
+from udd.models import Model
+from udd.trajectory import initial_state, tolerances
+
+from .coordinates import Floats, coordinates_of
+from .crossings import Runner
+
+_SECTIONS = {"dle": "z", "disk": "Z", "pendulum": "theta"}
+
+
+def whole(name: str, value: Any, least: int) -> int:
+    """A whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ModelError(f"{name} must be a whole number of at least {least}, not {value!r}")
+    return int(value)
+
+
+def runner_of(
+    model: Model,
+    section: str | None,
+    direction: int,
+    rtol: float,
+    atol: float,
+    threads: int | None,
+    t_max: float | None,
+    each: int,
+) -> Runner:
+    """The checked way to run the model from section to section; `each` is the number of points of a job."""
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    if section is None:
+        section = _SECTIONS[model.kind]
+    if not isinstance(section, str):
+        raise ModelError(f"section must be an expression such as 'z', not {section!r}")
+    if direction not in (1, -1, 0):
+        raise ModelError(f"direction must be 1, -1 or 0 (both), not {direction!r}")
+    rtol, atol = tolerances(rtol, atol)
+    if t_max is None:
+        clock = coordinates_of(model, np.ones((1, len(model.state_names)))).clock
+        t_each = 100.0 * clock
+    else:
+        t_each = number("t_max", t_max, above=0.0) / each
+    return Runner(model, (section,), (direction,), rtol, atol, thread_count(threads), t_each)
+
+
+def start_states(model: Model, starts: ArrayLike | None) -> Floats:
+    """The initial states (n, dim)."""
+    if starts is None:
+        return initial_state(model, default_start(model))[None]
+    given = np.atleast_2d(array("starts", starts))
+    if given.ndim != 2 or not len(given):
+        raise ModelError("starts must be a list of initial states")
+    return np.stack([initial_state(model, state) for state in given])
+
+
+def parameter_values(model: Model, parameter: str, values: ArrayLike) -> Floats:
+    """The values of the parameter along a diagram."""
+    if parameter not in model.parameters:
+        raise ModelError(
+            f"{type(model).__name__} has no parameter {parameter!r}; it has {', '.join(model.parameters)}"
+        )
+    axis = increasing(parameter, values)
+    for value in (float(axis[0]), float(axis[-1])):
+        model.replace(**{parameter: value})
+    return axis
+
+
+def increasing(name: str, values: ArrayLike) -> Floats:
+    """A list of increasing numbers."""
+    axis = array(f"the values of {name}", values)
+    if axis.ndim != 1 or not len(axis):
+        raise ModelError(f"the values of {name} must be a list of at least one number")
+    if not (np.diff(axis) > 0).all():
+        raise ModelError(f"the values of {name} must increase, without duplicates")
+    return axis
+
+
+def parameter_rows(model: Model, changes: dict[str, Floats], jobs: int) -> NDArray[np.float64]:
+    """The parameters of each job, shape (jobs, parameters)."""
+    rows = np.tile(np.array(list(model.parameters.values())), (jobs, 1))
+    for name, values in changes.items():
+        rows[:, list(model.parameters).index(name)] = values
+    return rows

@@ -1,0 +1,102 @@
+"""Labels for the attractors of a diagram."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .attractors import Attractor
+from .branches import Tracks, groups, partners
+from .coordinates import Floats
+from .crossings import Crossings
+from .recurrence import APERIODIC
+from .verdicts import Judge, Verdicts, decided
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What is known of each job and of each value.
+
+    Attributes
+    ----------
+    label : ndarray of int (jobs,)
+        From 1 on; 0 where there is no attractor.
+    symmetric : ndarray of int (jobs,)
+        1 own mirror image, 0 not, -1 no symmetry or no attractor.
+    duration : ndarray (jobs,)
+        Of a period.
+    differ : ndarray of bool (values,)
+        Whether the ways up and down end on different attractors, mirror images being the same.
+    """
+
+    label: NDArray[np.int32]
+    symmetric: NDArray[np.int8]
+    duration: Floats
+    differ: NDArray[np.bool_]
+
+
+def tell(
+    judge: Judge,
+    found: Crossings,
+    verdicts: Verdicts,
+    places: NDArray[np.intp],
+    reach: float,
+) -> Told:
+    """Tell the attractors apart, value by value; `places` (paths, starts, values) numbers the jobs."""
+    jobs = places.size
+    told = Told(
+        np.zeros(jobs, dtype=np.int32),
+        np.full(jobs, -1, dtype=np.int8),
+        np.full(jobs, np.nan),
+        np.zeros(places.shape[2], dtype=bool),
+    )
+    known = decided(found, verdicts)
+    tracks = Tracks(reach)
+    for k in range(places.shape[2]):
+        here = [job for job in places[:, :, k].ravel().tolist() if known[job]]
+        seen = [judge.attractor(found, verdicts, job) for job in here]
+        first = groups(seen, judge.tight)
+        distinct = sorted(set(first))
+        labels = dict(zip(distinct, tracks.label([seen[j] for j in distinct]), strict=True))
+        for job, attractor, j in zip(here, seen, first, strict=True):
+            told.label[job] = labels[j]
+            told.duration[job] = attractor.duration
+        family = _families(judge, seen, distinct, told, here, first)
+        if places.shape[0] == 2:
+            of_job = {job: family[j] for job, j in zip(here, first, strict=True)}
+            pairs = places[:, :, k].T.tolist()
+            told.differ[k] = any(
+                up in of_job and down in of_job and of_job[up] != of_job[down] for up, down in pairs
+            )
+    return told
+
+
+def _families(
+    judge: Judge,
+    seen: list[Attractor],
+    distinct: list[int],
+    told: Told,
+    here: list[int],
+    first: list[int],
+) -> dict[int, int]:
+    """To each distinct attractor the first of it and its mirror images; notes which are their own."""
+    family: dict[int, int] = {}
+    if not judge.coordinates.mirrors:
+        return {j: j for j in distinct}
+    some = [seen[j] for j in distinct]
+    own = {}
+    for place, j in enumerate(distinct):
+        images = partners(some, place, judge.coordinates, judge.tight)
+        own[j] = place in images
+        family[j] = min(family.get(distinct[i], distinct[i]) for i in (place, *images))
+    for job, j in zip(here, first, strict=True):
+        told.symmetric[job] = own[j]
+    return family
+
+
+def aperiodic(found: Crossings, verdicts: Verdicts) -> NDArray[np.bool_]:
+    """Which jobs have ended on an aperiodic motion, as far as can be seen."""
+    some: NDArray[np.bool_] = decided(found, verdicts) & (verdicts.period == APERIODIC) & ~verdicts.rest
+    return some

@@ -1,0 +1,125 @@
+"""`udd basins`: which initial states end where."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import IncompleteWarning, UddError
+
+from .answer import Answer, watched
+from .chosen import add_models, add_runs, axis_of, model_of, runs_of, starts_of
+from .options import new
+from .saving import add_out, checked, save
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Basins of attraction: which initial states end on which attractor."
+    parser = new(commands, "basins", run, summary)
+    parser.add_argument(
+        "grid",
+        nargs="+",
+        metavar="NAME=FIRST:LAST:N",
+        help="one to three components of the state with their values at the start, such as omega=-3:3:100",
+    )
+    add_runs(parser, 100)
+    add_out(parser)
+    add_models(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it; on Ctrl-C what is finished is kept."""
+    from udd.branching import basins
+    from udd.plot import basins as draw
+
+    checked(args.out)
+    grid = dict(_component(text) for text in args.grid)
+    if len(grid) < len(args.grid):
+        raise UddError("a component of the grid is given twice")
+    starts = starts_of(args)
+    if starts is not None and len(starts) != 1:
+        raise UddError("basins take one --state, for the components that are not on the grid")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", UserWarning)
+        found = basins(
+            model_of(args, {}),
+            grid,
+            state0=None if starts is None else starts[0],
+            progress=watched(),
+            **runs_of(args),
+        )
+    for warning in said:
+        warnings.warn(warning.message, stacklevel=2)
+    save(args.out, found, lambda ax: draw(found, ax))
+    stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
+    data = {**summary_of(found), "complete": not stopped, "files": args.out}
+    return Answer(_text(data), data, 130 if stopped else 0)
+
+
+def _component(text: str) -> tuple[str, Any]:
+    name, equals, span = text.partition("=")
+    parts = span.split(":")
+    try:
+        if not equals or len(parts) != 3:
+            raise ValueError
+        first, last, n = float(parts[0]), float(parts[1]), int(parts[2])
+    except ValueError:
+        raise UddError(f"a component of the grid is given as NAME=FIRST:LAST:N, not {text}") from None
+    return name, axis_of(first, last, n)
+
+
+def summary_of(found: xr.Dataset) -> dict[str, Any]:
+    """The basins without the grid: the attractors, the fractions, the exponent."""
+    kinds = str(found["kind"].attrs["flag_meanings"]).split()
+    table = [
+        {
+            "number": int(one["number"]),
+            "kind": kinds[int(one["kind"])],
+            "period": int(one["period"]),
+            "period_time": float(one["period_time"]),
+            "mirror": int(one["mirror"]),
+        }
+        for one in (found.sel(number=k) for k in found["number"].to_numpy())
+    ]
+    fractions = [
+        {"ending": str(ending), "fraction": float(share), "standard_error": float(error)}
+        for ending, share, error in zip(
+            found["ending"].to_numpy(),
+            found["fraction"].to_numpy(),
+            found["fraction_error"].to_numpy(),
+            strict=True,
+        )
+    ]
+    exponent = {
+        "value": float(found["uncertainty_exponent"]),
+        "standard_error": float(found["uncertainty_exponent_error"]),
+    }
+    return {
+        "model": found.attrs["model"],
+        "grid": {name: found.sizes[name] for name in found.attrs["grid"].split()},
+        "attractors": table,
+        "fractions": fractions,
+        "uncertainty_exponent": exponent,
+    }
+
+
+def _text(data: dict[str, Any]) -> str:
+    size = " x ".join(f"{n} {name}" for name, n in data["grid"].items())
+    lines = [f"{data['model']}, {size}"]
+    for k, end in enumerate(data["fractions"]):
+        what = end["ending"]
+        if k < len(data["attractors"]):
+            one = data["attractors"][k]
+            what += f", {one['kind']}"
+            what += f" {one['period']}, T = {one['period_time']:.8g}" if one["kind"] == "periodic" else ""
+            what += f", mirror image of {one['mirror']}" if one["mirror"] not in (0, one["number"]) else ""
+        lines.append(f"  {100 * end['fraction']:.4g} +- {100 * end['standard_error']:.2g} %: {what}")
+    exponent = data["uncertainty_exponent"]
+    if exponent["value"] == exponent["value"]:
+        lines.append(f"  uncertainty exponent {exponent['value']:.3g} +- {exponent['standard_error']:.2g}")
+    return "\n".join(lines + [f"written: {path}" for path in data["files"]])

@@ -1,0 +1,123 @@
+"""`udd bifurcation`: section points over a parameter."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import IncompleteWarning
+
+from .answer import Answer, watched
+from .chosen import add_models, add_runs, axis_of, model_of, runs_of, starts_of
+from .options import new
+from .saving import add_out, checked, save
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_MANY = 12  # stretches that are worth a line each
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Bifurcation diagram: where motions cross a section, over a parameter, and on which attractor."
+    parser = new(commands, "bifurcation", run, summary)
+    parser.add_argument("parameter", help="what is varied, such as w, W or relaxation.b")
+    parser.add_argument("--from", dest="first", type=float, required=True, help="first value")
+    parser.add_argument("--to", dest="last", type=float, required=True, help="last value")
+    parser.add_argument("--n", type=int, default=200, help="how many values (default 200)")
+    parser.add_argument(
+        "--path",
+        choices=("independent", "up", "down", "both"),
+        default="independent",
+        help="whether the state is carried from value to value (default independent)",
+    )
+    add_runs(parser, 200)
+    parser.add_argument(
+        "--component", help="component of the state in the picture (default: one that varies)"
+    )
+    add_out(parser)
+    add_models(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it; on Ctrl-C what is finished is kept."""
+    from udd.branching import bifurcation
+    from udd.plot import bifurcation as draw
+
+    checked(args.out)
+    values = axis_of(args.first, args.last, args.n)
+    model = model_of(args, {args.parameter: float(values[0])})
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", UserWarning)
+        found = bifurcation(
+            model,
+            args.parameter,
+            values,
+            starts=starts_of(args),
+            path=args.path,
+            progress=watched(),
+            **runs_of(args),
+        )
+    for warning in said:
+        warnings.warn(warning.message, stacklevel=2)
+    save(args.out, found, lambda ax: draw(found, ax, component=args.component))
+    stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
+    data = {**summary_of(found), "complete": not stopped, "files": args.out}
+    return Answer(_text(found, data), data, 130 if stopped else 0)
+
+
+def summary_of(found: xr.Dataset) -> dict[str, Any]:
+    """The diagram without its points: outcomes, stretches of one period on one attractor, hysteresis."""
+    parameter = found.attrs["parameter"]
+    outcomes = found["outcome"]
+    names = str(outcomes.attrs["flag_meanings"]).split()
+    counts = {name: int((outcomes == k).sum()) for k, name in enumerate(names)}
+    stretches = []
+    for path in found["path"].to_numpy():
+        for start in found["start"].to_numpy():
+            one = found.sel(path=path, start=start)
+            stretches += [{"path": str(path), "start": int(start), **s} for s in _stretches(one, parameter)]
+    intervals = found["hysteresis_interval"].to_numpy().tolist() if "hysteresis_interval" in found else None
+    return {
+        "model": found.attrs["model"],
+        "parameter": parameter,
+        "shape": dict(
+            zip(("path", "start", "value", "point"), (*outcomes.shape, found.sizes["point"]), strict=True)
+        ),
+        "outcomes": {name: count for name, count in counts.items() if count},
+        "attractors": int(found["attractor"].max()),
+        "stretches": stretches,
+        "hysteresis": intervals,
+    }
+
+
+def _stretches(one: xr.Dataset, parameter: str) -> list[dict[str, Any]]:
+    """Neighbouring values with the same period and attractor."""
+    rows: list[dict[str, Any]] = []
+    columns = (one[name].to_numpy().tolist() for name in (parameter, "period", "attractor", "symmetric"))
+    for value, period, attractor, symmetric in zip(*columns, strict=True):
+        now = {"period": period, "attractor": attractor, "symmetric": symmetric}
+        if rows and all(rows[-1][key] == what for key, what in now.items()):
+            rows[-1]["last"] = value
+        else:
+            rows.append({"first": value, "last": value, **now})
+    return rows
+
+
+def _text(found: xr.Dataset, data: dict[str, Any]) -> str:
+    name, shape = data["parameter"], data["shape"]
+    ends = ", ".join(f"{count} {end.replace('_', ' ')}" for end, count in data["outcomes"].items())
+    lines = [
+        f"{data['model']}, {shape['value']} values of {name}: {ends}; {data['attractors']} attractors",
+    ]
+    if len(data["stretches"]) <= _MANY:
+        for s in data["stretches"]:
+            period = {0: "aperiodic", -1: "undecided"}.get(s["period"], f"period {s['period']}")
+            on = f", attractor {s['attractor']}" if s["attractor"] else ""
+            way = f"{s['path']}: " if shape["path"] > 1 else ""
+            lines.append(f"  {way}{name} = {s['first']:.6g} to {s['last']:.6g}: {period}{on}")
+    for first, last in data["hysteresis"] or []:
+        lines.append(f"  hysteresis: {name} = {first:.6g} to {last:.6g}")
+    return "\n".join(lines + [f"written: {path}" for path in data["files"]])

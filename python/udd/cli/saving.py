@@ -1,0 +1,75 @@
+"""A labelled result as files: NetCDF, Zarr, or a picture."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from udd.errors import UddError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+_DATA = (".nc", ".zarr")
+_PICTURES = (".png", ".svg", ".pdf")
+
+
+def add_out(parser: argparse.ArgumentParser) -> None:
+    """Where to write."""
+    kinds = ", ".join((*_DATA, *_PICTURES))
+    parser.add_argument(
+        "--out",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help=f"file to write, by its ending: {kinds}; repeatable",
+    )
+
+
+def checked(paths: list[Path]) -> None:
+    """Refuse what cannot be written, before the work."""
+    for path in paths:
+        if path.suffix not in (*_DATA, *_PICTURES):
+            raise UddError(f"{path}: the name must end in {', '.join((*_DATA, *_PICTURES))}")
+        if not path.parent.is_dir():
+            raise UddError(f"{path}: there is no folder {path.parent}")
+        if path.suffix == ".zarr" and path.exists():
+            raise UddError(f"{path} exists already: Zarr needs a new folder")
+
+
+def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -> None:
+    """Write what is asked for; a file is there whole or not at all."""
+    from udd.files import write_whole
+
+    for path in paths:
+        if path.suffix == ".nc":
+            write_whole(path, bytes(found.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+        elif path.suffix == ".zarr":
+            _zarr(path, found)
+        else:
+            from matplotlib.figure import Figure
+
+            figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+            draw(figure.add_subplot())
+            picture = BytesIO()
+            figure.savefig(picture, format=path.suffix[1:], dpi=150)
+            write_whole(path, picture.getvalue())
+
+
+def _zarr(path: Path, found: xr.Dataset) -> None:
+    folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+    try:
+        found.to_zarr(folder / "made", zarr_format=3, consolidated=False)
+        os.replace(folder / "made", path)
+    except OSError as error:
+        raise UddError(f"{path} cannot be written: {error.strerror or error}") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
