@@ -12,12 +12,11 @@ from udd.crew import thread_count
 from udd.errors import ModelError
 from udd.exponents import default_start
 from udd.models import Model
+from udd.sections import _CLOCKS, _clock, _surfaces
 from udd.trajectory import initial_state, tolerances
 
-from .coordinates import Floats, coordinates_of
+from .coordinates import Floats
 from .crossings import Runner
-
-_SECTIONS = {"dle": "z", "disk": "Z", "pendulum": "theta"}
 
 
 def whole(name: str, value: Any, least: int) -> int:
@@ -29,36 +28,37 @@ def whole(name: str, value: Any, least: int) -> int:
 
 def runner_of(
     model: Model,
+    rows: Floats,
     section: str | None,
-    direction: int,
+    direction: str | None,
     rtol: float,
     atol: float,
     threads: int | None,
     t_max: float | None,
     each: int,
 ) -> Runner:
-    """The checked way to run the model from section to section; `each` is the number of points of a job."""
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
-    if section is None:
-        section = _SECTIONS[model.kind]
-    if not isinstance(section, str):
-        raise ModelError(f"section must be an expression such as 'z', not {section!r}")
-    if direction not in (1, -1, 0):
-        raise ModelError(f"direction must be 1, -1 or 0 (both), not {direction!r}")
+    """The checked way to run the model from section to section.
+
+    `rows` are the parameters of the jobs, `each` is the number of points of one.
+    """
+    if not isinstance(section, str | None):
+        raise ModelError(f"section must be one expression such as 'z', not {section!r}")
+    surfaces, ways = _surfaces(model, section, direction)
     rtol, atol = tolerances(rtol, atol)
-    if t_max is None:
-        clock = coordinates_of(model, np.ones((1, len(model.state_names)))).clock
-        t_each = 100.0 * clock
-    else:
-        t_each = number("t_max", t_max, above=0.0) / each
-    return Runner(model, (section,), (direction,), rtol, atol, thread_count(threads), t_each)
+    mean = None if t_max is None else number("t_max", t_max, above=0.0) / each
+    t_each = _CLOCKS * _clock(model, rows) if mean is None else mean
+    return Runner(model, surfaces, ways, rtol, atol, thread_count(threads), t_each)
 
 
 def start_states(model: Model, starts: ArrayLike | None) -> Floats:
     """The initial states (n, dim)."""
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
     if starts is None:
-        return initial_state(model, default_start(model))[None]
+        start = np.zeros(len(model.state_names))  # bristles are at rest
+        own = default_start(model)
+        start[: len(own)] = own
+        return start[None]
     given = np.atleast_2d(array("starts", starts))
     if given.ndim != 2 or not len(given):
         raise ModelError("starts must be a list of initial states")
@@ -67,6 +67,8 @@ def start_states(model: Model, starts: ArrayLike | None) -> Floats:
 
 def parameter_values(model: Model, parameter: str, values: ArrayLike) -> Floats:
     """The values of the parameter along a diagram."""
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
     if parameter not in model.parameters:
         raise ModelError(
             f"{type(model).__name__} has no parameter {parameter!r}; it has {', '.join(model.parameters)}"

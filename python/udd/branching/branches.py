@@ -55,7 +55,14 @@ class Tracks:
         return labels
 
 
-def intervals(where: NDArray[np.bool_], values: Floats) -> Floats:
-    """The first and the last value of every stretch of neighbouring values, shape (stretches, 2)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(np.int8)))
-    return np.stack([values[edges[::2]], values[edges[1::2] - 1]], axis=1).reshape(-1, 2)
+def intervals(where: NDArray[np.bool_], unknown: NDArray[np.bool_], values: Floats) -> Floats:
+    """The first and last value of every stretch, shape (stretches, 2); what is unknown does not end one."""
+    result: list[list[float]] = []
+    open_ = False
+    for value, here, gap in zip(values.tolist(), where.tolist(), unknown.tolist(), strict=True):
+        if here and open_:
+            result[-1][1] = value
+        elif here:
+            result.append([value, value])
+        open_ = here or (open_ and gap)
+    return np.array(result).reshape(-1, 2)

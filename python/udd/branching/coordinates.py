@@ -80,10 +80,10 @@ def _sizes(model: Model) -> tuple[dict[str, float], float]:
         return dict.fromkeys(("omega", "y", "z"), size), 4.0 / size
     if model.kind == "disk":
         swing = math.sqrt(p["g"] / p["R"]) or 1.0
-        return {"Omega": swing, "Y": p["R"], "Z": p["R"], "beta": 1.0}, 1.0 / swing
+        return {"Omega": swing, "Y": p["R"], "Z": p["R"], "beta": 1.0}, 10.0 / swing
     if model.kind == "pendulum":
         swing = math.sqrt(p["g"] * p["length"] / p["inertia"]) or 1.0
-        return {"Omega": swing, "theta": 1.0}, 1.0 / swing
+        return {"Omega": swing, "theta": 1.0}, 6.0 / swing
     return {}, 1.0
 
 

@@ -17,7 +17,7 @@ from udd.models import Model
 from .asked import parameter_rows, parameter_values, runner_of, start_states, whole
 from .branches import intervals
 from .coordinates import Floats, coordinates_of
-from .crossings import INTERRUPTED, Crossings, Runner, parts
+from .crossings import INTERRUPTED, parts
 from .labels import Variables, of_outcomes, of_parameter, of_result, of_state, require_xarray, time_unit
 from .paths import PATHS, kick, nothing, walk
 from .recurrence import tightness
@@ -34,7 +34,7 @@ def bifurcation(
     values: ArrayLike,
     *,
     section: str | None = None,
-    direction: int = 1,
+    direction: str | None = None,
     n: int = 200,
     transient: int = 200,
     starts: ArrayLike | None = None,
@@ -61,9 +61,9 @@ def bifurcation(
     values : array_like, shape (v,)
         Its values, increasing.
     section : str, optional
-        An expression of the state whose zero is the surface; by default ``"z"`` (``"Z"``, ``"theta"``).
-    direction : {1, -1, 0}
-        Whether it is crossed upward, downward or both ways.
+        The surface, as :func:`udd.poincare` takes it; by default ``"z"`` (``"Z"``, ``"theta"``).
+    direction : {"up", "down", "both"}, optional
+        In which direction it is crossed; by default upward.
     n : int
         How many points are kept, at least 12. Periods up to a third of this are recognised.
     transient : int
@@ -107,7 +107,8 @@ def bifurcation(
         - ``symmetric``: 1 where it is its own mirror image under the model's symmetry, 0 where not, -1 where
           there is no symmetry or no attractor;
         - ``hysteresis``: whether the way up and the way down end on different attractors (mirror images count
-          as the same); ``hysteresis_interval``: the stretches of such values.
+          as the same); ``hysteresis_interval``: the stretches of such values, which a value without a verdict
+          does not end.
 
     Raises
     ------
@@ -150,14 +151,13 @@ def bifurcation(
         raise ModelError(f"path must be one of {', '.join(PATHS)}, not {path!r}")
     kept = _components(model, component)
     begin = start_states(model, starts)
-    runner = runner_of(model, section, direction, rtol, atol, threads, t_max, transient + n)
     middle = model.with_parameters({parameter: float(axis[len(axis) // 2])})
-    judge = Judge(model, parameter, coordinates_of(middle, begin), tightness(runner.rtol))
-
     shape = (len(PATHS[path]), len(begin), len(axis))
     places = np.arange(np.prod(shape)).reshape(shape)
     of_job = np.broadcast_to(axis, shape).ravel()
     rows = parameter_rows(model, {parameter: of_job}, places.size)
+    runner = runner_of(model, rows, section, direction, rtol, atol, threads, t_max, transient + n)
+    judge = Judge(model, parameter, coordinates_of(middle, begin), tightness(runner.rtol))
     found = nothing(places.size, n, begin.shape[1])
     verdicts = Verdicts.none(places.size)
 
@@ -173,17 +173,22 @@ def bifurcation(
     with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
         added = kick(judge.coordinates.size, nudge)
         interrupted = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
-    told = None
-    if attractors:
-        told = tell(judge, found, verdicts, places, reach)
+    told = Told.nothing(places.size, len(axis))
+    try:
+        if attractors:
+            told = tell(judge, found, verdicts, places, reach)
         if told.differ.any() and not interrupted:
             unsure = places[:, :, told.differ].ravel()
             unsure = unsure[aperiodic(found, verdicts)[unsure]]
-            interrupted = _longer(runner, judge, rows, of_job, found, verdicts, unsure, longest, n)
+            for part in parts(len(unsure), longest + n):
+                if not again(runner, judge, rows, of_job, found, verdicts, unsure[part], longest, n):
+                    raise KeyboardInterrupt
             told = tell(judge, found, verdicts, places, reach)
+    except KeyboardInterrupt:
+        interrupted = True
     if interrupted:
         left = int((found.outcome == INTERRUPTED).sum())
-        missing = f"{left} of {places.size} runs are" if left else "the check of the hysteresis is"
+        missing = f"{left} of {places.size} runs are" if left else "telling the attractors apart is"
         warnings.warn(IncompleteWarning(f"{missing} not finished: stopped by Ctrl-C", True), stacklevel=2)
 
     dims = ("path", "start", parameter)
@@ -197,7 +202,7 @@ def bifurcation(
         if name in kept
     }
     data["outcome"] = (dims, found.outcome.astype(np.int8).reshape(shape), of_outcomes())
-    if told is not None:
+    if attractors:
         data |= _of_attractors(model, parameter, axis, shape, verdicts, told)
         if path == "both":
             data |= _of_hysteresis(model, parameter, axis, told)
@@ -214,25 +219,6 @@ def bifurcation(
         data, coords, of_result(runner, "bifurcation diagram", {**options, **more})
     )
     return made
-
-
-def _longer(
-    runner: Runner,
-    judge: Judge,
-    rows: Floats,
-    values: Floats,
-    found: Crossings,
-    verdicts: Verdicts,
-    jobs: NDArray[np.intp],
-    skip: int,
-    n: int,
-) -> bool:
-    """Follow some jobs on for long; whether Ctrl-C ended it."""
-    try:
-        some = (jobs[part] for part in parts(len(jobs), skip + n))
-        return not all(again(runner, judge, rows, values, found, verdicts, these, skip, n) for these in some)
-    except KeyboardInterrupt:
-        return True
 
 
 def _of_attractors(
@@ -257,7 +243,7 @@ def _of_hysteresis(model: Model, parameter: str, axis: Floats, told: Told) -> Va
     edges = {**of_parameter(model, parameter), "long_name": f"first and last {parameter} with hysteresis"}
     return {
         "hysteresis": (parameter, told.differ.astype(np.int8), words),
-        "hysteresis_interval": (("interval", "edge"), intervals(told.differ, axis), edges),
+        "hysteresis_interval": (("interval", "edge"), intervals(told.differ, told.unknown, axis), edges),
     }
 
 

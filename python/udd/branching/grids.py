@@ -14,7 +14,7 @@ from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model
 from udd.outcomes import FINISHED, OUTCOMES
 
-from .asked import increasing, runner_of, start_states, whole
+from .asked import increasing, parameter_rows, runner_of, start_states, whole
 from .attractors import KINDS, Attractor
 from .branches import partners
 from .coordinates import Floats, coordinates_of
@@ -38,7 +38,7 @@ def basins(
     *,
     state0: ArrayLike | None = None,
     section: str | None = None,
-    direction: int = 1,
+    direction: str | None = None,
     n: int = 100,
     transient: int = 100,
     extend: int = 16,
@@ -59,9 +59,9 @@ def basins(
     state0 : array_like, shape (dim,), optional
         The other components at the start; by default those of :func:`udd.lyapunov`.
     section : str, optional
-        An expression of the state whose zero is the surface; by default ``"z"`` (``"Z"``, ``"theta"``).
-    direction : {1, -1, 0}
-        Whether it is crossed upward, downward or both ways.
+        The surface, as :func:`udd.poincare` takes it; by default ``"z"`` (``"Z"``, ``"theta"``).
+    direction : {"up", "down", "both"}, optional
+        In which direction it is crossed; by default upward.
     n : int
         By how many section points a motion is recognised, at least 12; periods up to a third of this are.
     transient : int
@@ -136,8 +136,9 @@ def basins(
     xarray = require_xarray()
     n, transient = whole("n", n, 12), whole("transient", transient, 0)
     extend = whole("extend", extend, 1)
-    runner = runner_of(model, section, direction, rtol, atol, threads, t_max, transient + n)
     axes, starts = _starts(model, grid, state0)
+    rows = parameter_rows(model, {}, 1)
+    runner = runner_of(model, rows, section, direction, rtol, atol, threads, t_max, transient + n)
     judge = Judge(model, None, coordinates_of(model, starts), tightness(runner.rtol))
     crowd = Crowd(runner, Register(judge), starts, n, extend * (transient + n))
 

@@ -62,7 +62,7 @@ def of_result(runner: Runner, what: str, options: Mapping[str, Any]) -> dict[str
         "title": what,
         "model": repr(runner.model),
         "section": ", ".join(runner.section),
-        "direction": list(runner.direction),
+        "direction": ", ".join({1: "up", -1: "down", 0: "both"}[way] for way in runner.direction),
         "rtol": runner.rtol,
         "atol": runner.atol,
         **options,

@@ -29,12 +29,26 @@ class Told:
         Of a period.
     differ : ndarray of bool (values,)
         Whether the ways up and down end on different attractors, mirror images being the same.
+    unknown : ndarray of bool (values,)
+        Whether there is a way without an attractor.
     """
 
     label: NDArray[np.int32]
     symmetric: NDArray[np.int8]
     duration: Floats
     differ: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+
+    @classmethod
+    def nothing(cls, jobs: int, values: int) -> Told:
+        """Before the work."""
+        return cls(
+            np.zeros(jobs, dtype=np.int32),
+            np.full(jobs, -1, dtype=np.int8),
+            np.full(jobs, np.nan),
+            np.zeros(values, dtype=bool),
+            np.zeros(values, dtype=bool),
+        )
 
 
 def tell(
@@ -45,13 +59,7 @@ def tell(
     reach: float,
 ) -> Told:
     """Tell the attractors apart, value by value; `places` (paths, starts, values) numbers the jobs."""
-    jobs = places.size
-    told = Told(
-        np.zeros(jobs, dtype=np.int32),
-        np.full(jobs, -1, dtype=np.int8),
-        np.full(jobs, np.nan),
-        np.zeros(places.shape[2], dtype=bool),
-    )
+    told = Told.nothing(places.size, places.shape[2])
     known = decided(found, verdicts)
     tracks = Tracks(reach)
     for k in range(places.shape[2]):
@@ -64,6 +72,7 @@ def tell(
             told.label[job] = labels[j]
             told.duration[job] = attractor.duration
         family = _families(judge, seen, distinct, told, here, first)
+        told.unknown[k] = len(here) < places[:, :, k].size
         if places.shape[0] == 2:
             of_job = {job: family[j] for job, j in zip(here, first, strict=True)}
             pairs = places[:, :, k].T.tolist()

@@ -55,14 +55,8 @@ def add_runs(parser: argparse.ArgumentParser, points: int) -> None:
     parser.add_argument(
         "--transient", type=int, default=points, help=f"points left out before (default {points})"
     )
-    parser.add_argument("--section", metavar="EXPR", help="surface: zero of an expression (default z, Z)")
-    parser.add_argument(
-        "--direction",
-        type=int,
-        default=1,
-        choices=(1, -1, 0),
-        help="crossed upward, downward, both (default 1)",
-    )
+    parser.add_argument("--section", help="surface, such as z or 'maxima of z' (default z, Z or theta)")
+    parser.add_argument("--direction", choices=("up", "down", "both"), help="how it is crossed (default up)")
     parser.add_argument("--extend", type=int, help="how many times as far what is not clear is followed")
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")

@@ -67,7 +67,9 @@ def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -
 def _zarr(path: Path, found: xr.Dataset) -> None:
     folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
     try:
-        found.to_zarr(folder / "made", zarr_format=3, consolidated=False)
+        # Zarr 3 has no arrays of strings of one length.
+        words = {name: found[name].astype(object) for name in found.coords if found[name].dtype.kind == "U"}
+        found.assign_coords(words).to_zarr(folder / "made", zarr_format=3, consolidated=False)
         os.replace(folder / "made", path)
     except OSError as error:
         raise UddError(f"{path} cannot be written: {error.strerror or error}") from None
