@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use proptest::prelude::*;
-use udd::model::effects::{Kind, Role};
+use udd::model::effects::{Kind, Role, Treatment};
 use udd::model::{
     DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, Parameter, PendulumFamily, Sides, System, sides_of,
 };
@@ -15,11 +15,11 @@ const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// Every effect, in each way it can enter.
 fn all() -> Vec<Effect> {
     let ways = |kind: Kind| match kind.spec().momenta {
-        [] => vec![Effect { kind, momentum: None, treatment: Treatment::default() }],
-        momenta => momenta
-            .iter()
-            .map(|&m| Effect { kind, momentum: Some(m), treatment: Treatment::default() })
-            .collect(),
+        [] if kind.dry() => [Treatment::Smoothed, Treatment::SetValued, Treatment::Karnopp]
+            .map(|treatment| Effect::new(kind).with_treatment(treatment))
+            .to_vec(),
+        [] => vec![Effect::new(kind)],
+        momenta => momenta.iter().map(|&m| Effect::new(kind).with_momentum(Some(m))).collect(),
     };
     Kind::ALL.iter().flat_map(|&kind| ways(kind)).collect()
 }
@@ -37,7 +37,8 @@ fn values(effect: &Effect, amplitude: f64) -> Vec<f64> {
 fn disks() -> Vec<(DiskFamily, Vec<f64>)> {
     let mut sets: Vec<Vec<Effect>> = all().into_iter().map(|effect| vec![effect]).collect();
     sets.push(vec![]);
-    sets.push(all().into_iter().filter(|effect| effect.momentum.is_none()).collect());
+    let together = |effect: &Effect| effect.momentum.is_none() && effect.treatment == Treatment::Smoothed;
+    sets.push(all().into_iter().filter(together).collect());
     let with = |effects: Vec<Effect>| {
         let own = effects.iter().flat_map(|effect| values(effect, 1e-3));
         let p = PLAIN.into_iter().chain(own).collect();
@@ -81,7 +82,7 @@ proptest! {
             same_rates(&family, &p, t, [omega, radius * angle.sin(), radius * angle.cos(), beta]);
         }
         same_rates(&DleFamily, &[7.1, 0.2], t, [omega, beta, 40.0 * radius]);
-        for effect in all().into_iter().filter(|e| e.momentum.is_none()) {
+        for effect in all().into_iter().filter(|e| e.momentum.is_none() && e.treatment == Treatment::Smoothed) {
             let p = [&[0.05, 0.0057, 9.81, 0.012][..], &values(&effect, 0.1)].concat();
             same_rates(&PendulumFamily { effects: vec![effect] }, &p, t, [omega, beta]);
         }
@@ -95,7 +96,7 @@ fn what_a_known_parameter_removes_is_left_out() {
     // y - omega, omega z, omega y, w - omega y.
     assert_eq!((plain.steps().len(), plain.held().len()), (4, 1));
     assert_eq!(damped.steps().len(), 6);
-    let effect = Effect { kind: Kind::EccentricMass, momentum: None, treatment: Treatment::default() };
+    let effect = Effect::new(Kind::EccentricMass);
     let disk = |effects| DiskFamily { effects, edge: false };
     let without = Tape::record(&disk(vec![]), &[]).unwrap();
     let zero: Vec<Option<f64>> = [None; 6].into_iter().chain([Some(0.0); 2]).collect();
@@ -141,7 +142,7 @@ impl Family<8> for ClosedFamily {
 fn series_of_closed_forms() {
     const N: usize = 25;
     let tape = Tape::record(&ClosedFamily, &[]).unwrap();
-    let mut jets = Jets::<f64, 8, N>::new(&tape);
+    let mut jets = Jets::<f64, 8, N>::new(&tape, Isa::best());
     let (a, b) = (0.7, 1.3);
     jets.expand(&tape, &[a, b], 0.0, &[0.5; 8], &[true; MAX_SURFACES]);
     // All radii of convergence exceed 1: the nearest singularities are those of tan at 1.11, of ln and
@@ -192,7 +193,7 @@ fn polynomials_solve_the_equations() {
         let tape = Tape::record(&family, &[]).unwrap();
         let system = family.build(&p);
         let sides = sides_of(&system, 0.3, &x0);
-        let mut jets = Jets::<f64, 4, N>::new(&tape);
+        let mut jets = Jets::<f64, 4, N>::new(&tape, Isa::best());
         jets.expand(&tape, &p, 0.3, &x0, &sides);
         // The poles of tanh(Omega/eps) are near for the smoothed dry friction.
         let h = 1e-3;
@@ -215,9 +216,9 @@ fn run<S: Scalar, const D: usize, const N: usize>(
     tape: &Tape<D>,
     system: &impl System<S, D>,
     (p, mut x, end): (&[S], [S; D], f64),
-    rtol: f64,
+    (rtol, isa): (f64, Isa),
 ) -> [S; D] {
-    let mut jets = Jets::<S, D, N>::new(tape);
+    let mut jets = Jets::<S, D, N>::new(tape, isa);
     let (mut t, end) = (S::Real::constant(0.0), S::Real::constant(end));
     while t.less(end).any() {
         let sides = sides_of(system, S::lift(t), &x);
@@ -232,7 +233,7 @@ fn run<S: Scalar, const D: usize, const N: usize>(
 fn dle(w: f64, b: f64, x0: [f64; 3], end: f64, rtol: f64) -> [f64; 3] {
     let tape = Tape::record(&DleFamily, &[]).unwrap();
     let p = [w, b];
-    run::<f64, 3, 21>(&tape, &DleFamily.build(&p), (&p, x0, end), rtol)
+    run::<f64, 3, 21>(&tape, &DleFamily.build(&p), (&p, x0, end), (rtol, Isa::best()))
 }
 
 /// Digits on which independent integrators agree.
@@ -260,11 +261,11 @@ fn order_of_convergence() {
     let tape = Tape::record(&DleFamily, &[]).unwrap();
     let p = [7.1, 0.1];
     let exact = |h| {
-        let mut jets = Jets::<f64, 3, 25>::new(&tape);
+        let mut jets = Jets::<f64, 3, 25>::new(&tape, Isa::best());
         jets.expand(&tape, &p, 0.0, &[1.0, 1.0, 0.01], &[true; MAX_SURFACES]);
         jets.at(h)
     };
-    let mut jets = Jets::<f64, 3, N>::new(&tape);
+    let mut jets = Jets::<f64, 3, N>::new(&tape, Isa::best());
     jets.expand(&tape, &p, 0.0, &[1.0, 1.0, 0.01], &[true; MAX_SURFACES]);
     let error = |h: f64| {
         let (x, y) = (jets.at(h), exact(h));
@@ -282,7 +283,7 @@ fn tangents() {
     let p = [7.1, 0.0].map(T::fixed);
     let x0 = [1.0, 1.0, 0.01];
     let state = from_fn(|n| T::variable(x0[n], n));
-    let x = run::<T, 3, 21>(&tape, &DleFamily.build(&p), (&p, state, 3.0), 1e-12);
+    let x = run::<T, 3, 21>(&tape, &DleFamily.build(&p), (&p, state, 3.0), (1e-12, Isa::best()));
     let h = 1e-5;
     for i in 0..3 {
         let moved = |by: f64| {
@@ -315,46 +316,48 @@ impl<F: Family<D>, const D: usize> Bits<'_, F, D> {
     }
 
     #[inline(always)]
-    fn one(&self, l: usize) -> [u64; D] {
+    fn one(&self, l: usize, isa: Isa) -> [u64; D] {
         let system = self.family.build(self.p);
-        run::<f64, D, 21>(self.tape, &system, (self.p, self.lane(l), self.end), 1e-9).map(f64::to_bits)
+        run::<f64, D, 21>(self.tape, &system, (self.p, self.lane(l), self.end), (1e-9, isa)).map(f64::to_bits)
     }
 
     #[inline(always)]
-    fn many<const L: usize>(&self) -> Vec<[u64; D]> {
+    fn many<const L: usize>(&self, isa: Isa) -> Vec<[u64; D]> {
         let p: Vec<Packet<L>> = self.p.iter().map(|&v| Packet::constant(v)).collect();
         let x0 = from_fn(|n| Packet::from_lanes(|l| self.lane(l)[n]));
         let system = self.family.build(&p);
-        let x = run::<Packet<L>, D, 21>(self.tape, &system, (&p, x0, self.end), 1e-9);
+        let x = run::<Packet<L>, D, 21>(self.tape, &system, (&p, x0, self.end), (1e-9, isa));
         (0..L).map(|l| x.map(|v| v.lane(l).to_bits())).collect()
     }
 
     /// The second lane as one of a packet of tangents.
     #[inline(always)]
-    fn tangents<const L: usize>(&self) -> [u64; D] {
+    fn tangents<const L: usize>(&self, isa: Isa) -> [u64; D] {
         type T<const L: usize> = Dual<Packet<L>, 1>;
         let p: Vec<T<L>> = self.p.iter().map(|&v| Dual::constant(v)).collect();
         let x0 = from_fn(|n| Dual::variable(Packet::from_lanes(|l| self.lane(l)[n]), 0));
         let system = self.family.build(&p);
-        let x = run::<T<L>, D, 21>(self.tape, &system, (&p, x0, self.end), 1e-9);
+        let x = run::<T<L>, D, 21>(self.tape, &system, (&p, x0, self.end), (1e-9, isa));
         x.map(|v| v.re.lane(1).to_bits())
     }
 }
 
-impl<F: Family<D>, const D: usize> Work for &Bits<'_, F, D> {
+struct On<'a, F, const D: usize>(&'a Bits<'a, F, D>, Isa);
+
+impl<F: Family<D>, const D: usize> Work for On<'_, F, D> {
     type Output = (Vec<[u64; D]>, [u64; D], [u64; D]);
     #[inline(always)]
     fn run<const L: usize>(self) -> Self::Output {
-        (self.many::<L>(), self.tangents::<L>(), self.one(1))
+        (self.0.many::<L>(self.1), self.0.tangents::<L>(self.1), self.0.one(1, self.1))
     }
 }
 
 fn same_bits<F: Family<D>, const D: usize>(bits: &Bits<'_, F, D>) {
-    let alone: Vec<[u64; D]> = (0..8).map(|l| bits.one(l)).collect();
-    assert_eq!(bits.many::<1>(), alone[..1]);
-    assert_eq!(bits.many::<2>(), alone[..2]);
+    let alone: Vec<[u64; D]> = (0..8).map(|l| bits.one(l, Isa::Baseline)).collect();
+    assert_eq!(bits.many::<1>(Isa::best()), alone[..1]);
+    assert_eq!(bits.many::<2>(Isa::best()), alone[..2]);
     for isa in Isa::available() {
-        let (many, tangents, one) = isa.run(bits);
+        let (many, tangents, one) = isa.run(On(bits, isa));
         assert_eq!(many, alone[..many.len()], "{isa:?}");
         assert_eq!((tangents, one), (alone[1], alone[1]), "{isa:?}");
     }
@@ -400,7 +403,7 @@ fn a_law_with_comparisons_is_refused() {
 #[test]
 fn a_radius_that_is_no_number() {
     let tape = Tape::record(&DleFamily, &[]).unwrap();
-    let mut jets = Jets::<f64, 3, 21>::new(&tape);
+    let mut jets = Jets::<f64, 3, 21>::new(&tape, Isa::best());
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         jets.expand(&tape, &[1.0, 0.0], 0.0, &[bad, 1.0, 1.0], &[true; MAX_SURFACES]);
         assert!(jets.radius(1e-9, 1e-12).is_nan(), "{bad}");

@@ -1,29 +1,30 @@
 //! The Taylor coefficients of a solution.
 
-use std::array::from_fn;
-
-use super::Tape;
+use super::known::{Dle, Known, Program};
 use super::node::{INVERSE, hold};
+use super::{Step, Tape};
 use crate::model::Sides;
-use crate::scalar::Scalar;
+use crate::scalar::{Isa, Real, Scalar, Work};
+use crate::unroll::unroll;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.
 #[derive(Clone, Debug)]
 pub struct Jets<S, const D: usize, const N: usize> {
+    isa: Isa,
     work: Vec<[S; N]>,
     held: Vec<S>,
-    state: [[S; N]; D],
 }
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// The highest order.
     pub const ORDER: usize = N - 1;
 
-    /// Room for this tape; [`expand`](Jets::expand) allocates nothing.
-    pub fn new(tape: &Tape<D>) -> Self {
-        const { assert!(N >= 4 && N <= INVERSE.len(), "between 3 and 32 orders") };
+    /// Room for this tape, whose series are computed with these instructions.
+    /// [`expand`](Jets::expand) allocates nothing.
+    pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
+        const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
         let zero = [S::zero(); N];
-        Self { work: vec![zero; tape.slots], held: Vec::with_capacity(tape.held.len()), state: [zero; D] }
+        Self { isa, work: vec![zero; tape.slots], held: vec![S::zero(); tape.held.len()] }
     }
 
     /// The coefficients of the solution through the state `x` at time `t`, all laws taken on these
@@ -33,31 +34,128 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// Where the room was made for another tape, or parameters are missing.
     #[inline(always)]
     pub fn expand(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
-        hold(&tape.held, parameters, sides, &mut self.held);
-        let (work, held) = (&mut self.work[..tape.slots], &self.held[..]);
-        for n in 0..D {
-            work[n][0] = x[n];
-        }
-        for step in &tape.steps {
-            step.start(work, held, t, sides);
-        }
-        for n in 0..D {
-            work[n][1] = work[usize::from(tape.rates[n])][0];
-        }
-        for k in 1..N - 1 {
-            for step in &tape.steps {
-                step.next(work, held, sides, k);
-            }
-            for n in 0..D {
-                work[n][k + 1] = work[usize::from(tape.rates[n])][k].scale(INVERSE[k + 1]);
-            }
-        }
-        self.state = from_fn(|n| work[n]);
+        self.isa.run(Expansion { tape, parameters, t, x, sides, work: &mut self.work, held: &mut self.held });
     }
 
     /// The coefficients of each component, order 0 first.
     #[inline(always)]
     pub fn coefficients(&self) -> &[[S; N]; D] {
-        &self.state
+        self.work.first_chunk().expect("a slot for each component")
     }
+}
+
+/// What is compiled once for each instruction set.
+struct Expansion<'a, S: Scalar, const D: usize, const N: usize> {
+    tape: &'a Tape<D>,
+    parameters: &'a [S],
+    t: S,
+    x: &'a [S; D],
+    sides: &'a Sides<S>,
+    work: &'a mut [[S; N]],
+    held: &'a mut [S],
+}
+
+impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const L: usize>(self) {
+        let Self { tape, parameters, t, x, sides, work, held } = self;
+        hold(&tape.held, parameters, sides, held);
+        // Only for three equations can it be the DLE; nothing else is then compiled.
+        if const { D == 3 } {
+            if tape.known == Known::Dle {
+                if const { size_of::<S>() == size_of::<f64>() } {
+                    return unrolled::<Dle, S, D, N>(work, held, t, x, sides);
+                }
+                return rolled::<Dle, S, D, N>(&mut work[..Dle::SLOTS], held, t, x, sides);
+            }
+        }
+        interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], held, t, x, sides);
+    }
+}
+
+/// Any tape.
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "one call")]
+fn interpreted<S: Scalar, const D: usize, const N: usize>(
+    steps: &[Step],
+    rates: &[u16; D],
+    work: &mut [[S; N]],
+    held: &[S],
+    t: S,
+    x: &[S; D],
+    sides: &Sides<S>,
+) {
+    unroll!(n in 0..D => { work[n][0] = x[n]; });
+    begin(steps, work, held, t, sides);
+    unroll!(n in 0..D => { work[n][1] = work[usize::from(rates[n])][0]; });
+    for k in 1..N - 1 {
+        for step in steps {
+            step.next(work, held, sides, k);
+        }
+        unroll!(n in 0..D => { work[n][k + 1] = work[usize::from(rates[n])][k].scale(INVERSE[k + 1]); });
+    }
+}
+
+/// Coefficient 0 of every operation. Once per step: not worth a copy for each instruction set.
+#[inline(never)]
+fn begin<S: Scalar, const N: usize>(steps: &[Step], work: &mut [[S; N]], held: &[S], t: S, sides: &Sides<S>) {
+    for step in steps {
+        step.start(work, held, t, sides);
+    }
+}
+
+/// A known tape over packets: the operations are unrolled, the sums remain loops, whose lanes the
+/// compiler makes vectors of. Orders go in fours, so that it knows their remainders.
+#[inline(always)]
+fn rolled<P: Program, S: Scalar, const D: usize, const N: usize>(
+    work: &mut [[S; N]],
+    held: &[S],
+    t: S,
+    x: &[S; D],
+    sides: &Sides<S>,
+) {
+    unroll!(n in 0..D => { work[n][0] = x[n]; });
+    unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].start(work, held, t, sides); });
+    unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
+    for four in 0..(N + 1) / 4 {
+        unroll!(r in 1..5 => {
+            let k = 4 * four + r;
+            if k < N - 1 {
+                unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].next(work, held, sides, k); });
+                unroll!(n in 0..D => {
+                    work[n][k + 1] = work[usize::from(P::RATES[n])][k].scale(INVERSE[k + 1]);
+                });
+            }
+        });
+    }
+}
+
+/// A known tape over single numbers: everything is unrolled and stays in registers.
+#[inline(always)]
+fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize>(
+    series: &mut [[S; N]],
+    held: &[S],
+    t: S,
+    x: &[S; D],
+    sides: &Sides<S>,
+) {
+    let mut room = [[S::zero(); N]; 24];
+    let work = &mut room[..];
+    unroll!(n in 0..D => { work[n][0] = x[n]; });
+    unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].start(work, held, t, sides); });
+    unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
+    macro_rules! orders {
+        ($($k:literal)+) => {
+            $(if const { $k < N - 1 } {
+                unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].next(work, held, sides, $k); });
+                unroll!(n in 0..D => {
+                    work[n][$k + 1] = work[usize::from(P::RATES[n])][$k].scale(INVERSE[$k + 1]);
+                });
+            })+
+        };
+    }
+    orders!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
+    unroll!(n in 0..D => { series[n] = work[n]; });
 }

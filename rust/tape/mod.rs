@@ -4,13 +4,17 @@
 //! what repeated evaluation of the rates cannot: the Taylor coefficients of the solution, order by
 //! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
 
+mod expression;
 mod jet;
+mod known;
 mod node;
+mod parse;
 mod reach;
 mod record;
 mod series;
 mod symbol;
 
+pub use expression::{Binary, Expression, Leaf, Mistake, Names, Op, Place, Unary};
 pub use jet::Jets;
 pub use node::{Held, Node, Step};
 pub use record::Unrecordable;
@@ -39,6 +43,7 @@ pub struct Tape<const D: usize> {
     pub(crate) rates: [u16; D],
     /// How many series there are; the first `D` are the state.
     pub(crate) slots: usize,
+    known: known::Known,
 }
 
 impl<const D: usize> Tape<D> {
@@ -58,7 +63,7 @@ impl<const D: usize> Tape<D> {
     /// Where there are fewer parameters than the model has.
     #[inline(always)]
     pub fn rates<S: Scalar>(&self, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
-        let mut held = Vec::with_capacity(self.held.len());
+        let mut held = vec![S::zero(); self.held.len()];
         node::hold(&self.held, parameters, sides, &mut held);
         let mut work = vec![[S::zero()]; self.slots];
         for n in 0..D {

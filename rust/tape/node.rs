@@ -85,32 +85,34 @@ pub struct Step {
     pub to: u16,
 }
 
-/// Evaluates the held values one after the other.
-#[inline(always)]
-pub(super) fn hold<S: Scalar>(list: &[Held], parameters: &[S], sides: &Sides<S>, values: &mut Vec<S>) {
-    values.clear();
-    for &held in list {
-        let of = |i: u16| values[usize::from(i)];
-        let value = match held {
+/// Evaluates the held values one after the other. Once per step: not worth a copy for each instruction set.
+#[inline(never)]
+pub(super) fn hold<S: Scalar>(list: &[Held], parameters: &[S], sides: &Sides<S>, values: &mut [S]) {
+    macro_rules! of {
+        ($i:expr) => {
+            values[usize::from($i)]
+        };
+    }
+    for (i, &held) in list.iter().enumerate() {
+        values[i] = match held {
             Held::Constant(value) => S::constant(value),
             Held::Parameter(i) => parameters[usize::from(i)],
-            Held::Neg(a) => -of(a),
-            Held::Add(a, b) => of(a) + of(b),
-            Held::Sub(a, b) => of(a) - of(b),
-            Held::Mul(a, b) => of(a) * of(b),
-            Held::Div(a, b) => of(a) / of(b),
-            Held::Apply(function, a) => function.of(of(a)),
-            Held::Select(j, a, b) => S::select(sides[usize::from(j)], of(a), of(b)),
+            Held::Neg(a) => -of!(a),
+            Held::Add(a, b) => of!(a) + of!(b),
+            Held::Sub(a, b) => of!(a) - of!(b),
+            Held::Mul(a, b) => of!(a) * of!(b),
+            Held::Div(a, b) => of!(a) / of!(b),
+            Held::Apply(function, a) => function.of(of!(a)),
+            Held::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
         };
-        values.push(value);
     }
 }
 
 /// `1/k`
-pub(super) const INVERSE: [f64; 33] = {
-    let mut table = [1.0; 33];
+pub(super) const INVERSE: [f64; 25] = {
+    let mut table = [1.0; 25];
     let mut k = 2;
-    while k < 33 {
+    while k < 25 {
         table[k] = 1.0 / k as f64;
         k += 1;
     }
@@ -128,48 +130,56 @@ impl Step {
         sides: &Sides<S>,
     ) {
         let (done, to) = work.split_at_mut(usize::from(self.to));
-        let of = |i: u16| done[usize::from(i)][0];
-        let h = |i: u16| held[usize::from(i)];
+        macro_rules! of {
+            ($i:expr) => {
+                done[usize::from($i)][0]
+            };
+        }
+        macro_rules! h {
+            ($i:expr) => {
+                held[usize::from($i)]
+            };
+        }
         to[0][0] = match self.node {
             Node::Time => t,
-            Node::Hold(c) => h(c),
-            Node::Neg(a) => -of(a),
-            Node::Add(a, b) => of(a) + of(b),
-            Node::Sub(a, b) => of(a) - of(b),
-            Node::Plus(a, c) => of(a) + h(c),
-            Node::Minus(a, c) => of(a) - h(c),
-            Node::From(c, a) => h(c) - of(a),
-            Node::Scale(a, c) => of(a) * h(c),
-            Node::Mul(a, b) => of(a) * of(b),
-            Node::Square(a) => of(a).square(),
+            Node::Hold(c) => h!(c),
+            Node::Neg(a) => -of!(a),
+            Node::Add(a, b) => of!(a) + of!(b),
+            Node::Sub(a, b) => of!(a) - of!(b),
+            Node::Plus(a, c) => of!(a) + h!(c),
+            Node::Minus(a, c) => of!(a) - h!(c),
+            Node::From(c, a) => h!(c) - of!(a),
+            Node::Scale(a, c) => of!(a) * h!(c),
+            Node::Mul(a, b) => of!(a) * of!(b),
+            Node::Square(a) => of!(a).square(),
             Node::Div(a, b) => {
-                to[1][0] = S::one() / of(b);
-                of(a) * to[1][0]
+                to[1][0] = S::one() / of!(b);
+                of!(a) * to[1][0]
             }
             Node::Over(c, b) => {
-                to[1][0] = S::one() / of(b);
-                h(c) * to[1][0]
+                to[1][0] = S::one() / of!(b);
+                h!(c) * to[1][0]
             }
             Node::Sqrt(a) => {
-                let root = of(a).sqrt();
+                let root = Function::Sqrt.of(of!(a));
                 to[1][0] = S::constant(0.5) / root;
                 root
             }
-            Node::Exp(a) => of(a).exp(),
+            Node::Exp(a) => Function::Exp.of(of!(a)),
             Node::Ln(a) => {
-                to[2][0] = S::one() / of(a);
-                of(a).ln()
+                to[2][0] = S::one() / of!(a);
+                Function::Ln.of(of!(a))
             }
             Node::SinCos(a) => {
-                to[1][0] = of(a).cos();
-                of(a).sin()
+                to[1][0] = Function::Cos.of(of!(a));
+                Function::Sin.of(of!(a))
             }
             Node::Tanh(a) => {
-                let value = of(a).tanh();
+                let value = Function::Tanh.of(of!(a));
                 to[1][0] = S::one() - value.square();
                 value
             }
-            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of(a), of(b)),
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
         };
     }
 
@@ -183,44 +193,52 @@ impl Step {
         k: usize,
     ) {
         let (done, to) = work.split_at_mut(usize::from(self.to));
-        let of = |i: u16| &done[usize::from(i)];
-        let h = |i: u16| held[usize::from(i)];
+        macro_rules! of {
+            ($i:expr) => {
+                &done[usize::from($i)]
+            };
+        }
+        macro_rules! h {
+            ($i:expr) => {
+                held[usize::from($i)]
+            };
+        }
         let (weight, inverse) = (k as f64, INVERSE[k]);
         to[0][k] = match self.node {
             Node::Time if k == 1 => S::one(),
             Node::Time | Node::Hold(_) => S::zero(),
-            Node::Neg(a) | Node::From(_, a) => -of(a)[k],
-            Node::Add(a, b) => of(a)[k] + of(b)[k],
-            Node::Sub(a, b) => of(a)[k] - of(b)[k],
-            Node::Plus(a, _) | Node::Minus(a, _) => of(a)[k],
-            Node::Scale(a, c) => of(a)[k] * h(c),
-            Node::Mul(a, b) => product(of(a), of(b), k),
-            Node::Square(a) => square(of(a), k),
+            Node::Neg(a) | Node::From(_, a) => -of!(a)[k],
+            Node::Add(a, b) => of!(a)[k] + of!(b)[k],
+            Node::Sub(a, b) => of!(a)[k] - of!(b)[k],
+            Node::Plus(a, _) | Node::Minus(a, _) => of!(a)[k],
+            Node::Scale(a, c) => of!(a)[k] * h!(c),
+            Node::Mul(a, b) => product(of!(a), of!(b), k),
+            Node::Square(a) => square(of!(a), k),
             // The quotient q of a = q b.
             Node::Div(a, b) => {
-                let b = of(b);
-                ((of(a)[k] - inner(&to[0], b, k)) - to[0][0] * b[k]) * to[1][0]
+                let b = of!(b);
+                ((of!(a)[k] - inner(&to[0], b, k)) - to[0][0] * b[k]) * to[1][0]
             }
             Node::Over(_, b) => {
-                let b = of(b);
+                let b = of!(b);
                 -((inner(&to[0], b, k) + to[0][0] * b[k]) * to[1][0])
             }
             // The root r of a = r^2.
-            Node::Sqrt(a) => (of(a)[k] - inner_square(&to[0], k)) * to[1][0],
+            Node::Sqrt(a) => (of!(a)[k] - inner_square(&to[0], k)) * to[1][0],
             Node::Exp(a) => {
-                let slope = of(a)[k].scale(weight);
+                let slope = of!(a)[k].scale(weight);
                 to[1][k] = slope;
                 (inner(&to[1], &to[0], k) + slope * to[0][0]).scale(inverse)
             }
             // a l' = a'
             Node::Ln(a) => {
-                let a = of(a);
+                let a = of!(a);
                 let slope = (a[k].scale(weight) - inner(&to[1], a, k)) * to[2][0];
                 to[1][k] = slope;
                 slope.scale(inverse)
             }
             Node::SinCos(a) => {
-                let slope = of(a)[k].scale(weight);
+                let slope = of!(a)[k].scale(weight);
                 to[2][k] = slope;
                 let cosine = (inner(&to[2], &to[0], k) + slope * to[0][0]).scale(-inverse);
                 let sine = (inner(&to[2], &to[1], k) + slope * to[1][0]).scale(inverse);
@@ -228,14 +246,14 @@ impl Step {
                 sine
             }
             Node::Tanh(a) => {
-                let slope = of(a)[k].scale(weight);
+                let slope = of!(a)[k].scale(weight);
                 to[2][k] = slope;
                 let value = (inner(&to[2], &to[1], k) + slope * to[1][0]).scale(inverse);
                 to[0][k] = value;
                 to[1][k] = -square(&to[0], k);
                 value
             }
-            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of(a)[k], of(b)[k]),
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a)[k], of!(b)[k]),
         };
     }
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use thiserror::Error;
 
+use super::known::Known;
 use super::symbol::{self, Function, Made, Recording, SideOf, Symbol};
 use super::{Held, Node, Step, Tape};
 use crate::model::{Family, MAX_SURFACES, Sides, System};
@@ -72,7 +73,10 @@ impl<'a> Lowering<'a> {
     fn tape<const D: usize>(mut self, rates: [Symbol; D]) -> Tape<D> {
         let rates = rates.map(|s| self.slot(s));
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
-        Tape { held: self.held, steps: self.steps, rates, slots: self.slots }
+        let mut tape =
+            Tape { held: self.held, steps: self.steps, rates, slots: self.slots, known: Known::Not };
+        tape.known = Known::of(&tape);
+        tape
     }
 
     fn varies(&self, s: Symbol) -> bool {

@@ -10,75 +10,51 @@ use crate::scalar::Scalar;
 /// `sum of a[j] b[k-j] for j in 1..k`, the coefficient `k` of the product without its first and last term.
 #[inline(always)]
 pub fn inner<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
-    if k < 2 {
-        return S::zero();
-    }
-    if k == 2 {
-        return a[1] * b[1];
-    }
-    let pairs = (k - 1) / 2;
+    let pairs = k.saturating_sub(1) / 2;
     let (a_low, a_high) = (&a[1..=pairs], &a[k - pairs..k]);
     let (b_low, b_high) = (&b[1..=pairs], &b[k - pairs..k]);
-    let pair = |q: usize| a_low[pairs - 1 - q] * b_high[q] + a_high[q] * b_low[pairs - 1 - q];
-    let mut sum = pair(0);
-    if k.is_multiple_of(2) {
-        sum = a[k / 2] * b[k / 2] + sum;
+    // Adding -0 changes nothing, not even the sign of a zero.
+    let (mut even, mut odd) = (S::constant(-0.0), S::constant(-0.0));
+    if k >= 2 && k.is_multiple_of(2) {
+        even += a[k / 2] * b[k / 2];
     }
-    sum_of(pairs, sum, pair)
+    let outwards = a_low.rchunks_exact(2).zip(b_high.chunks_exact(2));
+    for ((al, bh), (bl, ah)) in outwards.zip(b_low.rchunks_exact(2).zip(a_high.chunks_exact(2))) {
+        even += al[1] * bh[0] + ah[0] * bl[1];
+        odd += al[0] * bh[1] + ah[1] * bl[0];
+    }
+    if !pairs.is_multiple_of(2) {
+        even += a_low[0] * b_high[pairs - 1] + a_high[pairs - 1] * b_low[0];
+    }
+    even + odd
 }
 
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.
 #[inline(always)]
 pub fn inner_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
-    if k < 2 {
-        return S::zero();
-    }
-    if k == 2 {
-        return a[1].square();
-    }
-    let pairs = (k - 1) / 2;
+    let pairs = k.saturating_sub(1) / 2;
     let (low, high) = (&a[1..=pairs], &a[k - pairs..k]);
-    let pair = |q: usize| low[pairs - 1 - q] * high[q];
-    let half = sum_of(pairs, pair(0), pair);
+    let (mut even, mut odd) = (S::constant(-0.0), S::constant(-0.0));
+    for (low, high) in low.rchunks_exact(2).zip(high.chunks_exact(2)) {
+        even += low[1] * high[0];
+        odd += low[0] * high[1];
+    }
+    if !pairs.is_multiple_of(2) {
+        even += low[0] * high[pairs - 1];
+    }
+    let half = even + odd;
     let sum = half + half;
-    if k.is_multiple_of(2) { sum + a[k / 2].square() } else { sum }
+    if k >= 2 && k.is_multiple_of(2) { sum + a[k / 2].square() } else { sum }
 }
 
-/// The sum of the pairs, of which `first` is the first one.
-#[inline(always)]
-fn sum_of<S: Scalar>(pairs: usize, first: S, pair: impl Fn(usize) -> S) -> S {
-    if pairs == 1 {
-        return first;
-    }
-    let (mut even, mut odd) = (first, pair(1));
-    let mut q = 2;
-    while q + 1 < pairs {
-        even += pair(q);
-        odd += pair(q + 1);
-        q += 2;
-    }
-    if q < pairs {
-        even += pair(q);
-    }
-    even + odd
-}
-
-/// Coefficient `k` of the product.
+/// Coefficient `k >= 1` of the product.
 #[inline(always)]
 pub fn product<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
-    match k {
-        0 => a[0] * b[0],
-        1 => a[0] * b[1] + a[1] * b[0],
-        _ => inner(a, b, k) + (a[0] * b[k] + a[k] * b[0]),
-    }
+    inner(a, b, k) + (a[0] * b[k] + a[k] * b[0])
 }
 
-/// Coefficient `k` of the square.
+/// Coefficient `k >= 1` of the square.
 #[inline(always)]
 pub fn square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
-    match k {
-        0 => a[0].square(),
-        1 => (a[0] + a[0]) * a[1],
-        _ => inner_square(a, k) + (a[0] + a[0]) * a[k],
-    }
+    inner_square(a, k) + (a[0] + a[0]) * a[k]
 }

@@ -49,7 +49,8 @@ pub enum Function {
 }
 
 impl Function {
-    #[inline(always)]
+    // Never inlined: it would fill the loops over the orders, which need it once per step.
+    #[inline(never)]
     pub fn of<S: Scalar>(self, x: S) -> S {
         match self {
             Function::Sqrt => x.sqrt(),
