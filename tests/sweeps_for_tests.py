@@ -55,7 +55,7 @@ def wait_for(met: Callable[[], bool], what: str, process: subprocess.Popen[Any] 
 def dask_executor() -> Iterator[Executor]:
     distributed = pytest.importorskip("distributed", reason="Dask needs the extra 'scale'")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         yield client.get_executor()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _EXAMPLE = """\
 A spec in TOML, of the exponents at 1000 drives:
 
-  quantity = "lyapunov"            # or final_state, outcome
+  quantity = "lyapunov"            # or spectrum, final_state, outcome
   model = {kind = "dle", w = 1.0}  # or {kind = "disk", W = 0.039, edge = "ignore"}, ...
   chunk = 64
   [over]                           # one to three parameters or initial values
@@ -70,7 +70,8 @@ def _counted(found: xr.Dataset) -> dict[str, Any]:
     outcome = found["outcome"]
     ends = outcome.to_numpy()  # a byte each
     names = str(outcome.attrs["flag_meanings"]).split()
-    counts = {name: int((ends == value).sum()) for value, name in enumerate(names)}
+    flags = zip(names, outcome.attrs["flag_values"], strict=True)
+    counts = {name: int((ends == value).sum()) for name, value in flags}
     outcomes = {name: count for name, count in counts.items() if count}
     return {"quantity": found.attrs["quantity"], "shape": outcome.shape, "outcomes": outcomes}
 

@@ -30,8 +30,8 @@ class Memory:
     work = staticmethod(compute)
     remedy = "the others are kept"
 
-    def __init__(self, spec: SweepSpec, grid: Grid) -> None:
-        self._spec, self._grid = spec, grid
+    def __init__(self, spec: SweepSpec, grid: Grid, threads: int) -> None:
+        self._spec, self._grid, self._threads = spec, grid, threads
         self._done = np.zeros(len(grid), dtype=bool)
         self._arrays: Found = {
             v.name: np.full((*grid.shape, *(n for _, n in v.more)), fill_of(v), dtype=v.dtype)
@@ -40,7 +40,7 @@ class Memory:
 
     def arguments(self, chunk: int) -> tuple[Any, ...]:
         """What `work` takes."""
-        return (part_of(self._spec, self._grid, chunk),)
+        return part_of(self._spec, self._grid, chunk), self._threads
 
     def keep(self, chunk: int, found: Found) -> None:
         """Take what `work` gave."""

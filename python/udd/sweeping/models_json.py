@@ -60,13 +60,15 @@ def model_from_dict(data: object) -> Model:
 
 
 def _effect_to_dict(effect: Effect) -> dict[str, Any]:
-    momentum = {} if effect.momentum is None else {"momentum": effect.momentum}
-    return {"name": effect.name, **effect.parameters, **momentum}
+    choices = {"momentum": effect.momentum, "treatment": effect.treatment}
+    made = {key: choice for key, choice in choices.items() if choice is not None}
+    return {"name": effect.name, **effect.parameters, **made}
 
 
 def _effect_from_dict(data: object) -> Effect:
     given = _mapping("an effect", data)
-    name, momentum = given.pop("name", None), given.pop("momentum", None)
+    name = given.pop("name", None)
+    choices = given.pop("momentum", None), given.pop("treatment", None)
     specs = {spec.name: spec for spec in library()}
     if name not in specs:
         raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
@@ -75,7 +77,7 @@ def _effect_from_dict(data: object) -> Effect:
     if given:
         known = ", ".join(p.name for p in specs[name].parameters)
         raise ModelError(f"{name} has no parameter {next(iter(given))!r}; it has {known}")
-    return Effect(name, values, momentum)
+    return Effect(name, values, *choices)
 
 
 def _mapping(what: str, data: object) -> dict[str, Any]:

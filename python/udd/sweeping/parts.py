@@ -8,8 +8,9 @@ from math import ceil, prod
 import numpy as np
 
 from udd.models import Model
+from udd.outcomes import OUTCOMES
 
-from .quantities import OUTCOMES, QUANTITIES, Floats, Found, Options, Variable
+from .quantities import NOT_RUN, QUANTITIES, Floats, Found, Options, Variable
 from .spec import SweepSpec
 
 
@@ -66,17 +67,20 @@ def part_of(spec: SweepSpec, grid: Grid, chunk: int) -> Part:
     return Part(spec.quantity, spec.model, axes, np.asarray(spec.state0), dict(spec.options))
 
 
-def compute(part: Part) -> Found:
-    """The work on a chunk: a pure function of its part of the spec."""
+def compute(part: Part, threads: int) -> Found:
+    """The work on a chunk: a pure function of its part of the spec, whatever the number of threads."""
     mesh = np.meshgrid(*part.axes.values(), indexing="ij")
     shape = mesh[0].shape
-    columns = {name: values.ravel() for name, values in zip(part.axes, mesh, strict=True)}
-    names = part.model.state_names
+    model = part.model
+    rows = np.tile(list(model.parameters.values()), (prod(shape), 1))
     states = np.tile(part.state0, (prod(shape), 1))
-    for name in names:
-        if name in columns:
-            states[:, names.index(name)] = columns.pop(name)
-    found = QUANTITIES[part.quantity].run(part.model, columns, states, part.options)
+    parameters = list(model.parameters)
+    for name, values in zip(part.axes, mesh, strict=True):
+        if name in parameters:
+            rows[:, parameters.index(name)] = values.ravel()
+        else:
+            states[:, model.state_names.index(name)] = values.ravel()
+    found = QUANTITIES[part.quantity].run(model, rows, states, part.options, threads)
     return {name: values.reshape(*shape, *values.shape[1:]) for name, values in found.items()}
 
 
@@ -89,7 +93,8 @@ def variables_of(spec: SweepSpec) -> tuple[Variable, ...]:
 def attributes(variable: Variable) -> dict[str, object]:
     """What is written beside an array, by the CF conventions."""
     if variable.name == "outcome":
-        flags = {"flag_values": list(range(len(OUTCOMES))), "flag_meanings": " ".join(OUTCOMES)}
+        words = " ".join(name.replace(" ", "_") for name in ("not run", *OUTCOMES))
+        flags = {"flag_values": list(range(NOT_RUN, len(OUTCOMES))), "flag_meanings": words}
         return {"long_name": variable.meaning, **flags}
     return {"long_name": variable.meaning, "units": variable.unit}
 
@@ -108,4 +113,4 @@ def spec_attributes(spec: SweepSpec) -> dict[str, object]:
 
 def fill_of(variable: Variable) -> float | int | bool:
     """What stands in an array before the work is done."""
-    return {"float64": float("nan"), "int8": 0, "bool": False}[variable.dtype]
+    return {"float64": float("nan"), "int8": NOT_RUN, "bool": False}[variable.dtype]

@@ -1,13 +1,13 @@
 """What can be swept: a table from a quantity's name to the function that computes it.
 
-Such a function takes the model, a value of every swept parameter for each of n trajectories, their initial
-states, and the options. It returns arrays whose first axis is the trajectory. A trajectory that fails has an
-outcome and NaN, and disturbs no other.
+Such a function takes the model, for each of n trajectories a row of all parameters and an initial state, the
+options, and how many threads it may use (0: one per core). It returns arrays whose first axis is the
+trajectory. A trajectory that fails has an outcome and NaN, and disturbs no other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from udd import _core
 from udd._validate import number
 from udd.errors import IntegrationError, ModelError
+from udd.exponents import span
 from udd.models import DLE, Model
+from udd.outcomes import EJECTED, FINISHED, OUTCOMES
 from udd.trajectory import simulate, tolerances
 
-OUTCOMES = ("not_run", "finished", "ejected", "failed", "start_outside")
-"""The meanings of the array ``outcome``, by its values."""
+NOT_RUN = -1
+"""In the array ``outcome`` before the work is done; the other values are those of `udd.outcomes`."""
 
 Floats: TypeAlias = NDArray[np.float64]
 Options: TypeAlias = dict[str, float]
@@ -45,7 +47,7 @@ class Quantity:
 
     options: Callable[[Model, Mapping[str, Any]], Options]
     variables: Callable[[Model], tuple[Variable, ...]]
-    run: Callable[[Model, Mapping[str, Floats], Floats, Options], Found]
+    run: Callable[[Model, Floats, Floats, Options, int], Found]
 
 
 def _chosen(given: Mapping[str, Any], defaults: Mapping[str, float | None]) -> dict[str, Any]:
@@ -61,20 +63,15 @@ def _time_unit(model: Model) -> str:
     return "1" if isinstance(model, DLE) else "s"
 
 
-# --- the largest Lyapunov exponent
+# --- Lyapunov exponents
 
 
 def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
     slow = 1.0 if isinstance(model, DLE) else 0.25  # as in `udd.lyapunov`
-    defaults = {"t": 1e5 * slow, "tol": 2e-3 / slow, "transient": None, "rtol": 1e-8, "atol": 1e-10}
+    defaults = {"t": None, "tol": 2e-3 / slow, "transient": None, "rtol": 1e-8, "atol": 1e-10}
     chosen = _chosen(given, defaults)
-    t = number("t", chosen["t"], above=0.0)
-    tol = number("tol", chosen["tol"], above=0.0)
-    skipped = chosen["transient"]
-    skipped = number("transient", min(400.0 * slow, 0.1 * t) if skipped is None else skipped, least=0.0)
-    if skipped >= t:
-        raise ModelError(f"transient must be below t = {t:g}, not {skipped:g}")
-    return {**chosen, "t": t, "tol": tol, "transient": skipped}
+    t, skipped = span(chosen["t"], chosen["transient"], longest=1e5 * slow, skip=400.0 * slow)
+    return {**chosen, "t": t, "tol": number("tol", chosen["tol"], above=0.0), "transient": skipped}
 
 
 def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
@@ -86,59 +83,34 @@ def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
     )
 
 
-def _lyapunov(model: Model, parameters: Mapping[str, Floats], states: Floats, options: Options) -> Found:
-    n = len(states)
-    found: Found = {
-        "value": np.full(n, np.nan),
-        "standard_error": np.full(n, np.nan),
-        "converged": np.zeros(n, dtype=bool),
-        "outcome": np.zeros(n, dtype=np.int8),
+def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
+    unit = "1" if isinstance(model, DLE) else "1/s"
+    numbers = (("number", len(model.state_names)),)
+    return (
+        Variable("value", unit, "Lyapunov exponents", more=numbers),
+        Variable("standard_error", unit, "their standard errors", more=numbers),
+        Variable("converged", "1", "whether the standard errors met tol", "bool"),
+    )
+
+
+def _lyapunov(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    found = _spectrum(model, rows, states, options, threads, all=False)
+    return {**found, **{name: found[name][:, 0] for name in ("value", "standard_error")}}
+
+
+def _spectrum(
+    model: Model, rows: Floats, states: Floats, options: Options, threads: int, all: bool = True
+) -> Found:
+    time = options["t"], options["transient"], options["tol"]
+    accuracy = options["rtol"], options["atol"]
+    found = _core.lyapunov(model, rows, states, all, *time, *accuracy, threads, None)
+    done = found["outcome"] == FINISHED
+    return {
+        "value": np.where(done[:, None], found["value"], np.nan),
+        "standard_error": np.where(done[:, None], found["standard_error"], np.nan),
+        "converged": done & found["converged"],
+        "outcome": found["outcome"].astype(np.int8),
     }
-    for group, index, values, fixed, state in _groups(model, parameters, states):
-
-        def some(values: Floats, index: int = index, fixed: Model = fixed, state: Floats = state) -> Any:
-            o = options
-            time = o["t"], o["transient"], o["tol"]
-            return _core.lyapunov(fixed, index, values, state.tolist(), *time, o["rtol"], o["atol"])
-
-        try:
-            _keep(found, group, some(values))
-        except IntegrationError:
-            # One failure fails the whole call; the others are as good as ever.
-            for k in range(len(group)):
-                try:
-                    _keep(found, group[k : k + 1], some(values[k : k + 1]))
-                except IntegrationError as error:
-                    left = "left the wheels" in str(error)
-                    found["outcome"][group[k]] = OUTCOMES.index("ejected" if left else "failed")
-    return found
-
-
-def _keep(found: Found, group: NDArray[np.intp], part: Any) -> None:
-    for name, column in zip(("value", "standard_error", "converged"), part, strict=True):
-        found[name][group] = column
-    found["outcome"][group] = OUTCOMES.index("finished")
-
-
-def _groups(
-    model: Model, parameters: Mapping[str, Floats], states: Floats
-) -> Iterator[tuple[NDArray[np.intp], int, Floats, Model, Floats]]:
-    """Trajectories that differ in one parameter only, which the core takes together.
-
-    Yields which they are, the parameter's index and values, the model with the others, the state.
-    """
-    names = list(model.parameters)
-    # The parameter with the most values makes the fewest groups.
-    inner = max(parameters, key=lambda name: len(np.unique(parameters[name])), default=names[0])
-    outer = {name: values for name, values in parameters.items() if name != inner}
-    groups: dict[bytes, list[int]] = {}
-    for k, row in enumerate(np.column_stack([*outer.values(), states])):
-        groups.setdefault(row.tobytes(), []).append(k)
-    for members in groups.values():
-        first = members[0]
-        fixed = model.with_parameters({name: float(values[first]) for name, values in outer.items()})
-        values = parameters[inner][members] if parameters else np.full(len(members), fixed.parameters[inner])
-        yield np.array(members), names.index(inner), values, fixed, states[first]
 
 
 # --- where a run ends, and how
@@ -161,35 +133,36 @@ def _state_variables(model: Model) -> tuple[Variable, ...]:
     return (*_outcome_variables(model), *ends)
 
 
-def _runs(model: Model, parameters: Mapping[str, Floats], states: Floats, options: Options) -> Found:
+def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
     n = len(states)
     names = ("t_end", *(f"final_{name}" for name in model.state_names))
     found: Found = {name: np.full(n, np.nan) for name in names}
-    found["outcome"] = np.zeros(n, dtype=np.int8)
-    for k, state in enumerate(states):
-        one = model.with_parameters({name: float(values[k]) for name, values in parameters.items()})
+    found["outcome"] = np.full(n, OUTCOMES.index("failed"), dtype=np.int8)
+    for k, (row, state) in enumerate(zip(rows, states, strict=True)):
+        one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
         try:
             run = simulate(one, [0.0, options["t"]], state, rtol=options["rtol"], atol=options["atol"])
         except IntegrationError:
-            outcome = "failed"
+            continue
         except ModelError:
-            # All else was checked when the spec was made.
-            outcome = "start_outside"
+            # All else was checked when the spec was made: this start is not on the disk.
+            end, outcome = (0.0, *state), EJECTED
         else:
-            outcome = run.outcome
-            for name, value in zip(names, (run.t[-1], *run.state[-1]), strict=True):
-                found[name][k] = value
-        found["outcome"][k] = OUTCOMES.index(outcome)
+            end, outcome = (run.t[-1], *run.state[-1]), OUTCOMES.index(run.outcome)
+        found["outcome"][k] = outcome
+        for name, value in zip(names, end, strict=True):
+            found[name][k] = value
     return found
 
 
-def _outcomes(model: Model, parameters: Mapping[str, Floats], states: Floats, options: Options) -> Found:
-    found = _runs(model, parameters, states, options)
+def _outcomes(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    found = _runs(model, rows, states, options, threads)
     return {name: found[name] for name in ("t_end", "outcome")}
 
 
 QUANTITIES: dict[str, Quantity] = {
     "lyapunov": Quantity(_lyapunov_options, _lyapunov_variables, _lyapunov),
+    "spectrum": Quantity(_lyapunov_options, _spectrum_variables, _spectrum),
     "final_state": Quantity(_run_options, _state_variables, _runs),
     "outcome": Quantity(_run_options, _outcome_variables, _outcomes),
 }

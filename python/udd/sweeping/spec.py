@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd._validate import array, number
 from udd.errors import ModelError, UddError
-from udd.exponents import _start
+from udd.exponents import default_start
 from udd.models import Model
 from udd.trajectory import initial_state
 
@@ -37,7 +37,7 @@ class SweepSpec:
 
     Parameters
     ----------
-    quantity : {"lyapunov", "final_state", "outcome"}
+    quantity : {"lyapunov", "spectrum", "final_state", "outcome"}
         What is computed of every trajectory.
     model : Model
         The model; what `over` names is varied in it.
@@ -47,8 +47,8 @@ class SweepSpec:
     state0 : array_like, shape (dim,), optional
         The initial state, for the components that are not varied; by default that of :func:`udd.lyapunov`.
     options : mapping of str to float, optional
-        "lyapunov": `t`, `tol`, `transient`, `rtol` and `atol` as in :func:`udd.lyapunov`. "final_state" and
-        "outcome": the length `t` of the runs, `rtol` and `atol`.
+        "lyapunov" and "spectrum": `t`, `tol`, `transient`, `rtol` and `atol` as in :func:`udd.lyapunov`.
+        "final_state" and "outcome": the length `t` of the runs, `rtol` and `atol`.
     chunk : int
         How many trajectories are computed and written at once, at most.
 
@@ -83,7 +83,7 @@ class SweepSpec:
         if not isinstance(self.over, Mapping) or not 1 <= len(self.over) <= 3:
             raise ModelError("over must name one to three axes with their values")
         over = {name: _axis(self.model, name, values) for name, values in self.over.items()}
-        state = initial_state(self.model, _start(self.model) if self.state0 is None else self.state0)
+        state = initial_state(self.model, default_start(self.model) if self.state0 is None else self.state0)
         if not isinstance(self.options, Mapping):
             raise ModelError(f"options must be a table of names and values, not {self.options!r}")
         options = QUANTITIES[self.quantity].options(self.model, self.options)

@@ -42,13 +42,13 @@ class Target:
     place: tuple[int, ...]
 
 
-def compute_and_write(part: Part, target: Target) -> None:
+def compute_and_write(part: Part, threads: int, target: Target) -> None:
     """The work on a chunk, written to the store, and only then its flag.
 
     A process that is killed on the way leaves no flag, so that the chunk is computed again. Every Zarr
     chunk belongs to one chunk of the work, and a local store puts each into place whole.
     """
-    for name, values in compute(part).items():
+    for name, values in compute(part, threads).items():
         target.arrays[name][target.region] = values
     target.done[target.place] = True
 
@@ -59,8 +59,10 @@ class SweepStore:
     work = staticmethod(compute_and_write)
     remedy = "the same call goes on from here"
 
-    def __init__(self, store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, grid: Grid) -> None:
-        self._spec, self._grid = spec, grid
+    def __init__(
+        self, store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, grid: Grid, threads: int
+    ) -> None:
+        self._spec, self._grid, self._threads = spec, grid, threads
         self._group = _opened(store, spec)
         if "done" not in self._group:  # made last
             _make_template(self._group, spec, grid)
@@ -72,7 +74,7 @@ class SweepStore:
         """What `work` takes."""
         place = self._grid.place(chunk)
         target = Target(self._arrays, self._done, self._grid.region(chunk), place)
-        return part_of(self._spec, self._grid, chunk), target
+        return part_of(self._spec, self._grid, chunk), self._threads, target
 
     def keep(self, chunk: int, _nothing: None) -> None:
         """The worker has written it; whether to here, the first one shows."""

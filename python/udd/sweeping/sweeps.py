@@ -60,7 +60,7 @@ def sweep(
     -----
     IncompleteWarning
         After Ctrl-C, or where a chunk's workers died again and again: what is finished is returned, the rest
-        is NaN with the outcome "not_run".
+        is NaN with the outcome -1, "not_run".
 
     Notes
     -----
@@ -71,8 +71,7 @@ def sweep(
 
     A trajectory that fails is no error: it has an outcome other than "finished", and NaN.
 
-    Every worker uses all cores of its machine, unless the environment variable RAYON_NUM_THREADS says how
-    many.
+    A worker of an executor takes one core, so there should be as many as cores.
 
     Examples
     --------
@@ -102,7 +101,9 @@ def sweep(
     from tqdm import tqdm
 
     grid = grid_of(spec)
-    result = Memory(spec, grid) if store is None else SweepStore(store, spec, grid)
+    # An executor has a worker for every core; alone, this process has them all.
+    threads = 0 if executor is None else 1
+    result = Memory(spec, grid, threads) if store is None else SweepStore(store, spec, grid, threads)
     done = result.done()
     sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
     shown = sys.stderr.isatty() if progress is None else progress
