@@ -20,6 +20,7 @@ _PUBLIC = {
     "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
     "Pendulum": "udd.models",
+    "Section": "udd.sections",
     "SweepSpec": "udd.sweeping",
     "Trajectory": "udd.trajectory",
     "UddError": "udd.errors",
@@ -31,6 +32,7 @@ _PUBLIC = {
     "fit": "udd.fitting",
     "lyapunov": "udd.exponents",
     "plot": "udd.plot",
+    "poincare": "udd.sections",
     "read_measurement": "udd.measurement",
     "render": "udd.film",
     "simulate": "udd.trajectory",
@@ -60,6 +62,8 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.models import DLE as DLE
     from udd.models import Disk as Disk
     from udd.models import Pendulum as Pendulum
+    from udd.sections import Section as Section
+    from udd.sections import poincare as poincare
     from udd.sweeping import SweepSpec as SweepSpec
     from udd.sweeping.sweeps import sweep as sweep
     from udd.tracking import track as track

@@ -6,6 +6,7 @@ results do not already hold, and no global matplotlib setting is changed.
 
 from __future__ import annotations
 
+from .crossings import poincare, return_map
 from .evidence import errors, evidence
 from .fits import misfit, residuals
 from .friction import friction
@@ -23,6 +24,8 @@ __all__ = [
     "orbit",
     "overlay",
     "phase_space",
+    "poincare",
     "residuals",
+    "return_map",
     "time_series",
 ]

@@ -1,0 +1,147 @@
+"""`udd poincare`: where an orbit crosses a surface."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import IncompleteWarning, UddError
+
+from .answer import Answer
+from .chosen import add_models, model_of
+from .options import new, numbers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from udd.sections import Section
+
+_PICTURES = (".png", ".svg", ".pdf")
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Poincare section: where an orbit crosses a surface; the table is CSV."
+    parser = new(commands, "poincare", run, summary)
+    parser.add_argument(
+        "--section",
+        action="append",
+        metavar="EXPR",
+        help='surface: the zero of an expression ("omega - y"), or "maxima of z", "turning points of Y", '
+        '"reversal" (default z, Z or theta); repeatable',
+    )
+    parser.add_argument(
+        "--direction",
+        choices=("up", "down", "both"),
+        help="how it is crossed (default up, turning points and reversals both)",
+    )
+    parser.add_argument("--points", type=int, default=1000, help="how many points (default 1000)")
+    parser.add_argument("--transient", type=int, default=100, help="points left out before (default 100)")
+    parser.add_argument("--t-max", type=float, help="time at which the orbit ends in any case")
+    parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
+    parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
+    parser.add_argument("--state", metavar="X,X,X", help="initial state omega,y,z or Omega,Y,Z,beta or ...")
+    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="file for the table instead of stdout")
+    parser.add_argument("--picture", type=Path, help="picture of the points: .png, .svg or .pdf")
+    parser.add_argument("--map", type=Path, metavar="PICTURE", help="picture of the return map")
+    parser.add_argument("--component", help="component of the state in the return map")
+    add_models(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it; on Ctrl-C what is finished is kept."""
+    from udd.files import write_whole
+    from udd.plot import poincare as draw
+    from udd.plot import return_map
+    from udd.sections import poincare
+
+    _check(args)
+    model = model_of(args, {})
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", UserWarning)
+        found = poincare(
+            model,
+            args.section,
+            args.points,
+            state0=None if args.state is None else numbers([args.state], "--state"),
+            direction=args.direction,
+            transient=args.transient,
+            t_max=args.t_max,
+            rtol=args.rtol,
+            atol=args.atol,
+        )
+    for warning in said:
+        warnings.warn(warning.message, stacklevel=2)
+    files = []
+    table = "\n".join(_lines(found))
+    if args.out is not None:
+        write_whole(args.out, f"{table}\n".encode())
+        files.append(args.out)
+    for path, make in (
+        (args.picture, lambda ax: draw(found, ax)),
+        (args.map, lambda ax: return_map(found, ax, component=args.component)),
+    ):
+        if path is not None:
+            _picture(path, make)
+            files.append(path)
+    stopped = any(isinstance(one.message, IncompleteWarning) and one.message.interrupted for one in said)
+    data = {
+        "model": repr(model),
+        "section": found.section,
+        "direction": found.direction,
+        "points": found.found,
+        "residual": found.residual,
+        "outcome": found.outcome,
+        "mean_return_time": float(_mean_gap(found)),
+        "t": found.t,
+        "state": found.state,
+        "which": found.which,
+        "files": files,
+    }
+    if files and not args.json:
+        for path in files:
+            print(f"written: {path}", file=sys.stderr)
+    return Answer(table if args.out is None else "", data, 130 if stopped else 0)
+
+
+def _mean_gap(found: Section) -> float:
+    return float((found.t[-1] - found.t[0]) / (found.found - 1)) if found.found > 1 else float("nan")
+
+
+def _lines(found: Section) -> list[str]:
+    """The table, to the last digit."""
+    several = len(found.section) > 1
+    head = ["t", *found.model.state_names] + (["section"] if several else [])
+    rows = [",".join(head)]
+    for t, state, which in zip(found.t.tolist(), found.state.tolist(), found.which.tolist(), strict=True):
+        cells = [repr(value) for value in (t, *state)] + ([str(which)] if several else [])
+        rows.append(",".join(cells))
+    return rows
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse what cannot be written, before the work."""
+    for path in filter(None, (args.out, args.picture, args.map)):
+        if not path.parent.is_dir():
+            raise UddError(f"{path}: there is no folder {path.parent}")
+    for path in filter(None, (args.picture, args.map)):
+        if path.suffix not in _PICTURES:
+            raise UddError(f"{path}: the name must end in {', '.join(_PICTURES)}")
+
+
+def _picture(path: Path, make: Any) -> None:
+    from io import BytesIO
+
+    from matplotlib.figure import Figure
+
+    from udd.files import write_whole
+
+    figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+    ax: Axes = figure.add_subplot()
+    make(ax)
+    picture = BytesIO()
+    figure.savefig(picture, format=path.suffix[1:], dpi=150)
+    write_whole(path, picture.getvalue())

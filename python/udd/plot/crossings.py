@@ -1,0 +1,162 @@
+"""Poincaré sections and the maps from crossing to crossing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import UddError
+
+from .style import AFTER, AXES, BEFORE, FAINT, label, new_axes, scale, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from udd.sections import Section
+
+_SHADES = (AFTER, BEFORE, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito's
+_MANY = 20_000  # dots that are drawn as a picture
+_TURNING = ("beta", "theta")
+_SAME = 1e-9  # a component that varies by less of its size is the same everywhere
+
+
+def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, str] | None = None) -> Axes:
+    """The points of a section in the plane of two components; several surfaces in several colours.
+
+    Parameters
+    ----------
+    result : Section
+        Of :func:`udd.poincare`; the points of many orbits are drawn together.
+    ax : Axes, optional
+    components : tuple of str, optional
+        Which components lie across and up; by default the first two that vary, or the time and the one.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        The result is no section, has no points, or no such component.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.plot.poincare(udd.poincare(udd.DLE(1.0), n=100)).get_xlabel()
+    'ω [1]'
+    """
+    _checked(result)
+    across, up = _components(result) if components is None else components
+    ax = new_axes(ax)
+    for k, surface in enumerate(result.section):
+        chosen = (result.which == k) & np.isfinite(result.t)
+        said = f"{surface} = 0" if "=" not in surface else surface
+        _dots(
+            ax,
+            _column(result, across)[chosen],
+            _column(result, up)[chosen],
+            _SHADES[k % len(_SHADES)],
+            said,
+        )
+    ax.set_xlabel(_label(result, across))
+    ax.set_ylabel(_label(result, up))
+    if len(result.section) > 1:
+        ax.legend(frameon=False, markerscale=6)
+    tidy(ax)
+    return ax
+
+
+def return_map(result: Section, ax: Axes | None = None, *, component: str | None = None) -> Axes:
+    """Each crossing's component over that of the crossing before, with the diagonal.
+
+    Parameters
+    ----------
+    result : Section
+        Of :func:`udd.poincare`; ask it for ``"maxima of z"`` to see Lorenz's cusp map.
+    ax : Axes, optional
+    component : str, optional
+        By default the first that varies; of a section of maxima what is at its maximum.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        The result is no section of one surface, has no points, or no such component.
+
+    Examples
+    --------
+    >>> import udd
+    >>> maxima = udd.poincare(udd.DLE(1.0), "maxima of z", 100)
+    >>> udd.plot.return_map(maxima).get_ylabel()
+    'next z [1]'
+    """
+    _checked(result)
+    name = component
+    if name is None:
+        own = result.section[0].removesuffix("'")
+        name = own if own in result.model.state_names else _components(result)[-1]
+    x, following = result.return_map(name)
+    factor = scale(name) if name in AXES else 1.0
+    x, following = factor * x.ravel(), factor * following.ravel()
+    there = np.isfinite(x) & np.isfinite(following)
+    ax = new_axes(ax)
+    if there.any():
+        ends = [float(x[there].min()), float(x[there].max())]
+        ax.plot(ends, ends, color=FAINT, linewidth=1.0, zorder=0)
+    _dots(ax, x[there], following[there], AFTER, None)
+    ax.set_xlabel(_label(result, name))
+    ax.set_ylabel(f"next {_label(result, name)}")
+    ax.set_aspect("equal", "datalim")
+    tidy(ax)
+    return ax
+
+
+def _checked(result: Any) -> None:
+    from udd.sections import Section
+
+    if not isinstance(result, Section):
+        raise UddError(f"this is no section, which udd.poincare makes, but {type(result).__name__}")
+    if not np.isfinite(result.t).any():
+        raise UddError("there are no points in this section")
+
+
+def _dots(ax: Axes, x: NDArray[Any], y: NDArray[Any], shade: str, said: str | None) -> None:
+    size = min(4.0, max(0.5, 60.0 / np.sqrt(max(len(x), 1))))
+    style = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "rasterized": len(x) > _MANY}
+    ax.plot(x, y, color=shade, markersize=size, label=said, **style)
+
+
+def _components(result: Section) -> tuple[str, str]:
+    """Two components that vary, angles that turn only where there is nothing else."""
+    names = sorted(result.model.state_names, key=lambda name: name in _TURNING)
+    varied = []
+    for name in names:
+        own = result.component(name)[np.isfinite(result.t)]
+        if np.ptp(own) > _SAME * np.abs(own).max(initial=0.0) and np.ptp(own) > _SAME:
+            varied.append(name)
+    if len(varied) == 1 or (len(varied) == 2 and varied[1] in _TURNING):
+        return "t", varied[0]
+    if len(varied) < 2:
+        return names[0], names[1]
+    return varied[0], varied[1]
+
+
+def _column(result: Section, name: str) -> NDArray[np.float64]:
+    if name == "t":
+        return result.t
+    return (scale(name) if name in AXES else 1.0) * result.component(name)
+
+
+def _label(result: Section, name: str) -> str:
+    if name == "t":
+        return label("tau" if result.model.kind == "dle" else "t")
+    if name in AXES:
+        return label(name)
+    units = dict(zip(result.model.state_names, result.model.state_units, strict=True))
+    return f"{name} [{units.get(name) or '1'}]"
