@@ -1,10 +1,10 @@
 //! The Taylor coefficients of a solution.
 
-use super::known::{Dle, Known, Program};
+use super::known::{Disk, Dle, Known, Program};
 use super::node::{INVERSE, hold};
 use super::{Step, Tape};
 use crate::model::Sides;
-use crate::scalar::{Isa, Real, Scalar, Work};
+use crate::scalar::{Isa, Scalar, Work};
 use crate::unroll::unroll;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.
@@ -32,9 +32,28 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     ///
     /// # Panics
     /// Where the room was made for another tape, or parameters are missing.
-    #[inline(always)]
     pub fn expand(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
-        self.isa.run(Expansion { tape, parameters, t, x, sides, work: &mut self.work, held: &mut self.held });
+        self.isa.run(Expansion { jets: self, tape, parameters, t, x, sides });
+    }
+
+    /// The instructions that series are computed with.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// As [`expand`](Jets::expand), with the caller's instructions.
+    #[inline(always)]
+    pub fn expand_here(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
+        let Self { work, held, .. } = self;
+        hold(&tape.held, parameters, sides, held);
+        // By the number of equations, so that no other program is compiled.
+        if const { D == 3 } && tape.known == Known::Dle {
+            return known::<Dle, S, D, N>(work, held, t, x, sides);
+        }
+        if const { D == 4 } && tape.known == Known::Disk {
+            return known::<Disk, S, D, N>(work, held, t, x, sides);
+        }
+        interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], held, t, x, sides);
     }
 
     /// The coefficients of each component, order 0 first.
@@ -46,13 +65,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
 
 /// What is compiled once for each instruction set.
 struct Expansion<'a, S: Scalar, const D: usize, const N: usize> {
+    jets: &'a mut Jets<S, D, N>,
     tape: &'a Tape<D>,
     parameters: &'a [S],
     t: S,
     x: &'a [S; D],
     sides: &'a Sides<S>,
-    work: &'a mut [[S; N]],
-    held: &'a mut [S],
 }
 
 impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> {
@@ -60,18 +78,35 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
 
     #[inline(always)]
     fn run<const L: usize>(self) {
-        let Self { tape, parameters, t, x, sides, work, held } = self;
-        hold(&tape.held, parameters, sides, held);
-        // Only for three equations can it be the DLE; nothing else is then compiled.
-        if const { D == 3 } {
-            if tape.known == Known::Dle {
-                if const { size_of::<S>() == size_of::<f64>() } {
-                    return unrolled::<Dle, S, D, N>(work, held, t, x, sides);
-                }
-                return rolled::<Dle, S, D, N>(&mut work[..Dle::SLOTS], held, t, x, sides);
-            }
-        }
-        interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], held, t, x, sides);
+        self.jets.expand_here(self.tape, self.parameters, self.t, self.x, self.sides);
+    }
+}
+
+/// The body for every step of a program, with its number known when the program is compiled.
+macro_rules! every {
+    ($P:ident, $i:ident => $body:block) => {
+        every!(@ $P, $i, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
+    };
+    (@ $P:ident, $i:ident, $body:block, $($k:literal)+) => {
+        $(if $k < $P::STEPS.len() {
+            let $i: usize = $k;
+            $body
+        })+
+    };
+}
+
+#[inline(always)]
+fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
+    work: &mut [[S; N]],
+    held: &[S],
+    t: S,
+    x: &[S; D],
+    sides: &Sides<S>,
+) {
+    if const { size_of::<S>() == size_of::<f64>() } {
+        unrolled::<P, S, D, N>(work, held, t, x, sides);
+    } else {
+        rolled::<P, S, D, N>(&mut work[..P::SLOTS], held, t, x, sides);
     }
 }
 
@@ -117,13 +152,13 @@ fn rolled<P: Program, S: Scalar, const D: usize, const N: usize>(
     sides: &Sides<S>,
 ) {
     unroll!(n in 0..D => { work[n][0] = x[n]; });
-    unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].start(work, held, t, sides); });
+    every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
     unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
     for four in 0..(N + 1) / 4 {
         unroll!(r in 1..5 => {
             let k = 4 * four + r;
             if k < N - 1 {
-                unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].next(work, held, sides, k); });
+                every!(P, i => { P::STEPS[i].next(work, held, sides, k); });
                 unroll!(n in 0..D => {
                     work[n][k + 1] = work[usize::from(P::RATES[n])][k].scale(INVERSE[k + 1]);
                 });
@@ -144,12 +179,12 @@ fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize>(
     let mut room = [[S::zero(); N]; 24];
     let work = &mut room[..];
     unroll!(n in 0..D => { work[n][0] = x[n]; });
-    unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].start(work, held, t, sides); });
+    every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
     unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
     macro_rules! orders {
         ($($k:literal)+) => {
             $(if const { $k < N - 1 } {
-                unroll!(i in 0..P::STEPS.len() => { P::STEPS[i].next(work, held, sides, $k); });
+                every!(P, i => { P::STEPS[i].next(work, held, sides, $k); });
                 unroll!(n in 0..D => {
                     work[n][$k + 1] = work[usize::from(P::RATES[n])][$k].scale(INVERSE[$k + 1]);
                 });

@@ -52,6 +52,11 @@ impl<const D: usize> Tape<D> {
         &self.steps
     }
 
+    /// Whether its series are computed by a program of their own, unrolled when this was compiled.
+    pub fn is_unrolled(&self) -> bool {
+        self.known != known::Known::Not
+    }
+
     /// What does not change along a solution, in the order of evaluation.
     pub fn held(&self) -> &[Held] {
         &self.held
