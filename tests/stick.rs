@@ -472,6 +472,30 @@ fn chattering_is_an_outcome() {
     assert!(run.events.len() < 400 && run.counts.evaluations < 50_000, "{:?}", run.counts);
 }
 
+/// A disk at rest on its bristles trembles about `Omega = 0` by less than the tolerance: no landing leads
+/// back in time.
+#[test]
+fn bristles_at_rest_are_no_trap() {
+    let effects =
+        vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::Lugre), Effect::new(Kind::CubicDrag)];
+    let values = [0.0135, 0.08, 9.81, 0.012, 0.103, 0.055, 0.043, 0.0081, 0.0067];
+    let disk = Bristled(DiskFamily { effects, edge: false }).build(&values);
+    for k in 0..40 {
+        let rtol = 4e-7 * 1.01f64.powi(k);
+        let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
+        let start = [0.0, -0.0085, 0.0085, 0.0, 0.0];
+        let mut driver: Driver<_, f64, 5> = Driver::new(&disk, 0.0, start, None, &tolerance);
+        let mut before = 0.0;
+        while driver.t() < 20.0 {
+            driver.advance(20.0).unwrap();
+            assert!(driver.t() >= before && driver.size() >= 0.0);
+            before = driver.t();
+            // Some 800 steps, and some dozen landings.
+            assert!(driver.counts().evaluations < 100_000, "{:?}", driver.counts());
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 

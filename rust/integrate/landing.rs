@@ -241,7 +241,9 @@ impl<R: Real> Landing<R> {
         self.slope = R::select(R::one().less(self.count), secant, self.slope);
         let guess = size - value / self.slope;
         self.last = (size, value);
-        let inside = (self.low.0.abs().less(guess.abs())).and(guess.abs().less(self.high.0.abs()));
+        // Never back in time: a state that noise left beyond its surface would be led there.
+        let ahead = zero.less(guess * self.high.0);
+        let inside = ahead.and(self.low.0.abs().less(guess.abs())).and(guess.abs().less(self.high.0.abs()));
         let patient = self.count.less(R::constant(8.0));
         let middle = (self.low.0 + self.high.0).scale(0.5);
         let careful = R::select(self.sure, middle, self.high.0);
