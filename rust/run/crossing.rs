@@ -152,6 +152,10 @@ pub struct Scan<'a, R: Real, const D: usize> {
     step: Step<R, D>,
     /// What was found in the last step, lane by lane.
     crossed: Vec<Vec<Crossed<D>>>,
+    /// How many crossings each lane still leaves out.
+    skip: Vec<usize>,
+    /// Whether these need only be counted: a single surface that has no poles.
+    counted: bool,
 }
 
 impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
@@ -175,17 +179,22 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
                 sides: [R::mask(true); MAX_SURFACES],
             },
             crossed: vec![Vec::with_capacity(MOST_PROBES * sections.len()); R::LANES],
+            skip: vec![0; R::LANES],
+            counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
         }
     }
 
-    /// Starts anew in these lanes.
-    pub fn begin<F, E, K>(&mut self, ship: &Ship<'_, F, R, D, E, K>, lanes: R::Mask)
+    /// Starts anew in these lanes, to leave out the first `skip` crossings.
+    pub fn begin<F, E, K>(&mut self, ship: &Ship<'_, F, R, D, E, K>, lanes: R::Mask, skip: usize)
     where
         F: Family<D>,
         E: ErrorNorm<R, D> + Copy,
         K: Method<R, D>,
     {
         self.step.sides = *ship.driver.sides();
+        for lane in (0..R::LANES).filter(|&lane| lanes.lane(lane)) {
+            self.skip[lane] = skip;
+        }
         let law = Law { system: ship.driver.system(), parameters: ship.values() };
         for surface in &mut self.surfaces {
             let value = surface.at(&law, &self.step, &ship.driver.t(), ship.driver.x());
@@ -224,17 +233,39 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
                     any = true;
                     self.crossed.iter_mut().for_each(Vec::clear);
                 }
+                if self.counted {
+                    leave_out(stretches, &mut self.skip);
+                }
                 surface.find(&law, &self.step, stretches, which, &mut self.crossed);
             }
             surface.value = R::select(moved, stretches[K::PROBES.len() - 1].value, surface.value);
         }
         self.step.sides = *driver.sides();
-        if any && self.surfaces.len() > 1 {
-            for list in &mut self.crossed {
+        if any && !self.counted {
+            for (list, skip) in self.crossed.iter_mut().zip(&mut self.skip) {
                 list.sort_by(|a, b| a.t.total_cmp(&b.t));
+                let left_out = list.len().min(*skip);
+                list.drain(..left_out);
+                *skip -= left_out;
             }
         }
         any
+    }
+}
+
+/// Takes away the first crossings of lanes that still leave some out.
+#[inline(always)]
+fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut [usize]) {
+    if skip.iter().all(|&skip| skip == 0) {
+        return;
+    }
+    for stretch in stretches.iter_mut().filter(|stretch| stretch.crossing.any()) {
+        let crossing = stretch.crossing;
+        stretch.crossing = R::Mask::from_lanes(|lane| {
+            let left_out = crossing.lane(lane) && skip[lane] > 0;
+            skip[lane] -= usize::from(left_out);
+            crossing.lane(lane) && !left_out
+        });
     }
 }
 
@@ -342,8 +373,8 @@ impl<R: Real> Surface<'_, R> {
             let s = bracketed(|s| self.inside(law, step, s), low, high, tiny, seen);
             let (t, x) = (step.from + s * step.unit, step.state(s));
             let residual = self.at(law, step, &t, &x);
-            let jump = scale.scale(JUMP).less(residual.abs());
-            for lane in (0..R::LANES).filter(|&lane| seen.lane(lane) && !jump.lane(lane)) {
+            let real = seen.and(residual.abs().less(scale.scale(JUMP)));
+            for lane in (0..R::LANES).filter(|&lane| real.lane(lane)) {
                 crossed[lane].push(Crossed {
                     t: t.lane(lane),
                     x: x.map(|x| x.lane(lane)),
