@@ -97,7 +97,7 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Crossings<D>>> {
         let jobs = self.values.len().max(self.starts.len());
         match Tape::record(self.family, &known(self.values)) {
-            Ok(tape) => sail(&Collect { sections: self, recipe: ByTaylor(&tape) }, jobs, crew),
+            Ok(tape) => sail(&Collect { sections: self, recipe: ByTaylor(&tape, crew.isa) }, jobs, crew),
             // A law that no series follows.
             Err(_) => sail(&Collect { sections: self, recipe: ByDopri5 }, jobs, crew),
         }
@@ -122,7 +122,8 @@ struct Collect<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> {
     type Yield = Crossings<D>;
 
-    const PACKETS: bool = F::PACKETS && T::PACKETS;
+    const PACKETS: bool = F::PACKETS;
+    const WIDE: bool = T::WIDE;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Crossings<D>)>) {
@@ -131,29 +132,25 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
         let start = |job| self.sections.start::<R>(job);
         let mut ship = Ship::new(family, |values| self.recipe.make(values), start(first), &tolerance);
         let mut scan: Scan<'_, R, D> = Scan::new(sections);
-        // What each lane has found, and how many it still leaves out.
-        let mut catches: Vec<(Crossings<D>, usize)> = vec![(Crossings::new(0), skip); R::LANES];
+        // What each lane has found.
+        let mut catches: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];
         for lane in 0..R::LANES {
             let job = if lane == 0 { Some(first) } else { queue.take() };
             if let Some(job) = job {
                 ship.load(lane, job, start(job));
-                catches[lane] = (Crossings::new(count), skip);
+                catches[lane] = Crossings::new(count);
             }
         }
-        scan.begin(&ship, R::mask(true));
+        scan.begin(&ship, R::mask(true), skip);
         while !ship.is_empty() {
             let progress = ship.trial();
             let stopped = queue.stopped();
             let mut full = R::mask(false);
             if scan.look(&ship, progress.moved) {
                 full = R::Mask::from_lanes(|lane| {
-                    let (found, skip) = &mut catches[lane];
-                    for crossed in scan.crossed(lane) {
-                        if *skip > 0 {
-                            *skip -= 1;
-                        } else if found.t.len() < count {
-                            found.push(crossed);
-                        }
+                    let found = &mut catches[lane];
+                    for crossed in scan.crossed(lane).iter().take(count - found.t.len()) {
+                        found.push(crossed);
                     }
                     ship.job(lane).is_some() && found.t.len() == count
                 });
@@ -178,7 +175,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                     () => Ended::Interrupted,
                 };
                 let Some(job) = ship.unload(lane) else { continue };
-                let (mut found, _) = std::mem::replace(&mut catches[lane], (Crossings::new(0), 0));
+                let mut found = std::mem::replace(&mut catches[lane], Crossings::new(0));
                 found.ended = ended;
                 found.end = match ended {
                     Ended::Finished => (found.t[count - 1], found.x[count - 1]),
@@ -189,12 +186,12 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                 let next = if stopped { None } else { queue.take() };
                 if let Some(job) = next {
                     ship.load(lane, job, start(job));
-                    catches[lane] = (Crossings::new(count), skip);
+                    catches[lane] = Crossings::new(count);
                     fresh = true;
                 }
             }
             if fresh {
-                scan.begin(&ship, over);
+                scan.begin(&ship, over, skip);
             }
         }
     }
