@@ -96,9 +96,11 @@ fn what_a_known_parameter_removes_is_left_out() {
     // y - omega, omega z, omega y, w - omega y.
     assert_eq!((plain.steps().len(), plain.held().len()), (4, 1));
     assert_eq!(damped.steps().len(), 6);
+    assert!(plain.is_unrolled(), "rust/tape/known.rs has another tape for the DLE than is recorded");
     let effect = Effect::new(Kind::EccentricMass);
     let disk = |effects| DiskFamily { effects, edge: false };
     let without = Tape::record(&disk(vec![]), &[]).unwrap();
+    assert!(without.is_unrolled(), "rust/tape/known.rs has another tape for the disk than is recorded");
     let zero: Vec<Option<f64>> = [None; 6].into_iter().chain([Some(0.0); 2]).collect();
     let absent = Tape::record(&disk(vec![effect]), &zero).unwrap();
     assert_eq!(absent.steps().len(), without.steps().len());
@@ -354,7 +356,6 @@ impl<F: Family<D>, const D: usize> Work for On<'_, F, D> {
 
 fn same_bits<F: Family<D>, const D: usize>(bits: &Bits<'_, F, D>) {
     let alone: Vec<[u64; D]> = (0..8).map(|l| bits.one(l, Isa::Baseline)).collect();
-    assert_eq!(bits.many::<1>(Isa::best()), alone[..1]);
     assert_eq!(bits.many::<2>(Isa::best()), alone[..2]);
     for isa in Isa::available() {
         let (many, tangents, one) = isa.run(On(bits, isa));

@@ -3,7 +3,7 @@
 //! Products: Leibniz. The others follow from the differential equation of the function, as
 //! `(exp a)' = exp(a) a'` (À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99).
 
-use super::series::{inner, inner_square, product, square};
+use super::series::{inner, inner_square};
 use super::symbol::Function;
 use crate::model::Sides;
 use crate::scalar::Scalar;
@@ -59,20 +59,25 @@ pub enum Node {
     Exp(u16),
     /// Its second slot is for its own derivative, its third for `1 / a[0]`.
     Ln(u16),
-    /// Sine, cosine; the third slot is for the argument's derivative.
-    SinCos(u16),
+    /// The second slot is for the cosine, the third for the argument's derivative.
+    Sin(u16),
+    /// The cosine that belongs to this sine.
+    Cos(u16),
     /// Its other slots are for its slope `1 - tanh^2` and the argument's derivative.
     Tanh(u16),
+    /// The slope that belongs to this hyperbolic tangent.
+    Slope(u16),
     /// The first on the positive side of this surface, else the second.
     Select(u16, u16, u16),
 }
 
 impl Node {
-    /// How many slots it fills.
+    /// How many slots it needs.
     pub(super) fn slots(self) -> usize {
         match self {
             Node::Div(..) | Node::Over(..) | Node::Sqrt(_) | Node::Exp(_) => 2,
-            Node::Ln(_) | Node::SinCos(_) | Node::Tanh(_) => 3,
+            Node::Ln(_) | Node::Sin(_) | Node::Tanh(_) => 3,
+            Node::Cos(_) | Node::Slope(_) => 0,
             _ => 1,
         }
     }
@@ -170,7 +175,7 @@ impl Step {
                 to[2][0] = S::one() / of!(a);
                 Function::Ln.of(of!(a))
             }
-            Node::SinCos(a) => {
+            Node::Sin(a) => {
                 to[1][0] = Function::Cos.of(of!(a));
                 Function::Sin.of(of!(a))
             }
@@ -179,8 +184,28 @@ impl Step {
                 to[1][0] = S::one() - value.square();
                 value
             }
+            // Done with the sine and the tangent.
+            Node::Cos(_) | Node::Slope(_) => return,
             Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
         };
+    }
+
+    /// The series whose product enters coefficient `k`; a square where they are the same.
+    #[inline(always)]
+    fn factors(self) -> Option<(u16, u16)> {
+        let to = self.to;
+        match self.node {
+            Node::Mul(a, b) => Some((a, b)),
+            Node::Square(a) => Some((a, a)),
+            Node::Div(_, b) | Node::Over(_, b) => Some((to, b)),
+            Node::Sqrt(_) => Some((to, to)),
+            Node::Exp(_) => Some((to + 1, to)),
+            Node::Ln(a) => Some((to + 1, a)),
+            Node::Sin(_) | Node::Tanh(_) => Some((to + 2, to + 1)),
+            Node::Cos(sine) => Some((sine + 2, sine)),
+            Node::Slope(tanh) => Some((tanh, tanh)),
+            _ => None,
+        }
     }
 
     /// Coefficient `k >= 1`, from those of lower order and the operands' coefficients up to `k`.
@@ -192,10 +217,15 @@ impl Step {
         sides: &Sides<S>,
         k: usize,
     ) {
-        let (done, to) = work.split_at_mut(usize::from(self.to));
+        // One place for all products keeps the code small.
+        let sum = match self.factors() {
+            Some((a, b)) if a == b => inner_square(&work[usize::from(a)], k),
+            Some((a, b)) => inner(&work[usize::from(a)], &work[usize::from(b)], k),
+            None => S::zero(),
+        };
         macro_rules! of {
-            ($i:expr) => {
-                &done[usize::from($i)]
+            ($slot:expr, $k:expr) => {
+                work[usize::from($slot)][$k]
             };
         }
         macro_rules! h {
@@ -203,57 +233,42 @@ impl Step {
                 held[usize::from($i)]
             };
         }
+        let to = self.to;
         let (weight, inverse) = (k as f64, INVERSE[k]);
-        to[0][k] = match self.node {
+        of!(to, k) = match self.node {
             Node::Time if k == 1 => S::one(),
             Node::Time | Node::Hold(_) => S::zero(),
-            Node::Neg(a) | Node::From(_, a) => -of!(a)[k],
-            Node::Add(a, b) => of!(a)[k] + of!(b)[k],
-            Node::Sub(a, b) => of!(a)[k] - of!(b)[k],
-            Node::Plus(a, _) | Node::Minus(a, _) => of!(a)[k],
-            Node::Scale(a, c) => of!(a)[k] * h!(c),
-            Node::Mul(a, b) => product(of!(a), of!(b), k),
-            Node::Square(a) => square(of!(a), k),
+            Node::Neg(a) | Node::From(_, a) => -of!(a, k),
+            Node::Add(a, b) => of!(a, k) + of!(b, k),
+            Node::Sub(a, b) => of!(a, k) - of!(b, k),
+            Node::Plus(a, _) | Node::Minus(a, _) => of!(a, k),
+            Node::Scale(a, c) => of!(a, k) * h!(c),
+            Node::Mul(a, b) => sum + (of!(a, 0) * of!(b, k) + of!(a, k) * of!(b, 0)),
+            Node::Square(a) => sum + (of!(a, 0) + of!(a, 0)) * of!(a, k),
             // The quotient q of a = q b.
-            Node::Div(a, b) => {
-                let b = of!(b);
-                ((of!(a)[k] - inner(&to[0], b, k)) - to[0][0] * b[k]) * to[1][0]
-            }
-            Node::Over(_, b) => {
-                let b = of!(b);
-                -((inner(&to[0], b, k) + to[0][0] * b[k]) * to[1][0])
-            }
+            Node::Div(a, b) => ((of!(a, k) - sum) - of!(to, 0) * of!(b, k)) * of!(to + 1, 0),
+            Node::Over(_, b) => -((sum + of!(to, 0) * of!(b, k)) * of!(to + 1, 0)),
             // The root r of a = r^2.
-            Node::Sqrt(a) => (of!(a)[k] - inner_square(&to[0], k)) * to[1][0],
+            Node::Sqrt(a) => (of!(a, k) - sum) * of!(to + 1, 0),
             Node::Exp(a) => {
-                let slope = of!(a)[k].scale(weight);
-                to[1][k] = slope;
-                (inner(&to[1], &to[0], k) + slope * to[0][0]).scale(inverse)
+                let slope = of!(a, k).scale(weight);
+                of!(to + 1, k) = slope;
+                (sum + slope * of!(to, 0)).scale(inverse)
             }
             // a l' = a'
             Node::Ln(a) => {
-                let a = of!(a);
-                let slope = (a[k].scale(weight) - inner(&to[1], a, k)) * to[2][0];
-                to[1][k] = slope;
+                let slope = (of!(a, k).scale(weight) - sum) * of!(to + 2, 0);
+                of!(to + 1, k) = slope;
                 slope.scale(inverse)
             }
-            Node::SinCos(a) => {
-                let slope = of!(a)[k].scale(weight);
-                to[2][k] = slope;
-                let cosine = (inner(&to[2], &to[0], k) + slope * to[0][0]).scale(-inverse);
-                let sine = (inner(&to[2], &to[1], k) + slope * to[1][0]).scale(inverse);
-                to[1][k] = cosine;
-                sine
+            Node::Sin(a) | Node::Tanh(a) => {
+                let slope = of!(a, k).scale(weight);
+                of!(to + 2, k) = slope;
+                (sum + slope * of!(to + 1, 0)).scale(inverse)
             }
-            Node::Tanh(a) => {
-                let slope = of!(a)[k].scale(weight);
-                to[2][k] = slope;
-                let value = (inner(&to[2], &to[1], k) + slope * to[1][0]).scale(inverse);
-                to[0][k] = value;
-                to[1][k] = -square(&to[0], k);
-                value
-            }
-            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a)[k], of!(b)[k]),
+            Node::Cos(sine) => (sum + of!(sine + 2, k) * of!(sine, 0)).scale(-inverse),
+            Node::Slope(tanh) => -(sum + (of!(tanh, 0) + of!(tanh, 0)) * of!(tanh, k)),
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a, k), of!(b, k)),
         };
     }
 }

@@ -150,7 +150,12 @@ impl<'a> Lowering<'a> {
             Made::Apply(Function::Sqrt, a) => Node::Sqrt(self.slot(a)),
             Made::Apply(Function::Exp, a) => Node::Exp(self.slot(a)),
             Made::Apply(Function::Ln, a) => Node::Ln(self.slot(a)),
-            Made::Apply(Function::Tanh, a) => Node::Tanh(self.slot(a)),
+            Made::Apply(Function::Tanh, a) => {
+                let node = Node::Tanh(self.slot(a));
+                let slot = self.push(node);
+                self.steps.push(Step { node: Node::Slope(slot), to: slot + 1 });
+                return slot;
+            }
             Made::Apply(Function::Sin, a) => return self.circle(a),
             Made::Apply(Function::Cos, a) => return self.circle(a) + 1,
             Made::Select(j, a, b) => Node::Select(index(j), self.slot(a), self.slot(b)),
@@ -164,8 +169,9 @@ impl<'a> Lowering<'a> {
         if let Some(&slot) = self.circle_of.get(&angle) {
             return slot;
         }
-        let node = Node::SinCos(self.slot(angle));
+        let node = Node::Sin(self.slot(angle));
         let slot = self.push(node);
+        self.steps.push(Step { node: Node::Cos(slot), to: slot + 1 });
         self.circle_of.insert(angle, slot);
         slot
     }

@@ -46,15 +46,3 @@ pub fn inner_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
     let sum = half + half;
     if k >= 2 && k.is_multiple_of(2) { sum + a[k / 2].square() } else { sum }
 }
-
-/// Coefficient `k >= 1` of the product.
-#[inline(always)]
-pub fn product<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
-    inner(a, b, k) + (a[0] * b[k] + a[k] * b[0])
-}
-
-/// Coefficient `k >= 1` of the square.
-#[inline(always)]
-pub fn square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
-    inner_square(a, k) + (a[0] + a[0]) * a[k]
-}
