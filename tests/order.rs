@@ -92,7 +92,7 @@ fn dense_output_is_of_order_4() {
     let start = Point { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
     for theta in [0.3, 0.62] {
         let points = [0.08, 0.06, 0.04, 0.03, 0.02].map(|h| {
-            let mut method = Dopri5::new();
+            let mut method = Dopri5::default();
             method.begin(&dle, &start, true);
             method.attempt(&dle, &start, h, &Tolerance::default());
             (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))

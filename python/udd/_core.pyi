@@ -1,5 +1,6 @@
 """The compiled core. Internal: use the functions of `udd`."""
 
+from collections.abc import Callable
 from typing import TypeAlias, TypedDict, final
 
 import numpy as np
@@ -37,6 +38,26 @@ class _Run(TypedDict):
     outcome: str
     counts: tuple[int, int, int]
     dense: Dense | None
+
+class _Orbits(TypedDict):
+    value: _Floats
+    standard_error: _Floats
+    time: _Floats
+    converged: NDArray[np.bool_]
+    mean: _Floats
+    product: _Floats
+    end: _Floats
+    outcome: NDArray[np.uint8]
+
+class _Crossings(TypedDict):
+    points: _Floats
+    t: _Floats
+    which: NDArray[np.uint8]
+    found: NDArray[np.uint64]
+    residual: _Floats
+    end: _Floats
+    t_end: _Floats
+    outcome: NDArray[np.uint8]
 
 class _Solution(TypedDict):
     states: _Floats
@@ -78,15 +99,32 @@ def simulate(
 ) -> _Run: ...
 def lyapunov(
     model: Model,
-    index: int,
     values: _Floats,
-    state0: list[float],
+    starts: _Floats,
+    all: bool,
     time: float,
     transient: float,
     goal: float,
     rtol: float,
     atol: float,
-) -> tuple[_Floats, _Floats, NDArray[np.bool_]]: ...
+    threads: int,
+    progress: Callable[[int], object] | None,
+) -> _Orbits: ...
+
+def sections(
+    model: Model,
+    values: _Floats,
+    starts: _Floats,
+    section: list[str],
+    direction: list[int],
+    skip: int,
+    count: int,
+    t_max: float,
+    rtol: float,
+    atol: float,
+    threads: int,
+    progress: Callable[[int], object] | None = None,
+) -> _Crossings: ...
 def solve(
     model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], iterations: int
 ) -> _Solution: ...

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._validate import array, number
-from udd.errors import ConvergenceWarning, ModelError
+from udd.crew import bar, thread_count
+from udd.errors import ConvergenceWarning, IntegrationError, ModelError
 from udd.models import DLE, Disk, Model
+from udd.outcomes import FINISHED, OUTCOMES
 from udd.trajectory import initial_state, tolerances
 
 __all__ = ["ConvergenceWarning", "lyapunov"]
@@ -27,6 +29,8 @@ def lyapunov(
     state0: ArrayLike | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    threads: int | None = None,
+    progress: bool | None = None,
     with_error: Literal[False] = False,
 ) -> float: ...
 
@@ -41,6 +45,8 @@ def lyapunov(
     state0: ArrayLike | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    threads: int | None = None,
+    progress: bool | None = None,
     with_error: Literal[False] = False,
 ) -> NDArray[np.float64]: ...
 
@@ -55,6 +61,8 @@ def lyapunov(
     state0: ArrayLike | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    threads: int | None = None,
+    progress: bool | None = None,
     with_error: Literal[True],
 ) -> tuple[float, float]: ...
 
@@ -69,6 +77,8 @@ def lyapunov(
     state0: ArrayLike | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    threads: int | None = None,
+    progress: bool | None = None,
     with_error: Literal[True],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
@@ -82,6 +92,8 @@ def lyapunov(
     state0: ArrayLike | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    threads: int | None = None,
+    progress: bool | None = None,
     with_error: bool = False,
 ) -> float | NDArray[np.float64] | tuple[float, float] | tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The largest Lyapunov exponent: the mean rate at which neighbouring orbits part.
@@ -102,6 +114,10 @@ def lyapunov(
         Initial state. Where several attractors coexist it decides between them.
     rtol, atol : float
         Tolerances of the run.
+    threads : int, optional
+        How many threads to use, by default one per core. No bit of the result depends on it.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default for long arrays, where stderr is a terminal.
     with_error : bool
         Whether to return the standard error too.
 
@@ -117,20 +133,23 @@ def lyapunov(
     ModelError
         A drive or an option that cannot be used.
     IntegrationError
-        The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up.
+        The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up. In an array such an
+        exponent is NaN, with a warning.
     KeyboardInterrupt
         On Ctrl-C, at once.
 
     Warns
     -----
     ConvergenceWarning
-        Where the standard error does not meet `tol` after the time `t`.
+        Where the standard error does not meet `tol` after the time `t`, or an orbit of an array has no exponent.
 
     Notes
     -----
-    The tangent vector is the derivative part of a run over dual numbers, scaled back after every block
-    (Benettin et al., Meccanica 15 (1980) 9). The exponent is that of the orbit from `state0`: a transient
-    longer than `t`, as near w = 4.5, is not seen as one.
+    The tangent vector is the derivative part of a run over dual numbers, kept at length 1
+    (Benettin et al., Meccanica 15 (1980) 9); steps are taken by the Taylor method, many orbits at once. The
+    exponent is that of the orbit from `state0`: a transient longer than `t`, as near w = 4.5, is not seen as
+    one. See :func:`udd.lyapunov_spectrum` for a verdict. Drives are taken in portions, so that memory hardly
+    grows beyond the result.
 
     Examples
     --------
@@ -148,33 +167,82 @@ def lyapunov(
             raise ModelError(f"w must not be negative, not {drives[drives < 0].flat[0]:g}")
         model, values, shape = DLE(1.0), drives.ravel(), drives.shape
     slow = 1.0 if isinstance(model, DLE) else 0.25  # the disk's unit of time is 0.27 s
-    time = number("t", 1e5 * slow if t is None else t, above=0.0)
+    time, skipped = span(t, transient, longest=1e5 * slow, skip=400.0 * slow)
     goal = number("tol", 2e-3 / slow if tol is None else tol, above=0.0)
-    skipped = number(
-        "transient", min(400.0 * slow, 0.1 * time) if transient is None else transient, least=0.0
-    )
-    if skipped >= time:
-        raise ModelError(f"transient must be below t = {time:g}, not {skipped:g}")
     rtol, atol = tolerances(rtol, atol)
-    start = initial_state(model, _start(model) if state0 is None else state0)
+    start = initial_state(model, default_start(model) if state0 is None else state0)
+    crew = thread_count(threads)
 
-    found = _core.lyapunov(model, 0, values, start.tolist(), time, skipped, goal, rtol, atol)
-    exponents, errors = found[0].reshape(shape), found[1].reshape(shape)
-    missed = errors[~found[2].reshape(shape)]
-    if missed.size:
-        which = "the exponent has" if shape == () else f"{missed.size} of {errors.size} exponents have"
+    n = values.size
+    exponents, errors = np.empty(n), np.empty(n)
+    missed, worst = 0, 0.0
+    outcomes: list[int] = []
+    with bar(n, "exponents", progress) as show:
+        for first in range(0, n, PORTION):
+            part = slice(first, min(first + PORTION, n))
+            rows = np.tile(list(model.parameters.values()), (part.stop - first, 1))
+            rows[:, 0] = values[part]
+            found = _core.lyapunov(
+                model, rows, start[None, :], False, time, skipped, goal, rtol, atol, crew, show(first)
+            )
+            done = found["outcome"] == FINISHED
+            exponents[part] = np.where(done, found["value"][:, 0], np.nan)
+            errors[part] = np.where(done, found["standard_error"][:, 0], np.nan)
+            short = done & ~found["converged"]
+            if short.any():
+                missed += int(short.sum())
+                worst = max(worst, float(errors[part][short].max()))
+            if not done.all():
+                outcomes += found["outcome"][~done].tolist()
+    if outcomes:
+        _tell(outcomes, n, shape == ())
+    if missed:
+        which = "the exponent has" if shape == () else f"{missed} of {n} exponents have"
         warnings.warn(
-            f"{which} a standard error up to {missed.max():.2g}, above tol = {goal:g}; "
+            f"{which} a standard error up to {worst:.2g}, above tol = {goal:g}; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
             stacklevel=2,
         )
     if shape == ():
-        return (float(exponents), float(errors)) if with_error else float(exponents)
+        value, error = float(exponents[0]), float(errors[0])
+        return (value, error) if with_error else value
+    exponents, errors = exponents.reshape(shape), errors.reshape(shape)
     return (exponents, errors) if with_error else exponents
 
 
-def _start(model: Model) -> list[float]:
+PORTION = 1 << 16
+"""So many orbits are handed to the core at a time."""
+
+
+def _tell(outcomes: list[int], n: int, single: bool) -> None:
+    """Says what became of the orbits that have no exponent."""
+    counts = {OUTCOMES[code]: outcomes.count(code) for code in sorted(set(outcomes))}
+    if single:
+        reasons = {
+            "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
+            "failed": "the solution blew up",
+        }
+        (outcome,) = counts
+        raise IntegrationError(f"there is no exponent: {reasons.get(outcome, outcome)}")
+    list_ = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+    warnings.warn(
+        f"{len(outcomes)} of {n} orbits have no exponent ({list_}) and are NaN",
+        ConvergenceWarning,
+        stacklevel=3,
+    )
+
+
+def span(t: float | None, transient: float | None, *, longest: float, skip: float) -> tuple[float, float]:
+    """The checked time to run and how much of it is left out at the start."""
+    time = number("t", longest if t is None else t, above=0.0)
+    skipped = number("transient", min(skip, 0.1 * time) if transient is None else transient, least=0.0)
+    if skipped >= time:
+        raise ModelError(f"transient must be below t = {time:g}, not {skipped:g}")
+    return time, skipped
+
+
+def default_start(model: Model) -> list[float]:
     """An initial state from which orbits reach the main attractor."""
     if isinstance(model, DLE):
         return [1.0, 1.0, 0.01]

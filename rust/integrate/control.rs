@@ -3,6 +3,7 @@
 use super::method::Point;
 use super::tolerance::Tolerance;
 use crate::model::System;
+use crate::scalar::elementary::{exp2_rough, log2_rough};
 use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::vector;
 
@@ -20,7 +21,7 @@ const LEAST: f64 = 1e-4;
 pub struct Controller<R: Real> {
     /// The proportional exponent.
     alpha: f64,
-    /// Logarithm of the error norm of the last accepted step.
+    /// Binary logarithm, a rough one, of the error norm of the last accepted step.
     previous: R,
     /// Whether the last trial was rejected; the step does not grow right after.
     rejected: R::Mask,
@@ -30,12 +31,12 @@ impl<R: Real> Controller<R> {
     /// For a method of this order.
     pub fn new(order: i32) -> Self {
         let alpha = 1.0 / f64::from(order) - 0.75 * BETA;
-        Self { alpha, previous: R::constant(LEAST.ln()), rejected: R::mask(false) }
+        Self { alpha, previous: R::constant(LEAST.log2()), rejected: R::mask(false) }
     }
 
     /// Forgets what was, in these lanes.
     pub fn reset(&mut self, lanes: R::Mask) {
-        self.previous = R::select(lanes, R::constant(LEAST.ln()), self.previous);
+        self.previous = R::select(lanes, R::constant(LEAST.log2()), self.previous);
         self.rejected = self.rejected.and(lanes.not());
     }
 
@@ -45,13 +46,13 @@ impl<R: Real> Controller<R> {
     pub fn judge(&mut self, error: R, lanes: R::Mask) -> (R::Mask, R) {
         let finite = error.finite();
         let accepted = finite.and(R::one().less(error).not());
-        let log = error.max(R::constant(1e-200)).ln();
+        let log = log2_rough(error.max(R::constant(1e-200)));
         let integral = R::select(accepted, self.previous.scale(BETA), R::zero());
-        let factor = (integral - log.scale(self.alpha)).exp().scale(SAFETY);
+        let factor = exp2_rough(integral - log.scale(self.alpha)).scale(SAFETY);
         let factor = factor.max(R::constant(SHRINK)).min(R::constant(GROW));
         let capped = R::select(self.rejected, factor.min(R::one()), factor);
         let factor = R::select(finite, R::select(accepted, capped, factor), R::constant(0.1));
-        let kept = R::select(accepted, log.max(R::constant(LEAST.ln())), self.previous);
+        let kept = R::select(accepted, log.max(R::constant(LEAST.log2())), self.previous);
         self.previous = R::select(lanes, kept, self.previous);
         self.rejected = lanes.and(accepted.not()).or(lanes.not().and(self.rejected));
         (accepted, factor)

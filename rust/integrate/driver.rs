@@ -235,6 +235,12 @@ where
         self.method.at(dt)
     }
 
+    /// The same without derivatives.
+    #[inline(always)]
+    pub fn dense_real(&self, dt: S::Real) -> [S::Real; D] {
+        self.method.real_at(dt)
+    }
+
     /// The method, whose polynomial is that of the last trial.
     pub fn method(&self) -> &K {
         &self.method
@@ -359,7 +365,7 @@ where
                 let mut slope = S::Real::zero();
                 let ahead = trial.size.scale(1e-4);
                 for target in watch.targets().filter(|&j| found.crossing[j].any()) {
-                    let on = |dt: S::Real| watch.value(target, self.at.t + dt, &self.method.at(dt));
+                    let on = |dt: S::Real| watch.on(target, &self.method, dt);
                     let own = (on(found.dt + ahead) - on(found.dt - ahead)) / (ahead + ahead);
                     slope = S::Real::select(found.crossing[target], own, slope);
                 }

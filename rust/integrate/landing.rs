@@ -11,6 +11,7 @@ use super::method::{Method, Point};
 use super::root::bracketed;
 use crate::model::{MAX_SURFACES, System};
 use crate::scalar::{Mask, Real, Scalar};
+use crate::unroll::vector;
 
 /// What can be crossed: the switching surfaces, then the wall.
 pub const TARGETS: usize = MAX_SURFACES + 1;
@@ -66,6 +67,13 @@ where
         S::Real::select(self.at.sides[target], value, -value)
     }
 
+    /// The same at `dt` after the start of the method's last trial, on its polynomial.
+    #[inline(always)]
+    pub fn on<K: Method<S, D>>(&self, target: usize, method: &K, dt: S::Real) -> S::Real {
+        let x = method.real_at(dt);
+        self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
+    }
+
     /// The first crossings within the method's last trial, of size `h`.
     #[inline(always)]
     pub fn find<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Found<S::Real> {
@@ -77,7 +85,7 @@ where
         let mut earliest = infinite;
         let mut stale = never;
         for target in self.targets() {
-            let on = |dt: S::Real| self.value(target, self.at.t + dt, &method.at(dt));
+            let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
             let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));

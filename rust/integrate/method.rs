@@ -3,6 +3,7 @@
 use super::tolerance::ErrorNorm;
 use crate::model::{Sides, System};
 use crate::scalar::Scalar;
+use crate::unroll::vector;
 
 /// Where a run stands, lane by lane.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +59,13 @@ pub trait Method<S: Scalar, const D: usize> {
 
     /// The state at `dt` after the start of the last trial, on its polynomial.
     fn at(&self, dt: S::Real) -> [S; D];
+
+    /// The same without derivatives.
+    #[inline(always)]
+    fn real_at(&self, dt: S::Real) -> [S::Real; D] {
+        let x = self.at(dt);
+        vector!(S::Real, D; n => x[n].real())
+    }
 
     /// The same polynomial's unit of time and its coefficients, lowest first: `x = Σ_k c_k (dt/unit)^k`.
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;

@@ -52,8 +52,8 @@ fn combine<S: Scalar, const D: usize, const N: usize>(
     n: usize,
 ) -> S {
     let mut sum = stages[0][n].scale(weights[0]);
-    unroll!(j in 1..count => {
-        if weights[j] != 0.0 {
+    unroll!(j in 1..N => {
+        if j < count && weights[j] != 0.0 {
             sum += stages[j][n].scale(weights[j]);
         }
     });

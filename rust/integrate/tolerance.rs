@@ -12,6 +12,9 @@ pub trait ErrorNorm<S: Scalar, const D: usize> {
 
     /// What is allowed for the state alone.
     fn state(&self) -> &Tolerance;
+
+    /// Whether more than the state counts.
+    const TANGENTS: bool = false;
 }
 
 /// The error that a step may make in component `n`: `atol + rtol |x_n|`.
@@ -89,6 +92,8 @@ impl<R: Real, const D: usize, const N: usize> ErrorNorm<Dual<R, N>, D> for WithT
     fn state(&self) -> &Tolerance {
         &self.0
     }
+
+    const TANGENTS: bool = true;
 }
 
 /// Why a run could not go on.

@@ -100,8 +100,8 @@ impl<S: Scalar> Disk<S> {
         slots
     }
 
-    /// The equation of motion with all effects.
-    #[inline]
+    /// The equation of motion with all effects. It is large, and compiled once for each kind of number.
+    #[inline(never)]
     pub(super) fn balance(&self, t: S, x: &[S; 4], contact: &Contact<S>, sides: &Sides<S>) -> Balance<S> {
         let &[omega, y, z, _] = x;
         let at = self.at(|s| s, t, *x, contact, sides);

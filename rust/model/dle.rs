@@ -33,6 +33,8 @@ pub struct DleFamily;
 impl Family<3> for DleFamily {
     type Built<S: Scalar> = Dle<S>;
 
+    const PACKETS: bool = true;
+
     fn parameters(&self) -> Vec<Parameter> {
         vec![parameter("w", ""), parameter("B", "")]
     }

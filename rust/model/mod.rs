@@ -135,6 +135,10 @@ pub trait Family<const D: usize>: Clone + Send + Sync {
     /// The system it builds.
     type Built<S: Scalar>: System<S, D>;
 
+    /// Whether many runs are taken in packets: it makes a short law several times as fast, at the cost of
+    /// compiling every analysis of it for each instruction set. Others run one by one, with the same bits.
+    const PACKETS: bool = false;
+
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;
 

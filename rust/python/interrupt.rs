@@ -23,6 +23,19 @@ where
     T: Send,
     E: Into<PyErr> + Send,
 {
+    let (result, signal) = watch(py, || Ok(()), work)?;
+    signal?;
+    result.map_err(Into::into)
+}
+
+/// The same for work that has something to show when it is stopped: returns its result beside the
+/// signal. `tick` is called now and then with the lock held, to show how far the work is; its error stops
+/// the work as a signal does.
+pub fn watch<T: Send>(
+    py: Python<'_>,
+    tick: impl Fn() -> PyResult<()>,
+    work: impl FnOnce(&Stop) -> T + Send,
+) -> PyResult<(T, PyResult<()>)> {
     let stop = Stop::new();
     let done = AtomicBool::new(false);
     let caller = thread::current();
@@ -37,16 +50,14 @@ where
         while !done.load(Ordering::Acquire) {
             py.detach(|| thread::park_timeout(POLL));
             if signal.is_ok() {
-                signal = py.check_signals();
+                signal = py.check_signals().and_then(|()| tick());
                 if signal.is_err() {
                     stop.set();
                 }
             }
         }
-        let result = worker.join();
-        signal?;
-        match result.and_then(|inner| inner) {
-            Ok(value) => value.map_err(Into::into),
+        match worker.join().and_then(|inner| inner) {
+            Ok(value) => Ok((value, signal)),
             Err(panic) => {
                 let what = message(panic.as_ref());
                 Err(PyRuntimeError::new_err(format!("internal error, please report it: {what}")))

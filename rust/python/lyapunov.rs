@@ -1,81 +1,122 @@
-//! `udd.lyapunov`.
+//! `udd.lyapunov` and `udd.lyapunov_spectrum`.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use rayon::prelude::*;
+use pyo3::types::PyDict;
 
-use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
-use super::model::{AnyModel, state, with_model};
-use crate::integrate::{Failure, Tolerance};
+use super::jobs::{self, outcome_code};
+use super::model::{AnyModel, with_model};
+use crate::integrate::Tolerance;
 use crate::model::Family;
-use crate::run::{Exponent, LyapunovOptions, Stop, largest_exponent};
-use crate::scalar::Dual;
+use crate::run::{Crew, Exponents, Lyapunov, LyapunovOptions, Stop};
+use crate::scalar::Isa;
 
-fn exponent<F: Family<D>, const D: usize>(
-    family: &F,
-    values: &[f64],
-    x0: [f64; D],
-    options: &LyapunovOptions,
-    stop: &Stop,
-) -> Result<Exponent, Failure> {
-    let values: Vec<_> = values.iter().map(|&value| Dual::fixed(value)).collect();
-    largest_exponent(&family.build(&values), x0, options, stop)
+/// Columns, one row for each orbit.
+#[derive(Default)]
+struct Table {
+    value: Vec<f64>,
+    standard_error: Vec<f64>,
+    time: Vec<f64>,
+    converged: Vec<bool>,
+    mean: Vec<f64>,
+    product: Vec<f64>,
+    end: Vec<f64>,
+    outcome: Vec<u8>,
 }
 
-/// A failure at one value of the parameter that is swept.
-struct At(f64, Failure);
-
-impl From<At> for PyErr {
-    fn from(At(value, failure): At) -> PyErr {
-        match failure {
-            Failure::Interrupted => failure.into(),
-            other => IntegrationError::new_err(format!(
-                "the integration failed at parameter value {value}: {other}"
-            )),
-        }
+impl Table {
+    fn push<const D: usize, const N: usize>(&mut self, orbit: Option<Exponents<D, N>>) {
+        let Some(orbit) = orbit else {
+            self.value.extend([f64::NAN; N]);
+            self.standard_error.extend([f64::NAN; N]);
+            self.time.push(f64::NAN);
+            self.converged.push(false);
+            self.mean.extend([f64::NAN; D]);
+            self.product.extend([[f64::NAN; D]; D].as_flattened());
+            self.end.extend([f64::NAN; D]);
+            self.outcome.push(jobs::INTERRUPTED);
+            return;
+        };
+        self.value.extend(orbit.exponents.value);
+        self.standard_error.extend(orbit.exponents.standard_error);
+        self.time.push(orbit.exponents.time);
+        self.converged.push(orbit.converged);
+        self.mean.extend(orbit.moments.first);
+        self.product.extend(orbit.moments.second.as_flattened());
+        self.end.extend(orbit.x);
+        self.outcome.push(outcome_code(orbit.outcome));
     }
 }
 
-type Columns<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
+fn table<F: Family<D>, const D: usize>(
+    orbits: &Lyapunov<'_, F, D>,
+    all: bool,
+    threads: usize,
+    done: &AtomicUsize,
+    stop: &Stop,
+) -> Table {
+    let crew = Crew { threads, isa: Isa::best(), done, stop };
+    let mut table = Table::default();
+    if all {
+        orbits.run::<D>(crew).into_iter().for_each(|orbit| table.push(orbit));
+    } else {
+        orbits.run::<1>(crew).into_iter().for_each(|orbit| table.push(orbit));
+    }
+    table
+}
 
-/// Largest exponents of a model for each value of one of its parameters, on all cores: exponents,
-/// standard errors, and whether each met the goal.
+/// The largest exponent of each orbit, or all of them, on `threads` threads (0 for one per core).
+///
+/// `values` has one row of parameter values for each orbit, or a single row for all; `starts` likewise.
+/// `progress` is called with the number of orbits done. Returns a dict of columns.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn lyapunov<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,
-    index: usize,
-    values: PyReadonlyArray1<'py, f64>,
-    state0: Vec<f64>,
+    values: PyReadonlyArray2<'py, f64>,
+    starts: PyReadonlyArray2<'py, f64>,
+    all: bool,
     time: f64,
     transient: f64,
     goal: f64,
     rtol: f64,
     atol: f64,
-) -> PyResult<Columns<'py>> {
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    if index >= model.values().len() {
-        return Err(ModelError::new_err(format!("the model has no parameter number {index}")));
-    }
-    let swept = values.as_slice()?.to_vec();
     let options = LyapunovOptions { time, transient, goal, tolerance: Tolerance { rtol, atol } };
-    let list = with_model!(&model, |family, plain| {
-        let x0 = state(&state0)?;
-        interrupt::run(py, |stop| {
-            let one = |&value: &f64| {
-                let mut values = plain.clone();
-                values[index] = value;
-                exponent(family, &values, x0, &options, stop).map_err(|failure| At(value, failure))
-            };
-            swept.par_iter().with_max_len(1).map(one).collect::<Result<Vec<_>, At>>()
-        })?
+    let rows = jobs::values(&model, &values)?;
+    let done = AtomicUsize::new(0);
+    let tick = || match &progress {
+        Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
+        None => Ok(()),
+    };
+    let (table, width, dimension, signal) = with_model!(&model, |family, _values| {
+        let starts = jobs::starts(&starts)?;
+        jobs::agree(rows.len(), starts.len())?;
+        let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
+        let dimension = starts[0].len();
+        let (table, signal) = interrupt::watch(py, tick, |stop| table(&orbits, all, threads, &done, stop))?;
+        (table, if all { dimension } else { 1 }, dimension, signal)
     });
-    let value = PyArray1::from_vec(py, list.iter().map(|e| e.value).collect());
-    let error = PyArray1::from_vec(py, list.iter().map(|e| e.standard_error).collect());
-    let converged = PyArray1::from_vec(py, list.iter().map(|e| e.converged).collect());
-    Ok((value, error, converged))
+    signal?;
+    let count = table.time.len();
+    let wide = |values: Vec<f64>, width: usize| PyArray1::from_vec(py, values).reshape([count, width]);
+    let dict = PyDict::new(py);
+    dict.set_item("value", wide(table.value, width)?)?;
+    dict.set_item("standard_error", wide(table.standard_error, width)?)?;
+    dict.set_item("time", PyArray1::from_vec(py, table.time))?;
+    dict.set_item("converged", PyArray1::from_vec(py, table.converged))?;
+    dict.set_item("mean", wide(table.mean, dimension)?)?;
+    dict.set_item("product", PyArray1::from_vec(py, table.product).reshape([count, dimension, dimension])?)?;
+    dict.set_item("end", wide(table.end, dimension)?)?;
+    dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
+    Ok(dict)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -4,8 +4,10 @@ mod effects;
 mod errors;
 mod estimate;
 mod interrupt;
+mod jobs;
 mod lyapunov;
 mod model;
+mod section;
 mod simulate;
 
 use pyo3::prelude::*;
@@ -17,6 +19,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     model::register(module)?;
     simulate::register(module)?;
     lyapunov::register(module)?;
+    section::register(module)?;
     estimate::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;

@@ -48,7 +48,7 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
         match self.stepper {
             Stepper::Dopri5 => sail(&Sampled { ensemble: self, recipe: ByDopri5 }, runs, crew),
             Stepper::Taylor => match Tape::record(self.family, &known(self.values)) {
-                Ok(tape) => sail(&Sampled { ensemble: self, recipe: ByTaylor(&tape) }, runs, crew),
+                Ok(tape) => sail(&Sampled { ensemble: self, recipe: ByTaylor(&tape, crew.isa) }, runs, crew),
                 // A law that no series follows.
                 Err(_) => sail(&Sampled { ensemble: self, recipe: ByDopri5 }, runs, crew),
             },
@@ -82,7 +82,8 @@ struct Sampled<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
     type Yield = Passage<D>;
 
-    #[inline(always)]
+    const PACKETS: bool = F::PACKETS && T::PACKETS;
+
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Passage<D>)>) {
         let Ensemble { family, times, tolerance, .. } = self.ensemble;
         let Some(first) = queue.take() else { return };

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::ThreadPoolBuilder;
 
 use super::Stop;
-use crate::scalar::{Isa, Packet, Real, Work};
+use crate::scalar::{Isa, LANES, Packet, Real};
 
 /// Jobs numbered from 0, each taken once.
 #[derive(Debug)]
@@ -40,8 +40,10 @@ pub trait Fleet: Sync {
     /// What a job yields.
     type Yield: Send;
 
+    /// Whether packets are worth it.
+    const PACKETS: bool;
+
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
-    /// To be `#[inline(always)]`, as [`Work`] asks.
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Self::Yield)>);
 }
 
@@ -59,21 +61,32 @@ pub struct Crew<'a> {
 /// What the jobs yield, in their order; `None` for those that were not finished when the work was
 /// stopped.
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
+    spread(jobs, crew, |queue, yields| {
+        if T::PACKETS {
+            if jobs > 1 && crew.isa != Isa::Baseline {
+                return fleet.sail::<Packet<LANES>>(queue, yields);
+            }
+        }
+        fleet.sail::<f64>(queue, yields);
+    })
+}
+
+fn spread<Y: Send>(
+    jobs: usize,
+    crew: Crew<'_>,
+    work: impl Fn(&Queue<'_>, &mut Vec<(usize, Y)>) + Sync,
+) -> Vec<Option<Y>> {
     let queue = Queue { next: AtomicUsize::new(0), jobs, done: crew.done, stop: crew.stop };
-    let mut all: Vec<Option<T::Yield>> = Vec::new();
+    let mut all: Vec<Option<Y>> = Vec::new();
     all.resize_with(jobs, || None);
     let watch = |queue: &Queue<'_>| {
         let mut yields = Vec::new();
-        if jobs == 1 {
-            fleet.sail::<f64>(queue, &mut yields);
-        } else {
-            crew.isa.run(Sail { fleet, queue, yields: &mut yields });
-        }
+        work(queue, &mut yields);
         yields
     };
     let threads = if crew.threads == 0 { rayon::current_num_threads() } else { crew.threads };
     // One packet's worth of jobs is the least that a thread is worth.
-    let threads = threads.min(jobs.div_ceil(8)).max(1);
+    let threads = threads.min(jobs.div_ceil(LANES)).max(1);
     let parts = if threads == 1 {
         vec![watch(&queue)]
     } else {
@@ -87,19 +100,4 @@ pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Y
         all[job] = Some(result);
     }
     all
-}
-
-struct Sail<'a, T: Fleet> {
-    fleet: &'a T,
-    queue: &'a Queue<'a>,
-    yields: &'a mut Vec<(usize, T::Yield)>,
-}
-
-impl<T: Fleet> Work for Sail<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<const L: usize>(self) {
-        self.fleet.sail::<Packet<L>>(self.queue, self.yields);
-    }
 }

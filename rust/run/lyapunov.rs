@@ -1,173 +1,195 @@
-//! The largest Lyapunov exponent.
+//! Lyapunov exponents.
 
-use std::array::from_fn;
+use super::blocks::{Average, Blocks};
+use super::ensemble::known;
+use super::fleet::{Crew, Fleet, Queue, sail};
+use super::frame::{orthonormalise, tangents};
+use super::moments::Moments;
+use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::ship::{Ship, Start};
+use super::trajectory::Outcome;
+use crate::integrate::{Failure, Tolerance, WithTangents};
+use crate::model::Family;
+use crate::scalar::{Dual, Mask, Real};
+use crate::tape::Tape;
 
-use crate::integrate::{Driver, Ending, Failure, Tolerance, WithTangents};
-use crate::model::System;
-use crate::run::Stop;
-use crate::scalar::Dual;
-
-/// How an exponent is estimated.
+/// How exponents are estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LyapunovOptions {
     /// The time to run at most, the transient included.
     pub time: f64,
     /// The time at the start that is left out in any case.
     pub transient: f64,
-    /// The run ends when the standard error is down to this.
+    /// The run ends when the standard error of the largest exponent is down to this.
     pub goal: f64,
     /// The accuracy of the run.
     pub tolerance: Tolerance,
 }
 
-/// A time average with its uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exponent {
-    pub value: f64,
-    /// The standard error, from the scatter of block means.
-    pub standard_error: f64,
-    /// The time averaged over.
-    pub time: f64,
-    /// Whether the standard error met the goal.
-    pub converged: bool,
+/// The `N` largest exponents of many orbits.
+#[derive(Clone, Copy, Debug)]
+pub struct Lyapunov<'a, F, const D: usize> {
+    pub family: &'a F,
+    /// The parameters' values, one row for each orbit, or a single row for all.
+    pub values: &'a [Vec<f64>],
+    /// The initial states, one for each orbit, or a single one for all.
+    pub starts: &'a [[f64; D]],
+    pub options: LyapunovOptions,
 }
 
-/// The largest exponent of the orbit from `x0`, the mean growth rate of a tangent vector.
-///
-/// The tangent is the derivative part of a dual run, as accurate as the state. It is scaled back to
-/// length 1 at the end of every block; the blocks' growth rates give the mean and, from their scatter,
-/// its standard error. Where the first half of the blocks disagrees with the second by more than chance
-/// allows, the run was still on its way to the attractor and the first half is dropped. Blocks are merged
-/// in pairs as the run goes on, so memory stays bounded.
-pub fn largest_exponent<M: System<Dual<f64, 1>, D>, const D: usize>(
-    system: &M,
-    x0: [f64; D],
-    options: &LyapunovOptions,
-    stop: &Stop,
-) -> Result<Exponent, Failure> {
-    // A direction that no symmetry singles out.
-    let direction: [f64; D] = from_fn(|n| [1.0, -0.7, 0.5, 0.3][n % 4]);
-    let start = from_fn(|n| Dual { re: x0[n], d: [direction[n]] });
-    let norm = WithTangents(options.tolerance);
-    let mut driver: Driver<_, _, D, _> = Driver::new(system, 0.0, start, None, &norm).with_wall();
-    let mut blocks = Blocks::new((options.time - options.transient) / (8 * Blocks::MOST) as f64);
-    rescale(&mut driver);
+/// What is known of one orbit's exponents.
+#[derive(Clone, Copy, Debug)]
+pub struct Exponents<const D: usize, const N: usize> {
+    pub exponents: Average<N>,
+    /// Whether the standard error met the goal.
+    pub converged: bool,
+    /// Time averages of the state and of the products of its components, where all exponents are asked for.
+    pub moments: Moments<f64, D>,
+    /// When and where the run ended, and how.
+    pub t: f64,
+    pub x: [f64; D],
+    pub outcome: Result<Outcome, Failure>,
+}
 
-    let mut discarding = options.transient > 0.0;
-    let mut growth = 0.0;
-    let mut since = 0.0;
-    loop {
-        let end = if discarding { options.transient } else { options.time };
-        while driver.t() < end {
-            stop.check()?;
-            if driver.advance(end)? == Ending::Wall {
-                return Err(Failure::LeftDomain { t: driver.t() });
+impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
+    /// The `N` largest exponents of each orbit: the mean growth rates of tangents that are kept
+    /// orthonormal (Benettin et al., Meccanica 15 (1980) 9). `None` stands for orbits that were not
+    /// finished when the work was stopped.
+    ///
+    /// Tangents are the derivative part of a dual run, as accurate as the state. Growth is summed over
+    /// blocks, whose scatter gives the standard errors. Where the first half of the blocks disagrees
+    /// with the second by more than chance allows, the run was still on its way to the attractor and the
+    /// first half is dropped.
+    pub fn run<const N: usize>(&self, crew: Crew<'_>) -> Vec<Option<Exponents<D, N>>> {
+        let orbits = self.values.len().max(self.starts.len());
+        match Tape::record(self.family, &known(self.values)) {
+            Ok(tape) => sail(
+                &Tangents::<_, D, N, _> { orbits: self, recipe: ByTaylor(&tape, crew.isa) },
+                orbits,
+                crew,
+            ),
+            // A law that no series follows.
+            Err(_) => sail(&Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5 }, orbits, crew),
+        }
+    }
+
+    fn start<R: Real, const N: usize>(&self, orbit: usize) -> Start<'_, Dual<R, N>, D> {
+        let x = self.starts[orbit.min(self.starts.len() - 1)];
+        Start {
+            values: &self.values[orbit.min(self.values.len() - 1)],
+            t: 0.0,
+            x: tangents(x),
+            end: if self.options.transient > 0.0 { self.options.transient } else { self.options.time },
+        }
+    }
+}
+
+struct Tangents<'a, F, const D: usize, const N: usize, T> {
+    orbits: &'a Lyapunov<'a, F, D>,
+    recipe: T,
+}
+
+impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tangents<'_, F, D, N, T> {
+    type Yield = Exponents<D, N>;
+
+    const PACKETS: bool = F::PACKETS && T::PACKETS;
+
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Exponents<D, N>)>) {
+        let LyapunovOptions { time, transient, goal, tolerance } = self.orbits.options;
+        let Some(first) = queue.take() else { return };
+        let span = (time - transient) / (8 * Blocks::<N>::MOST) as f64;
+        let start = |orbit| self.orbits.start::<R, N>(orbit);
+        let norm = WithTangents(tolerance);
+        let mut ship = Ship::new(self.orbits.family, |v| self.recipe.make(v), start(first), &norm);
+        let mut blocks = vec![Blocks::<N>::new(span); R::LANES];
+        let mut growth = [R::zero(); N];
+        let mut since = R::zero();
+        let mut full_at = R::constant(f64::INFINITY);
+        let mut moments = Moments::<R, D>::zero();
+        let mut waiting = Some(first);
+        for lane in 0..R::LANES {
+            if let Some(orbit) = waiting.take().or_else(|| queue.take()) {
+                ship.load(lane, orbit, start(orbit));
+                full_at.set_lane(lane, if transient > 0.0 { f64::INFINITY } else { span });
             }
-            let span = driver.t() - since;
-            let size = length(driver.x());
-            // The tangent must neither over- nor underflow within a block.
-            let full = span >= blocks.span;
-            if full || !(1e-100..1e100).contains(&size) {
-                growth += rescale(&mut driver);
+        }
+
+        while !ship.is_empty() && !queue.stopped() {
+            // Up to the end of the transient nothing counts.
+            let counting = ship.end.less(R::constant(time)).not();
+            let progress = ship.trial();
+            let moved = progress.moved;
+            if const { N == D } {
+                moments.add(&ship.driver, moved.and(counting));
             }
-            if full && !discarding {
-                blocks.push(growth, span);
-                (growth, since) = (0.0, driver.t());
-                if let Some(exponent) = blocks.estimate()
-                    && exponent.standard_error <= options.goal
-                {
-                    return Ok(Exponent { converged: true, ..exponent });
+            let (x, lengths) = orthonormalise(ship.driver.x());
+            ship.driver.set_state(moved, x);
+            let t = ship.driver.t();
+            for i in 0..N {
+                growth[i] = R::select(moved, growth[i] + lengths[i].ln(), growth[i]);
+            }
+            let full = moved.and(t.less(full_at).not());
+            let over = ship.arrived().or(progress.walled()).or(progress.failed);
+            if !full.or(over).any() {
+                continue;
+            }
+            for lane in (0..R::LANES).filter(|&lane| full.or(over).lane(lane)) {
+                let Some(orbit) = ship.job(lane) else { continue };
+                let now = t.lane(lane);
+                let own = &mut blocks[lane];
+                let mut converged = false;
+                if counting.lane(lane) && now > since.lane(lane) {
+                    let sums = growth.map(|sum| sum.lane(lane));
+                    let look = own.push(sums, now - since.lane(lane));
+                    if look && !own.drop_transient() {
+                        converged = own.average().standard_error[0] <= goal;
+                    }
+                }
+                let failed = progress.failed.lane(lane);
+                let walled = progress.walled().lane(lane);
+                let arrived = over.lane(lane) && !failed && !walled;
+                let settled = arrived && !counting.lane(lane);
+                if settled {
+                    // The transient is over: count from here.
+                    ship.end.set_lane(lane, time);
+                    own.clear(span);
+                    moments.clear(lane);
+                }
+                if full.lane(lane) || settled {
+                    self::clear(&mut growth, lane);
+                    since.set_lane(lane, now);
+                    full_at.set_lane(lane, now + own.span);
+                }
+                if !(converged || failed || walled || (arrived && !settled)) {
+                    continue;
+                }
+                let outcome = match (failed, walled) {
+                    (true, _) => Err(ship.driver.failure_of(lane)),
+                    (_, true) => Ok(Outcome::Ejected),
+                    _ => Ok(Outcome::Finished),
+                };
+                let exponents = own.average();
+                let x = ship.driver.x().map(|x| x.re.lane(lane));
+                let means = moments.lane(lane);
+                moments.clear(lane);
+                yields.push((orbit, Exponents { exponents, converged, moments: means, t: now, x, outcome }));
+                queue.finish();
+                ship.unload(lane);
+                full_at.set_lane(lane, f64::INFINITY);
+                if let Some(orbit) = queue.take() {
+                    ship.load(lane, orbit, start(orbit));
+                    blocks[lane].clear(span);
+                    self::clear(&mut growth, lane);
+                    since.set_lane(lane, 0.0);
+                    full_at.set_lane(lane, if transient > 0.0 { f64::INFINITY } else { span });
                 }
             }
         }
-        if !discarding {
-            break;
-        }
-        discarding = false;
-        rescale(&mut driver);
-        (growth, since) = (0.0, driver.t());
-    }
-    Ok(blocks.whole())
-}
-
-fn length<const D: usize>(x: &[Dual<f64, 1>; D]) -> f64 {
-    x.iter().map(|v| v.d[0] * v.d[0]).sum::<f64>().sqrt()
-}
-
-/// Scales the tangent to length 1; returns the logarithm of the length it had.
-fn rescale<M: System<Dual<f64, 1>, D>, const D: usize>(
-    driver: &mut Driver<M, Dual<f64, 1>, D, WithTangents>,
-) -> f64 {
-    let size = length(driver.x());
-    driver.set_state(true, driver.x().map(|v| Dual { re: v.re, d: [v.d[0] / size] }));
-    size.ln()
-}
-
-/// Growth of the tangent over consecutive pieces of the run.
-struct Blocks {
-    /// The least time that a block covers.
-    span: f64,
-    /// Growth and time of each block.
-    list: Vec<(f64, f64)>,
-}
-
-impl Blocks {
-    /// With more than this many blocks neighbours are merged.
-    const MOST: usize = 256;
-    /// With fewer there is no telling the scatter.
-    const LEAST: usize = 32;
-
-    fn new(span: f64) -> Self {
-        Self { span, list: Vec::with_capacity(Self::MOST) }
-    }
-
-    fn push(&mut self, growth: f64, time: f64) {
-        self.list.push((growth, time));
-        if self.list.len() == Self::MOST {
-            self.list = merged(&self.list);
-            self.span *= 2.0;
-        }
-    }
-
-    /// Mean and standard error, looked at only where the number of blocks makes it worth while.
-    fn estimate(&mut self) -> Option<Exponent> {
-        let n = self.list.len();
-        if n < Self::LEAST || !n.is_multiple_of(16) {
-            return None;
-        }
-        let (first, second) = self.list.split_at(n / 2);
-        let ((a, a_error), (b, b_error)) = (mean(first), mean(second));
-        // Four standard errors: chance does that once in ten thousand looks.
-        if (a - b).abs() > 4.0 * a_error.hypot(b_error) {
-            self.list.drain(..n / 2);
-            return None;
-        }
-        Some(self.whole())
-    }
-
-    fn whole(&self) -> Exponent {
-        let time = self.list.iter().map(|b| b.1).sum();
-        let growth: f64 = self.list.iter().map(|b| b.0).sum();
-        let standard_error = mean(&self.list).1;
-        Exponent { value: growth / time, standard_error, time, converged: false }
     }
 }
 
-fn merged(list: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    list.chunks_exact(2).map(|pair| (pair[0].0 + pair[1].0, pair[0].1 + pair[1].1)).collect()
-}
-
-/// Mean rate and its standard error, from the scatter of blocks as long as can be: merged while 32
-/// remain. Neighbouring short blocks are correlated, long ones hardly.
-fn mean(list: &[(f64, f64)]) -> (f64, f64) {
-    let mut level = list.to_vec();
-    while level.len() >= 2 * Blocks::LEAST {
-        level = merged(&level);
+fn clear<R: Real>(sums: &mut [R], lane: usize) {
+    for sum in sums {
+        sum.set_lane(lane, 0.0);
     }
-    let n = level.len() as f64;
-    let rates = level.iter().map(|(growth, time)| growth / time);
-    let mean = rates.clone().sum::<f64>() / n;
-    let variance = rates.map(|rate| (rate - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let (growth, time) = list.iter().fold((0.0, 0.0), |(g, t), b| (g + b.0, t + b.1));
-    (growth / time, (variance / n).sqrt())
 }

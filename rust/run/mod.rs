@@ -1,17 +1,26 @@
 //! Who drives it: whole runs and what is derived from them.
 
+mod blocks;
+mod crossing;
 mod ensemble;
 mod fleet;
+mod frame;
 mod lyapunov;
+mod moments;
 mod recipe;
+mod section;
 mod ship;
 mod stop;
 mod trajectory;
 
+pub use blocks::{Average, Blocks};
+pub use crossing::Crossed;
 pub use ensemble::{Ensemble, Passage, Stepper, known};
 pub use fleet::{Crew, Fleet, Queue, sail};
-pub use lyapunov::{Exponent, LyapunovOptions, largest_exponent};
+pub use lyapunov::{Exponents, Lyapunov, LyapunovOptions};
+pub use moments::Moments;
 pub use recipe::{ByDopri5, ByTaylor, Recipe};
+pub use section::{Crossings, Ended, FAR, Section, Sections};
 pub use ship::{Ship, Start};
 pub use stop::Stop;
 pub use trajectory::{Outcome, Output, Run, trajectory};

@@ -1,12 +1,15 @@
 //! Which method takes the steps, before it is known over which scalar.
 
 use crate::integrate::{Dopri5, Method, Taylor};
-use crate::scalar::Scalar;
+use crate::scalar::{Isa, Scalar};
 use crate::tape::Tape;
 
 /// Makes a method for systems of `D` equations over any scalar.
 pub trait Recipe<const D: usize>: Sync {
     type Method<S: Scalar>: Method<S, D>;
+
+    /// Whether its steps over packets are compiled for every instruction set.
+    const PACKETS: bool;
 
     /// The method for systems whose parameters have these values.
     fn make<S: Scalar>(&self, values: Vec<S>) -> Self::Method<S>;
@@ -19,19 +22,23 @@ pub struct ByDopri5;
 impl<const D: usize> Recipe<D> for ByDopri5 {
     type Method<S: Scalar> = Dopri5<S, D>;
 
+    const PACKETS: bool = false;
+
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
         Dopri5::default()
     }
 }
 
-/// The Taylor method on this tape.
+/// The Taylor method on this tape, with these instructions.
 #[derive(Clone, Copy, Debug)]
-pub struct ByTaylor<'a, const D: usize>(pub &'a Tape<D>);
+pub struct ByTaylor<'a, const D: usize>(pub &'a Tape<D>, pub Isa);
 
 impl<'a, const D: usize> Recipe<D> for ByTaylor<'a, D> {
     type Method<S: Scalar> = Taylor<'a, S, D>;
 
+    const PACKETS: bool = true;
+
     fn make<S: Scalar>(&self, values: Vec<S>) -> Taylor<'a, S, D> {
-        Taylor::new(self.0, values)
+        Taylor::new(self.0, values, self.1)
     }
 }

@@ -122,10 +122,8 @@ struct Collect<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> {
     type Yield = Crossings<D>;
 
-    const PACKETS: bool = F::PACKETS;
-    const WIDE: bool = T::WIDE;
+    const PACKETS: bool = F::PACKETS && T::PACKETS;
 
-    #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Crossings<D>)>) {
         let Sections { family, sections, skip, count, bounded, tolerance, .. } = *self.sections;
         let Some(first) = queue.take() else { return };

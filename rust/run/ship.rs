@@ -69,13 +69,19 @@ where
         self.jobs[lane]
     }
 
+    /// The values of the parameters in each lane.
+    #[inline(always)]
+    pub fn values(&self) -> &[S] {
+        &self.values
+    }
+
     /// Whether all lanes are empty.
     pub fn is_empty(&self) -> bool {
         self.jobs.iter().all(Option::is_none)
     }
 
     /// Tries a step in every lane.
-    #[inline(always)]
+    #[inline(never)]
     pub fn trial(&mut self) -> Progress<S::Mask> {
         self.driver.trial(self.end)
     }

@@ -2,6 +2,9 @@
 
 use std::sync::OnceLock;
 
+/// Lanes in a packet, the same for every instruction set: one AVX-512 register, two of AVX2, four of SSE2.
+pub const LANES: usize = 8;
+
 /// A set of vector instructions. Results do not depend on it, only speed does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Isa {
@@ -56,8 +59,13 @@ impl Isa {
             Isa::Avx2 => return unsafe { avx2(work) },
             Isa::Baseline => {}
         }
-        work.run::<4>()
+        baseline(work)
     }
+}
+
+#[inline(never)]
+fn baseline<W: Work>(work: W) -> W::Output {
+    work.run::<LANES>()
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -71,11 +79,11 @@ fn has_avx512() -> bool {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn avx2<W: Work>(work: W) -> W::Output {
-    work.run::<8>()
+    work.run::<LANES>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
 fn avx512<W: Work>(work: W) -> W::Output {
-    work.run::<8>()
+    work.run::<LANES>()
 }

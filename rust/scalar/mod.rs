@@ -12,7 +12,7 @@ mod packet;
 mod real;
 
 pub use dual::Dual;
-pub use isa::{Isa, Work};
+pub use isa::{Isa, LANES, Work};
 pub use packet::{LaneMask, Packet};
 
 use std::fmt::Debug;

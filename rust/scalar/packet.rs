@@ -171,27 +171,29 @@ impl<const L: usize> Scalar for Packet<L> {
     fn sqrt(self) -> Self {
         self.each(f64::sqrt)
     }
-    #[inline(always)]
+    // Not inlined: models use these seldom, and their code is long over eight lanes. What is hot calls
+    // `elementary` itself.
+    #[inline(never)]
     fn exp(self) -> Self {
         elementary::exp(self)
     }
-    #[inline(always)]
+    #[inline(never)]
     fn ln(self) -> Self {
         elementary::ln(self)
     }
-    #[inline(always)]
+    #[inline(never)]
     fn sin(self) -> Self {
         elementary::sin_cos(self).0
     }
-    #[inline(always)]
+    #[inline(never)]
     fn cos(self) -> Self {
         elementary::sin_cos(self).1
     }
-    #[inline(always)]
+    #[inline(never)]
     fn tanh(self) -> Self {
         elementary::tanh(self)
     }
-    #[inline(always)]
+    #[inline(never)]
     fn sin_cos(self) -> (Self, Self) {
         elementary::sin_cos(self)
     }

@@ -1,13 +1,23 @@
 //! How far a Taylor polynomial reaches, and its values.
 
 use super::Jets;
-use crate::scalar::{Real, Scalar};
-use crate::unroll::unroll;
+use crate::scalar::{Real, Scalar, Work};
+use crate::unroll::{unroll, vector};
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// The solution at a distance `dt` from where it was expanded.
-    #[inline(always)]
     pub fn at(&self, dt: S::Real) -> [S; D] {
+        self.isa().run(Value(self, dt))
+    }
+
+    /// The same without derivatives.
+    pub fn real_at(&self, dt: S::Real) -> [S::Real; D] {
+        self.isa().run(RealValue(self, dt))
+    }
+
+    /// As [`at`](Jets::at), with the caller's instructions.
+    #[inline(always)]
+    pub fn at_here(&self, dt: S::Real) -> [S; D] {
         let dt2 = dt * dt;
         let dt4 = dt2 * dt2;
         let mut x = [S::zero(); D];
@@ -53,6 +63,29 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let before = before.scale(1.0 / D as f64).each(logarithm).scale(-0.5 / (N - 2) as f64);
         // Zero, or not a number.
         last.min(before).each(power) + (sum - sum)
+    }
+}
+
+struct Value<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
+
+impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
+    type Output = [S; D];
+
+    #[inline(always)]
+    fn run<const L: usize>(self) -> [S; D] {
+        self.0.at_here(self.1)
+    }
+}
+
+struct RealValue<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
+
+impl<S: Scalar, const D: usize, const N: usize> Work for RealValue<'_, S, D, N> {
+    type Output = [S::Real; D];
+
+    #[inline(always)]
+    fn run<const L: usize>(self) -> [S::Real; D] {
+        let x = self.0.at_here(self.1);
+        vector!(S::Real, D; n => x[n].real())
     }
 }
 

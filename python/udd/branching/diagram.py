@@ -129,7 +129,8 @@ def bifurcation(
     `extend` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the way up
     or down begins at its initial state again with the next value.
 
-    The numbers do not depend on the number of threads.
+    The numbers do not depend on the number of threads. Where the rates depend on time, every run begins at
+    time 0, carried over or not.
 
     Examples
     --------

@@ -118,11 +118,11 @@ def basins(
     smaller where the basins are large. With f ~ distance^alpha, the basins' boundary has the dimension of the
     grid less alpha (Grebogi et al., Phys. Lett. A 99 (1983) 415); initial states without an attractor or a
     final outcome are left out. The exponent is NaN where too few distances are small enough, as on a coarse
-    grid.
+    grid. Where the rates depend on time, every motion begins at time 0 again when it is followed further.
 
     Examples
     --------
-    At w = 6 the two asymmetric orbits, mirror images of each other, share the states between them.
+    At w = 6.2 two asymmetric orbits, mirror images of each other, share the states between them.
 
     >>> import numpy as np
     >>> import udd

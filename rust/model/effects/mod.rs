@@ -308,7 +308,8 @@ macro_rules! library {
                 match self { $(Kind::$Name => $Name::DRY),+ }
             }
 
-            #[inline]
+            // All effects over one kind of number are one function, not a copy for each use.
+            #[inline(never)]
             fn enter<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
                 match self { $(Kind::$Name => $Name::enter(p, at, slots)),+ }
             }

@@ -1,0 +1,10 @@
+"""How runs end, one list for all."""
+
+from __future__ import annotations
+
+OUTCOMES = ("finished", "ejected", "time ran out", "failed", "interrupted", "escaped", "chattering")
+"""The meanings of an array of outcomes, by its values."""
+
+FINISHED = OUTCOMES.index("finished")
+EJECTED = OUTCOMES.index("ejected")
+
