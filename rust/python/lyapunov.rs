@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 
 use super::interrupt;
 use super::jobs::{self, outcome_code};
-use super::model::{AnyModel, with_model};
+use super::model::{AnyModel, with_wide_model};
 use crate::integrate::Tolerance;
 use crate::model::Family;
 use crate::run::{Crew, Exponents, Lyapunov, LyapunovOptions, Stop};
@@ -96,7 +96,7 @@ fn lyapunov<'py>(
         Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
         None => Ok(()),
     };
-    let (table, width, dimension, signal) = with_model!(&model, |family, _values| {
+    let (table, width, dimension, signal) = with_wide_model!(&model, |family, _values| {
         let starts = jobs::starts(&starts)?;
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };

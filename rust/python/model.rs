@@ -35,6 +35,23 @@ macro_rules! with_model {
 }
 pub(crate) use with_model;
 
+/// The same for work on packets, which is compiled for each instruction set: friction by bristles, rarely
+/// wanted there, would double the time that takes.
+macro_rules! with_wide_model {
+    ($model:expr, |$family:ident, $values:ident| $body:expr) => {
+        match $model {
+            $crate::python::model::AnyModel::Dle($family, $values) => $body,
+            $crate::python::model::AnyModel::Disk($family, $values) => $body,
+            $crate::python::model::AnyModel::Pendulum($family, $values) => $body,
+            _ => {
+                let message = "friction with the treatment lugre is for udd.simulate; here take set-valued";
+                return Err($crate::python::errors::ModelError::new_err(message));
+            }
+        }
+    };
+}
+pub(crate) use with_wide_model;
+
 /// An effect's name, momentum and treatment.
 type EffectSpec = (String, Option<String>, Option<String>);
 /// What a Python model's `_spec` holds: kind, values, effects, edge.

@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use super::errors::ModelError;
 use super::interrupt;
 use super::jobs;
-use super::model::{AnyModel, with_model};
+use super::model::{AnyModel, with_wide_model};
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;
 use crate::run::{Crew, Crossings, Ended, Section, Sections, Stop};
@@ -176,7 +176,7 @@ fn sections<'py>(
         Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
         None => Ok(()),
     };
-    let (table, signal) = with_model!(&model, |family, _values| {
+    let (table, signal) = with_wide_model!(&model, |family, _values| {
         let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
         let pairs = section.iter().zip(&direction);
         let surfaces = pairs.map(|(text, &direction)| parse(text, direction, &names, &parameters));
