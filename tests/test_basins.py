@@ -223,7 +223,7 @@ def test_ctrl_c_gives_what_is_finished() -> None:
     timer.start()
     try:
         with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):
-            found = udd.basins(udd.DLE(9.0), square(3, 300), n=24, transient=2000)
+            found = udd.basins(udd.DLE(9.0), square(3, 300), n=24, transient=2000, threads=1)
     finally:
         timer.cancel()
     names = np.array(found["outcome"].attrs["flag_meanings"].split())[found["outcome"].to_numpy()]

@@ -168,9 +168,10 @@ def test_the_symmetry_breaks_where_it_should() -> None:
 
 
 def test_the_duration_of_periods() -> None:
-    # physics.md: T at w = 0.25 and at w = 10; 1e-8 is what rtol = 1e-9 leaves of such a time.
-    found = udd.bifurcation(udd.DLE(1.0), "w", [0.25, 10.0])
-    assert found["period_time"].to_numpy().ravel() == pytest.approx([22.737375, 3.35832224912], abs=1e-6)
+    # physics.md: T at w = 0.25 (to six decimals) and at w = 10. At w = 0.25 the transient falls by
+    # 0.995 from point to point; after 1000 it is below the digits given.
+    found = udd.bifurcation(udd.DLE(1.0), "w", [0.25, 10.0], transient=1000)
+    assert found["period_time"].to_numpy().ravel() == pytest.approx([22.737375, 3.35832224912], abs=6e-7)
 
 
 def test_the_transient_near_the_symmetry_breaking_is_seen_through() -> None:
@@ -235,7 +236,7 @@ def test_the_disk_has_the_period_that_the_full_model_should() -> None:
 
 def test_a_disk_that_leaves_the_wheels_is_an_outcome() -> None:
     starts = [[0.0, 1e-3, 0.04, 0.0], [0.0, 0.08, 0.01, 0.0]]
-    found = udd.bifurcation(udd.Disk(0.039), "W", [0.036, 0.045], starts=starts, n=40)
+    found = udd.bifurcation(udd.Disk(0.039), "W", [0.036, 0.039], starts=starts, n=40)
     names = found["outcome"].attrs["flag_meanings"].split()
     assert {names[k] for k in found["outcome"].sel(start=0).to_numpy().ravel()} == {"ejected"}
     assert {names[k] for k in found["outcome"].sel(start=1).to_numpy().ravel()} == {"start_outside"}
@@ -311,19 +312,28 @@ def test_without_xarray_one_sentence_says_how_to_get_it(monkeypatch: pytest.Monk
 @pytest.mark.skipif(os.name == "nt", reason="signals to a process of its own")
 @pytest.mark.parametrize("path", ["independent", "both"])
 def test_ctrl_c_gives_what_is_finished(path: str) -> None:
-    timer = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     try:
         with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):
             found = udd.bifurcation(
-                udd.DLE(1.0), "w", np.linspace(0.5, 4, 5000), n=20, transient=20000, path=path, component="y"
-            )  # type: ignore[call-overload]
+                udd.DLE(1.0),
+                "w",
+                np.linspace(0.5, 4, 5000),
+                n=20,
+                transient=3000,
+                path=path,  # type: ignore[arg-type]
+                component="y",
+                threads=1,
+            )
     finally:
         timer.cancel()
     names = found["outcome"].attrs["flag_meanings"].split()
-    finished = found["outcome"] == names.index("finished")
+    finished = found["outcome"] != names.index("interrupted")
     assert 0 < int(finished.sum()) < finished.size
-    assert (finished | (found["outcome"] == names.index("interrupted"))).all()
+    assert set(np.unique(found["outcome"])) <= {
+        names.index(n) for n in ("finished", "undecided", "interrupted")
+    }
     assert np.array_equal(np.isfinite(found["y"].to_numpy()).all(axis=-1), finished.to_numpy())
     assert found.attrs["complete"] == 0
 
@@ -384,7 +394,7 @@ def test_the_command_refuses_in_one_sentence(
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_the_command_keeps_what_is_finished_on_ctrl_c(tmp_path: Path) -> None:
     path = tmp_path / "part.nc"
-    argv = f"bifurcation w --from 0.5 --to 4 --n 5000 --points 20 --transient 20000 --out {path} --json"
+    argv = f"bifurcation w --from 0.5 --to 4 --n 20000 --points 20 --transient 4000 --out {path} --json"
     process = subprocess.Popen(
         [sys.executable, "-m", "udd", *argv.split()],
         stdout=subprocess.PIPE,
@@ -399,7 +409,7 @@ def test_the_command_keeps_what_is_finished_on_ctrl_c(tmp_path: Path) -> None:
     assert "stopped by Ctrl-C" in err
     said = json.loads(out)
     assert not said["complete"]
-    assert 0 < said["outcomes"]["finished"] < 5000
+    assert 0 < said["outcomes"]["finished"] < 20000
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        assert xr.open_dataset(path, engine="scipy").sizes["w"] == 5000
+        assert xr.open_dataset(path, engine="scipy").sizes["w"] == 20000

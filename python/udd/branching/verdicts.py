@@ -115,9 +115,10 @@ def follow(
     verdicts = judge(found, values)
     spent = transient + n
     while len(open_ := np.flatnonzero((found.outcome == FINISHED) & (verdicts.period == SETTLING))):
-        if 2 * spent + n > longest:
+        stopped = (found.outcome == INTERRUPTED).any()
+        if 2 * spent + n > longest and not stopped:
             found.outcome[open_] = UNDECIDED
-        elif not again(runner, judge, rows, values, found, verdicts, open_, spent, n):
+        elif stopped or not again(runner, judge, rows, values, found, verdicts, open_, spent, n):
             still = open_[verdicts.period[open_] == SETTLING]
             found.outcome[still], found.points[still] = INTERRUPTED, np.nan
         spent += spent + n
