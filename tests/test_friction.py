@@ -165,6 +165,10 @@ def test_effects_keep_their_treatment(treatment: str) -> None:
             ),
             "all dry friction must have it",
         ),
+        (
+            lambda: udd.lyapunov(udd.Pendulum(0.5, effects=effects.coulomb(c=0.1, treatment="lugre"))),
+            "is for udd.simulate",
+        ),
     ],
 )
 def test_what_cannot_be_is_said(call, named) -> None:  # type: ignore[no-untyped-def]

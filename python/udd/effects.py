@@ -94,8 +94,8 @@ class Spec:
         What may become of dry friction's jump at rest, the default first: ``"smoothed"`` (over the width
         `eps`; nothing sticks, but it can be fitted), ``"set-valued"`` (it sticks until the torque exceeds the
         friction), ``"karnopp"`` (the same, and speeds below `eps` count as rest) or ``"lugre"`` (bristles
-        bend by about `eps`, in rad, before they slide; their deflection is one more state). Empty for
-        what is not dry friction.
+        bend by about `eps`, in rad, before they slide; their deflection is one more state; for
+        :func:`udd.simulate` only). Empty for what is not dry friction.
     parameters : tuple of Parameter
         In the order of the formula.
     """
