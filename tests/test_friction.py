@@ -166,7 +166,9 @@ def test_effects_keep_their_treatment(treatment: str) -> None:
             "all dry friction must have it",
         ),
         (
-            lambda: udd.lyapunov(udd.Pendulum(0.5, effects=effects.coulomb(c=0.1, treatment="lugre"))),
+            lambda: udd.lyapunov(
+                udd.Pendulum(0.5, effects=effects.coulomb(c=0.1, treatment="lugre")), state0=[0, 1, 0]
+            ),
             "is for udd.simulate",
         ),
     ],
