@@ -67,6 +67,13 @@ pub trait Method<S: Scalar, const D: usize> {
         vector!(S::Real, D; n => x[n].real())
     }
 
+    /// The coefficients of one component's polynomial over the time since the step's start, lowest first,
+    /// where the method has them at hand.
+    #[inline(always)]
+    fn component(&self, _n: usize) -> Option<&[S]> {
+        None
+    }
+
     /// The same polynomial's unit of time and its coefficients, lowest first: `x = Σ_k c_k (dt/unit)^k`.
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;
 }

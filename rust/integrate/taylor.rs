@@ -79,6 +79,11 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         self.jets.real_at(dt)
     }
 
+    #[inline(always)]
+    fn component(&self, n: usize) -> Option<&[S]> {
+        Some(&self.jets.coefficients()[n])
+    }
+
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
         let series = self.jets.coefficients();
         coefficients.extend((0..COEFFICIENTS).map(|k| vector!(S, D; n => series[n][k])));

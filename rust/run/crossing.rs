@@ -1,13 +1,14 @@
 //! Crossings of surfaces within a step.
 
+use super::polynomial::{MOST_PROBES, Polynomials, Room, Scanned};
 use super::section::Section;
 use super::ship::Ship;
+use super::signs::{Side, Stretch, judge, leave_out};
 use crate::integrate::root::bracketed;
 use crate::integrate::{ErrorNorm, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
-use crate::scalar::{Mask, Real};
+use crate::scalar::{Isa, Mask, Real};
 use crate::tape::{Binary, Expression, Leaf, Op, Place};
-use crate::unroll::{unroll, vector};
 
 /// Looked for to this part of the function's largest value near the crossing, and to this size.
 const ZERO: f64 = 1e-14;
@@ -16,8 +17,6 @@ const SMALL: f64 = 1e-13;
 const ON: f64 = 1e-12;
 /// A change of sign where the function stays above this part of its values nearby is a jump or a pole.
 const JUMP: f64 = 1e-6;
-/// No method looks at more places within a step.
-const MOST_PROBES: usize = 8;
 
 /// A crossing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,59 +27,6 @@ pub struct Crossed<const D: usize> {
     pub which: u8,
     /// The function's value there.
     pub residual: f64,
-}
-
-/// The polynomial of a step, in its own unit of time.
-struct Step<R: Real, const D: usize> {
-    /// Lowest first, an odd number of them.
-    coefficients: Vec<[R; D]>,
-    unit: R,
-    from: R,
-    size: R,
-    /// The sides that the law is taken on.
-    sides: Sides<R>,
-}
-
-impl<R: Real, const D: usize> Step<R, D> {
-    fn load<K: Method<R, D>>(&mut self, method: &K, from: R, size: R) {
-        self.coefficients.clear();
-        self.unit = method.polynomial(&mut self.coefficients);
-        if self.coefficients.len().is_multiple_of(2) {
-            self.coefficients.push([R::zero(); D]);
-        }
-        (self.from, self.size) = (from, size / self.unit);
-    }
-
-    /// A component of the state at `s`.
-    #[inline(always)]
-    fn component(&self, n: usize, s: R) -> R {
-        // Two sums side by side; the state itself is added last, which rounds once.
-        let square = s * s;
-        let (first, rest) = (self.coefficients[0][n], self.coefficients[1..].as_chunks::<2>().0);
-        let (mut odd, mut even) = (R::zero(), R::zero());
-        for pair in rest.iter().rev() {
-            odd = odd * square + pair[0][n];
-            even = even * square + pair[1][n];
-        }
-        first + (odd + even * s) * s
-    }
-
-    /// A component at several places.
-    #[inline(always)]
-    fn components(&self, n: usize, s: &[R; MOST_PROBES]) -> [R; MOST_PROBES] {
-        let mut values = [R::zero(); MOST_PROBES];
-        for coefficients in self.coefficients[1..].iter().rev() {
-            unroll!(i in 0..MOST_PROBES => { values[i] = values[i] * s[i] + coefficients[n]; });
-        }
-        let first = self.coefficients[0][n];
-        unroll!(i in 0..MOST_PROBES => { values[i] = values[i] * s[i] + first; });
-        values
-    }
-
-    #[inline(always)]
-    fn state(&self, s: R) -> [R; D] {
-        vector!(R, D; n => self.component(n, s))
-    }
 }
 
 /// How a surface's function is evaluated.
@@ -107,6 +53,8 @@ impl Form {
 struct Law<'a, M, R: Real> {
     system: &'a M,
     parameters: &'a [R],
+    /// The sides that the law is taken on.
+    sides: &'a Sides<R>,
 }
 
 /// The value of any function. A function of its own: there would be too many copies of all that a formula
@@ -116,14 +64,23 @@ fn general<M: System<R, D>, R: Real, const D: usize>(
     function: &Expression,
     stack: &mut [R],
     law: &Law<'_, M, R>,
-    sides: &Sides<R>,
     (t, x): (&R, &[R; D]),
 ) -> R {
     let rates = match function.has_rates() {
-        true => law.system.rates(*t, x, sides),
+        true => law.system.rates(*t, x, law.sides),
         false => [R::zero(); D],
     };
     function.value(&Place { t: *t, x, rates: &rates, parameters: law.parameters }, stack)
+}
+
+/// A step that was taken.
+struct Step<'a, R: Real, const D: usize> {
+    polynomials: Polynomials<'a, R, D>,
+    from: R,
+    /// In the polynomials' unit.
+    size: R,
+    end: (R, &'a [R; D]),
+    probes: &'static [f64],
 }
 
 /// One surface, and on which side of it the lanes are.
@@ -131,25 +88,18 @@ struct Surface<'a, R: Real> {
     section: &'a Section,
     form: Form,
     stack: Vec<R>,
-    /// Lanes that are known to be below, and above; neither while on it.
-    below: R::Mask,
-    above: R::Mask,
+    side: Side<R>,
     /// The function's value at the end of the last step.
     value: R,
 }
 
-/// The function between two places, and whether the surface is crossed there.
-#[derive(Clone, Copy)]
-struct Stretch<R: Real> {
-    s: R,
-    value: R,
-    crossing: R::Mask,
-}
-
 /// Looks for crossings in the steps of a ship.
 pub struct Scan<'a, R: Real, const D: usize> {
+    isa: Isa,
     surfaces: Vec<Surface<'a, R>>,
-    step: Step<R, D>,
+    /// The sides that the law was taken on in the last step; the driver's are those of the next.
+    sides: Sides<R>,
+    room: Room<R, D>,
     /// What was found in the last step, lane by lane.
     crossed: Vec<Vec<Crossed<D>>>,
     /// How many crossings each lane still leaves out.
@@ -159,25 +109,26 @@ pub struct Scan<'a, R: Real, const D: usize> {
 }
 
 impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
-    pub fn new(sections: &'a [Section]) -> Self {
-        let (zero, never) = (R::zero(), R::mask(false));
+    pub fn new(sections: &'a [Section], isa: Isa) -> Self {
+        let never = R::mask(false);
         let surface = |section: &'a Section| Surface {
             section,
             form: Form::of(&section.function),
             stack: section.function.stack(),
-            below: never,
-            above: never,
-            value: zero,
+            side: Side {
+                below: never,
+                above: never,
+                rising: section.rising,
+                falling: section.falling,
+                moved: never,
+            },
+            value: R::zero(),
         };
         Self {
+            isa,
             surfaces: sections.iter().map(surface).collect(),
-            step: Step {
-                coefficients: Vec::with_capacity(64),
-                unit: zero,
-                from: zero,
-                size: zero,
-                sides: [R::mask(true); MAX_SURFACES],
-            },
+            sides: [R::mask(true); MAX_SURFACES],
+            room: Room::new(),
             crossed: vec![Vec::with_capacity(MOST_PROBES * sections.len()); R::LANES],
             skip: vec![0; R::LANES],
             counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
@@ -191,17 +142,17 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         E: ErrorNorm<R, D> + Copy,
         K: Method<R, D>,
     {
-        self.step.sides = *ship.driver.sides();
+        self.sides = *ship.driver.sides();
         for lane in (0..R::LANES).filter(|&lane| lanes.lane(lane)) {
             self.skip[lane] = skip;
         }
-        let law = Law { system: ship.driver.system(), parameters: ship.values() };
+        let law = Law { system: ship.driver.system(), parameters: ship.values(), sides: &self.sides };
         for surface in &mut self.surfaces {
-            let value = surface.at(&law, &self.step, &ship.driver.t(), ship.driver.x());
+            let value = surface.at(&law, &ship.driver.t(), ship.driver.x());
             surface.value = R::select(lanes, value, surface.value);
-            let on = R::constant(ON);
-            surface.below = choose(lanes, value.less(-on), surface.below);
-            surface.above = choose(lanes, on.less(value), surface.above);
+            let (on, side) = (R::constant(ON), &mut surface.side);
+            side.below = choose(lanes, value.less(-on), side.below);
+            side.above = choose(lanes, on.less(value), side.above);
         }
     }
 
@@ -211,7 +162,6 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
     }
 
     /// Looks at the last step, in the lanes that moved. Returns whether there is any crossing.
-    #[inline(always)]
     pub fn look<F, E, K>(&mut self, ship: &Ship<'_, F, R, D, E, K>, moved: R::Mask) -> bool
     where
         F: Family<D>,
@@ -220,15 +170,19 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
     {
         const { assert!(K::PROBES.len() <= MOST_PROBES) };
         let driver = &ship.driver;
-        let law = Law { system: driver.system(), parameters: ship.values() };
-        self.step.load(driver.method(), driver.from(), driver.size());
+        let law = Law { system: driver.system(), parameters: ship.values(), sides: &self.sides };
+        let polynomials = Polynomials::of(driver.method(), self.isa, &mut self.room);
+        let size = if K::SERIES { driver.size() } else { driver.size() / polynomials.unit };
+        let end = (driver.t(), driver.x());
+        let step = Step { polynomials, from: driver.from(), size, end, probes: K::PROBES };
         let mut any = false;
         for (which, surface) in (0..).zip(&mut self.surfaces) {
             let mut stretches =
                 [Stretch { s: R::zero(), value: R::zero(), crossing: R::mask(false) }; MOST_PROBES];
-            let end = (driver.t(), driver.x());
             let stretches = &mut stretches[..K::PROBES.len()];
-            if surface.signs(&law, &self.step, end, K::PROBES, moved, stretches) {
+            surface.signs(&law, &step, moved, stretches);
+            let last = stretches[stretches.len() - 1].value;
+            if stretches.iter().any(|stretch| stretch.crossing.any()) {
                 if !any {
                     any = true;
                     self.crossed.iter_mut().for_each(Vec::clear);
@@ -236,11 +190,11 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
                 if self.counted {
                     leave_out(stretches, &mut self.skip);
                 }
-                surface.find(&law, &self.step, stretches, which, &mut self.crossed);
+                surface.find(&law, &step, stretches, which, &mut self.crossed);
             }
-            surface.value = R::select(moved, stretches[K::PROBES.len() - 1].value, surface.value);
+            surface.value = R::select(moved, last, surface.value);
         }
-        self.step.sides = *driver.sides();
+        self.sides = *driver.sides();
         if any && !self.counted {
             for (list, skip) in self.crossed.iter_mut().zip(&mut self.skip) {
                 list.sort_by(|a, b| a.t.total_cmp(&b.t));
@@ -253,116 +207,80 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
     }
 }
 
-/// Takes away the first crossings of lanes that still leave some out.
-#[inline(always)]
-fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut [usize]) {
-    if skip.iter().all(|&skip| skip == 0) {
-        return;
-    }
-    for stretch in stretches.iter_mut().filter(|stretch| stretch.crossing.any()) {
-        let crossing = stretch.crossing;
-        stretch.crossing = R::Mask::from_lanes(|lane| {
-            let left_out = crossing.lane(lane) && skip[lane] > 0;
-            skip[lane] -= usize::from(left_out);
-            crossing.lane(lane) && !left_out
-        });
-    }
-}
-
 impl<R: Real> Surface<'_, R> {
     /// The function's value at any time and state.
     #[inline(always)]
-    fn at<M, const D: usize>(&mut self, law: &Law<'_, M, R>, step: &Step<R, D>, t: &R, x: &[R; D]) -> R
-    where
-        M: System<R, D>,
-    {
+    fn at<M: System<R, D>, const D: usize>(&mut self, law: &Law<'_, M, R>, t: &R, x: &[R; D]) -> R {
         match self.form {
             Form::Component(n, less) => x[n] - R::constant(less),
-            Form::Any => general(&self.section.function, &mut self.stack, law, &step.sides, (t, x)),
+            Form::Any => general(&self.section.function, &mut self.stack, law, (t, x)),
         }
     }
 
     /// Its value within the step.
-    #[inline(always)]
-    fn inside<M: System<R, D>, const D: usize>(&mut self, law: &Law<'_, M, R>, step: &Step<R, D>, s: R) -> R {
-        match self.form {
-            Form::Component(n, less) => step.component(n, s) - R::constant(less),
-            Form::Any => self.at(law, step, &(step.from + s * step.unit), &step.state(s)),
-        }
+    fn inside<M: System<R, D>, const D: usize>(
+        &mut self,
+        law: &Law<'_, M, R>,
+        step: &Step<'_, R, D>,
+        s: R,
+    ) -> R {
+        self.at(law, &(step.from + s * step.polynomials.unit), &step.polynomials.state(s))
     }
 
     /// Looks where the function changes its sign: after which of the method's places before.
-    #[inline(always)]
     fn signs<M: System<R, D>, const D: usize>(
         &mut self,
         law: &Law<'_, M, R>,
-        step: &Step<R, D>,
-        (t, x): (R, &[R; D]),
-        probes: &[f64],
+        step: &Step<'_, R, D>,
         moved: R::Mask,
         stretches: &mut [Stretch<R>],
-    ) -> bool {
-        let mut values = [R::zero(); MOST_PROBES];
-        let mut s = [R::zero(); MOST_PROBES];
-        for (s, &theta) in s.iter_mut().zip(probes) {
-            *s = step.size.scale(theta);
-        }
-        match self.form {
+    ) {
+        // At the end it is the state itself, from which the next step starts.
+        let end = self.at(law, &step.end.0, step.end.1);
+        let side = Side { moved, ..self.side };
+        let after = match self.form {
             Form::Component(n, less) => {
-                values = step.components(n, &s);
-                unroll!(i in 0..MOST_PROBES => { values[i] = values[i] - R::constant(less); });
+                let scan = Scanned { less, probes: step.probes, size: step.size, end, side };
+                step.polynomials.signs(n, scan, stretches)
             }
             Form::Any => {
-                for (value, &s) in values.iter_mut().zip(&s[..probes.len() - 1]) {
-                    *value = self.inside(law, step, s);
+                let (mut s, mut values) = ([R::zero(); MOST_PROBES], [end; MOST_PROBES]);
+                for (i, &theta) in step.probes.iter().enumerate() {
+                    s[i] = step.size.scale(theta);
+                    if i + 1 < step.probes.len() {
+                        values[i] = self.inside(law, step, s[i]);
+                    }
                 }
+                judge(&s, &values, side, stretches)
             }
-        }
-        // At the end it is the state itself, from which the next step starts.
-        values[probes.len() - 1] = self.at(law, step, &t, x);
-        let (rising, falling) = (R::mask(self.section.rising), R::mask(self.section.falling));
-        let (mut below, mut above) = (self.below, self.above);
-        let mut found = R::mask(false);
-        for (i, stretch) in stretches.iter_mut().enumerate() {
-            let value = values[i];
-            let (low, high) = (value.less(R::zero()), R::zero().less(value));
-            let crossing = below.and(high).and(rising).or(above.and(low).and(falling)).and(moved);
-            found = found.or(crossing);
-            *stretch = Stretch { s: s[i], value, crossing };
-            // A zero leaves the side as it was: a surface that is only touched is not crossed. What is
-            // not a number has no side.
-            let sane = value.finite();
-            below = low.or(below.and(high.not())).and(sane);
-            above = high.or(above.and(low.not())).and(sane);
-        }
-        self.below = choose(moved, below, self.below);
-        self.above = choose(moved, above, self.above);
-        found.any()
+        };
+        self.side.below = choose(moved, after.below, self.side.below);
+        self.side.above = choose(moved, after.above, self.side.above);
     }
 
     /// Finds the crossings in the stretches that have one.
-    #[inline(always)]
     fn find<M: System<R, D>, const D: usize>(
         &mut self,
         law: &Law<'_, M, R>,
-        step: &Step<R, D>,
+        step: &Step<'_, R, D>,
         stretches: &mut [Stretch<R>],
         which: u8,
         crossed: &mut [Vec<Crossed<D>>],
     ) {
         loop {
             // The first crossing in each lane that has not been dealt with.
-            let zero = R::zero();
-            let mut before = (zero, self.value);
+            let mut before = (R::zero(), self.value);
             let (mut low, mut high) = (before, before);
             let mut seen = R::mask(false);
             for stretch in stretches.iter_mut() {
                 let here = (stretch.s, stretch.value);
                 let new = stretch.crossing.and(seen.not());
-                low = (R::select(new, before.0, low.0), R::select(new, before.1, low.1));
-                high = (R::select(new, here.0, high.0), R::select(new, here.1, high.1));
-                stretch.crossing = stretch.crossing.and(new.not());
-                seen = seen.or(new);
+                if new.any() {
+                    low = (R::select(new, before.0, low.0), R::select(new, before.1, low.1));
+                    high = (R::select(new, here.0, high.0), R::select(new, here.1, high.1));
+                    stretch.crossing = stretch.crossing.and(new.not());
+                    seen = seen.or(new);
+                }
                 before = here;
             }
             if !seen.any() {
@@ -370,9 +288,12 @@ impl<R: Real> Surface<'_, R> {
             }
             let scale = low.1.abs().max(high.1.abs());
             let tiny = scale.scale(ZERO).min(R::constant(SMALL));
-            let s = bracketed(|s| self.inside(law, step, s), low, high, tiny, seen);
-            let (t, x) = (step.from + s * step.unit, step.state(s));
-            let residual = self.at(law, step, &t, &x);
+            let s = match self.form {
+                Form::Component(n, less) => step.polynomials.root(n, less, low, high, tiny, seen),
+                Form::Any => bracketed(|s| self.inside(law, step, s), low, high, tiny, seen),
+            };
+            let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
+            let residual = self.at(law, &t, &x);
             let real = seen.and(residual.abs().less(scale.scale(JUMP)));
             for lane in (0..R::LANES).filter(|&lane| real.lane(lane)) {
                 crossed[lane].push(Crossed {

@@ -7,9 +7,11 @@ mod fleet;
 mod frame;
 mod lyapunov;
 mod moments;
+mod polynomial;
 mod recipe;
 mod section;
 mod ship;
+mod signs;
 mod stop;
 mod trajectory;
 

@@ -7,7 +7,7 @@ use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::ship::{Ship, Start};
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;
-use crate::scalar::{Mask, Real};
+use crate::scalar::{Isa, Mask, Real};
 use crate::tape::{Expression, Tape};
 
 /// A component of the state beyond this has escaped to infinity.
@@ -97,9 +97,13 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Crossings<D>>> {
         let jobs = self.values.len().max(self.starts.len());
         match Tape::record(self.family, &known(self.values)) {
-            Ok(tape) => sail(&Collect { sections: self, recipe: ByTaylor(&tape, crew.isa) }, jobs, crew),
+            Ok(tape) => sail(
+                &Collect { sections: self, recipe: ByTaylor(&tape, crew.isa), isa: crew.isa },
+                jobs,
+                crew,
+            ),
             // A law that no series follows.
-            Err(_) => sail(&Collect { sections: self, recipe: ByDopri5 }, jobs, crew),
+            Err(_) => sail(&Collect { sections: self, recipe: ByDopri5, isa: crew.isa }, jobs, crew),
         }
     }
 
@@ -117,6 +121,7 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
 struct Collect<'a, F, const D: usize, T> {
     sections: &'a Sections<'a, F, D>,
     recipe: T,
+    isa: Isa,
 }
 
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> {
@@ -129,7 +134,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
         let Some(first) = queue.take() else { return };
         let start = |job| self.sections.start::<R>(job);
         let mut ship = Ship::new(family, |values| self.recipe.make(values), start(first), &tolerance);
-        let mut scan: Scan<'_, R, D> = Scan::new(sections);
+        let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa);
         // What each lane has found.
         let mut catches: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];
         for lane in 0..R::LANES {

@@ -1,0 +1,57 @@
+//! On which side of a surface lanes are, and where they change it.
+
+use crate::scalar::{Mask, Real};
+
+/// On which side of a surface the lanes are, in which direction crossing it counts, and in which lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct Side<R: Real> {
+    /// Lanes that are known to be below, and above; neither while on it.
+    pub below: R::Mask,
+    pub above: R::Mask,
+    pub rising: bool,
+    pub falling: bool,
+    pub moved: R::Mask,
+}
+
+/// A function at the end of a stretch of a step, and whether its surface is crossed within the stretch.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretch<R: Real> {
+    pub s: R,
+    pub value: R,
+    pub crossing: R::Mask,
+}
+
+/// Tells the stretches with a crossing from the values at their ends; returns the sides after them.
+#[inline(always)]
+pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Stretch<R>]) -> Side<R> {
+    let (rising, falling) = (R::mask(side.rising), R::mask(side.falling));
+    let Side { mut below, mut above, moved, .. } = side;
+    for (i, stretch) in stretches.iter_mut().enumerate() {
+        let value = values[i];
+        let (low, high) = (value.less(R::zero()), R::zero().less(value));
+        let crossing = below.and(high).and(rising).or(above.and(low).and(falling)).and(moved);
+        *stretch = Stretch { s: s[i], value, crossing };
+        // A zero leaves the side as it was: a surface that is only touched is not crossed. What is not a
+        // number has no side.
+        let sane = value.finite();
+        below = low.or(below.and(high.not())).and(sane);
+        above = high.or(above.and(low.not())).and(sane);
+    }
+    Side { below, above, ..side }
+}
+
+/// Takes away the first crossings of lanes that still leave some out.
+#[inline(always)]
+pub fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut [usize]) {
+    if skip.iter().all(|&skip| skip == 0) {
+        return;
+    }
+    for stretch in stretches.iter_mut().filter(|stretch| stretch.crossing.any()) {
+        let crossing = stretch.crossing;
+        stretch.crossing = R::Mask::from_lanes(|lane| {
+            let left_out = crossing.lane(lane) && skip[lane] > 0;
+            skip[lane] -= usize::from(left_out);
+            crossing.lane(lane) && !left_out
+        });
+    }
+}
