@@ -28,7 +28,8 @@ def events(function: object, direction: float, end: float, w: float = W) -> tupl
     """Times and states of an event by SciPy's DOP853."""
     function.direction = direction  # type: ignore[attr-defined]
     run = solve_ivp(dle, (0, end), [1, 1, 0.01], "DOP853", args=(w,), events=function, rtol=3e-14, atol=1e-15)
-    return run.t_events[0], run.y_events[0]
+    after = run.t_events[0] > 0  # a start on the surface is no crossing
+    return run.t_events[0][after], run.y_events[0][after]
 
 
 SURFACES = {
@@ -50,7 +51,7 @@ def test_points_are_those_of_scipy(name: str, sign: int, direction: str) -> None
         found = udd.poincare(
             udd.DLE(W), text, 1000, direction=direction, transient=0, t_max=20.0, rtol=1e-13, atol=1e-15
         )
-    assert found.found == len(t) > 3
+    assert found.found == len(t) >= 3
     # Over 20 units of time errors grow by exp(0.31 * 20) = 500, SciPy's from 1e-13 per step.
     np.testing.assert_allclose(found.t, t, atol=1e-9)
     np.testing.assert_allclose(found.state, x, atol=1e-8)
@@ -71,16 +72,17 @@ def test_the_periods_of_closed_orbits() -> None:
 
 
 def test_reversals_at_zero_drive() -> None:
-    # A swing about the contact: R0 = 0.058 m, 127 degrees from hanging; |Y| shrinks from turn to turn.
+    # A swing about the contact: R0 = 0.058 m, 127 degrees from upright; |Y| shrinks from turn to turn.
     angle = np.deg2rad(127)
-    start = [0.0, 0.058 * np.sin(angle), -0.058 * np.cos(angle), 0.0]
+    start = [0.0, 0.058 * np.sin(angle), 0.058 * np.cos(angle), 0.0]
     found = udd.poincare(udd.Disk(0.0), "reversal", 6, state0=start, transient=0)
     expected = [0.353385, 0.699102, 1.041013, 1.381645, 1.725801, 2.198271]
     np.testing.assert_allclose(found.t, expected, atol=1e-6)
     heights = [-0.0355556, 0.0264675, -0.0191920, 0.0131979, -0.0051802, 0.000173]
     np.testing.assert_allclose(found.component("Y"), heights, atol=5e-7)
-    turning = udd.poincare(udd.Disk(0.0), "turning points of Y", 40, state0=start, transient=0, t_max=2.3)
-    assert turning.found >= 6
+    # Z keeps its sign, so that Y turns where the disk does.
+    turning = udd.poincare(udd.Disk(0.0), "turning points of Y", 6, state0=start, transient=0)
+    np.testing.assert_allclose(turning.t, found.t, atol=1e-12)
 
 
 def test_a_chaotic_section_is_symmetric() -> None:
@@ -149,7 +151,8 @@ def test_orbits_without_enough_crossings_say_why() -> None:
     with pytest.warns(IncompleteWarning, match="the orbit has 0 crossings instead of 9: ejected"):
         off = udd.poincare(udd.Disk(0.05), n=9, state0=[0.0, 0.0, 0.0799, 0.0], transient=0)
     assert (off.found, off.outcome) == (0, "ejected")
-    assert abs(np.hypot(off.end[1], off.end[2]) - 0.08) < 1e-12
+    # To 1e-12 of the largest Y^2 + Z^2 in the step, a long one as the motion is uniform.
+    assert abs(np.hypot(off.end[1], off.end[2]) - 0.08) < 1e-9
 
 
 def test_maps() -> None:
@@ -171,7 +174,7 @@ def test_friction_that_sticks_and_bristles_have_sections() -> None:
     plain = udd.poincare(swing, n=20, state0=[0.0, 1.0], transient=0)
     ratios = plain.component("Omega")[1:] / plain.component("Omega")[:-1]
     assert (ratios < 1).all()
-    lugre = udd.Pendulum(0.25, effects=[udd.effects.coulomb(1e-3, treatment="lugre")])
+    lugre = udd.Pendulum(0.25, effects=[udd.effects.coulomb(c=1e-3, treatment="lugre")])
     found = udd.poincare(lugre, n=3, state0=[0.0, 1.0, 0.0], transient=0, rtol=1e-10)
     run = udd.simulate(lugre, [0.0, *found.t], [0.0, 1.0, 0.0], rtol=1e-11)
     np.testing.assert_allclose(run.state[1:], found.state, atol=1e-7)

@@ -268,11 +268,11 @@ def poincare(
     Examples
     --------
     >>> import udd
-    >>> points = udd.poincare(udd.DLE(7.1), n=20, transient=4000)
+    >>> points = udd.poincare(udd.DLE(10.0), n=20, transient=1000)
     >>> points.residual < 1e-12
     True
-    >>> print(f"{points.return_times.mean():.6f}")
-    3.988086
+    >>> print(f"{points.return_times.mean():.6f}")  # half a period of the symmetric orbit
+    1.679161
     """
     if not isinstance(model, Model):
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
@@ -342,8 +342,8 @@ def _surfaces(
     """The expressions, and the signs of the directions in which they are crossed."""
     if section is None:
         section = _DEFAULT[model.kind]
-    texts = [section] if isinstance(section, str) else list(section)
-    if not texts or not all(isinstance(text, str) for text in texts):
+    texts = [section] if isinstance(section, str) else section
+    if not isinstance(texts, Sequence) or not texts or not all(isinstance(text, str) for text in texts):
         raise ModelError(f"section must be an expression such as 'z', or a list of them, not {section!r}")
     if direction is None or isinstance(direction, str):
         wanted: list[str | None] = [direction] * len(texts)
