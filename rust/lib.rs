@@ -5,6 +5,9 @@
 //! taken) → [`observe`] (what is seen on the way) → [`run`] (who drives it) → [`estimate`] (what
 //! measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
 
+// Formulas over components are read with their indices.
+#![allow(clippy::needless_range_loop)]
+
 pub mod estimate;
 pub mod integrate;
 pub mod model;

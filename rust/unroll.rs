@@ -1,16 +1,14 @@
 //! Loops that are unrolled before the compiler looks at them.
 
 /// Runs the body for `i = from, from + 1, ...` below `count`, a constant, with `i` known when the program
-/// is compiled; from 16 on as an ordinary loop. Bodies beyond the count are not compiled.
+/// is compiled; the count is at most 16. Bodies beyond the count are not compiled.
 ///
 /// Over packets the compiler would otherwise choose between unrolling a loop over components or stages
 /// and turning it, instead of the lanes, into vector instructions.
 macro_rules! unroll {
     ($i:ident in $from:literal .. $count:expr => $body:block) => {
         $crate::unroll::unroll!(@ $i $from $count, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
-        if const { $count > 16 } {
-            for $i in 16..$count $body
-        }
+        const { assert!($count <= 16) };
     };
     (@ $i:ident $from:literal $count:expr, $body:block, $($k:literal)+) => {
         $(

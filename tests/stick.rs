@@ -11,7 +11,7 @@ use udd::model::stick::{REVERSAL, Slider, Sticking};
 use udd::model::{Bristled, Disk, DiskFamily, Family, Pendulum, PendulumFamily, Sides, System, choose};
 use udd::observe::Event;
 use udd::run::{Outcome, Output, Run, Stop, trajectory};
-use udd::scalar::{Mask, Packet, Real, Scalar};
+use udd::scalar::{Isa, Mask, Packet, Real, Scalar};
 use udd::tape::Tape;
 
 const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
@@ -401,7 +401,7 @@ fn methods_agree_on_when_it_sticks() {
     fn events<F: Family<D>, const D: usize>(family: &F, values: &[f64], x0: [f64; D]) -> (usize, f64) {
         let (system, tape) = (family.build(values), Tape::record(family, &[]).unwrap());
         let mut one: Driver<_, f64, D> = Driver::new(&system, 0.0, x0, None, &TIGHT);
-        let series = Taylor::new(&tape, values.to_vec());
+        let series = Taylor::new(&tape, values.to_vec(), Isa::best());
         let mut other: Driver<_, f64, D, _, _> = Driver::by(series, &system, 0.0, x0, None, &TIGHT);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         while one.t() < 10.0 {

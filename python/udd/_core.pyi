@@ -110,7 +110,6 @@ def lyapunov(
     threads: int,
     progress: Callable[[int], object] | None,
 ) -> _Orbits: ...
-
 def sections(
     model: Model,
     values: _Floats,

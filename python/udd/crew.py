@@ -22,7 +22,9 @@ def thread_count(threads: int | None) -> int:
 
 
 @contextmanager
-def bar(jobs: int, unit: str, progress: bool | None) -> Iterator[Callable[[int], Callable[[int], None] | None]]:
+def bar(
+    jobs: int, unit: str, progress: bool | None
+) -> Iterator[Callable[[int], Callable[[int], None] | None]]:
     """A progress bar on stderr.
 
     Gives a function from the number of jobs done before to the callback that the core calls with the number
@@ -37,7 +39,10 @@ def bar(jobs: int, unit: str, progress: bool | None) -> Iterator[Callable[[int],
     with tqdm(total=jobs, unit=f" {unit}", file=sys.stderr, dynamic_ncols=True) as line:
 
         def since(before: int) -> Callable[[int], None]:
-            return lambda done: line.update(before + done - line.n) and None
+            def show(done: int) -> None:
+                line.update(before + done - line.n)
+
+            return show
 
         yield since
         line.update(jobs - line.n)

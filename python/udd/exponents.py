@@ -141,7 +141,8 @@ def lyapunov(
     Warns
     -----
     ConvergenceWarning
-        Where the standard error does not meet `tol` after the time `t`, or an orbit of an array has no exponent.
+        Where the standard error does not meet `tol` after the time `t`, or an orbit of an array has no
+        exponent.
 
     Notes
     -----

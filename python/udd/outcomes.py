@@ -7,4 +7,3 @@ OUTCOMES = ("finished", "ejected", "time ran out", "failed", "interrupted", "esc
 
 FINISHED = OUTCOMES.index("finished")
 EJECTED = OUTCOMES.index("ejected")
-

@@ -62,10 +62,8 @@ pub struct Crew<'a> {
 /// stopped.
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
     spread(jobs, crew, |queue, yields| {
-        if T::PACKETS {
-            if jobs > 1 && crew.isa != Isa::Baseline {
-                return fleet.sail::<Packet<LANES>>(queue, yields);
-            }
+        if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
+            return fleet.sail::<Packet<LANES>>(queue, yields);
         }
         fleet.sail::<f64>(queue, yields);
     })

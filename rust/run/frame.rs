@@ -55,7 +55,7 @@ fn subtract<R: Real, const D: usize, const N: usize>(x: &mut [Dual<R, N>; D], i:
         along += x[n].d[i] * x[n].d[j];
     }
     for n in 0..D {
-        x[n].d[i] = x[n].d[i] - along * x[n].d[j];
+        x[n].d[i] -= along * x[n].d[j];
     }
 }
 

@@ -49,15 +49,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         // Tangents take so long in each operation that telling which one it is does not count. The number
         // of equations is asked so that no other program is compiled.
         if const { size_of::<S>() == size_of::<S::Real>() } {
-            if const { D == 3 } {
-                if tape.known == Known::Dle {
-                    return known::<Dle, S, D, N>(work, held, t, x, sides);
-                }
+            if const { D == 3 } && tape.known == Known::Dle {
+                return known::<Dle, S, D, N>(work, held, t, x, sides);
             }
-            if const { D == 4 } {
-                if tape.known == Known::Disk {
-                    return known::<Disk, S, D, N>(work, held, t, x, sides);
-                }
+            if const { D == 4 } && tape.known == Known::Disk {
+                return known::<Disk, S, D, N>(work, held, t, x, sides);
             }
         }
         interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], held, t, x, sides);

@@ -48,6 +48,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     ///
     /// À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99, section 3.2.
     #[inline(always)]
+    #[allow(clippy::eq_op, reason = "infinite or no number minus itself is no number")]
     pub fn radius(&self, rtol: f64, atol: f64) -> S::Real {
         let (mut last, mut before) = (S::Real::constant(0.0), S::Real::constant(0.0));
         unroll!(n in 0..D => {

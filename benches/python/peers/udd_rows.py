@@ -40,7 +40,14 @@ def sweep() -> tuple[str, Any]:
 
 def section() -> tuple[str, Any]:
     """The setting, and ``points(start, n)``."""
-    raise Missing("udd has no sections yet")
+    import udd
+
+    model = udd.DLE(1.0)
+
+    def points(start: Any, n: int) -> Any:
+        return udd.poincare(model, "z", n, state0=start, transient=0, threads=1).state
+
+    return "Taylor, rtol 1e-9, atol 1e-12", points
 
 
 def bifurcation() -> tuple[str, Any]:

@@ -20,7 +20,7 @@ from .coordinates import Floats, coordinates_of
 from .crossings import INTERRUPTED, parts
 from .labels import Variables, of_outcomes, of_parameter, of_result, of_state, require_xarray, time_unit
 from .paths import PATHS, kick, nothing, walk
-from .recurrence import tightness
+from .recurrence import SETTLING, tightness
 from .telling import Told, aperiodic, tell
 from .verdicts import Judge, Verdicts, again, follow, put
 
@@ -100,7 +100,7 @@ def bifurcation(
 
         - the components of the state at the section, NaN where there are fewer points;
         - ``outcome``: how each job ended;
-        - ``period``: the number of distinct points, 0 not periodic, -1 still settling;
+        - ``period``: the number of distinct points, 0 not periodic, -1 no verdict (it still settles, or leaves);
         - ``period_time``: how long a period takes;
         - ``attractor``: a label from 1 on, 0 where there is none; attractors of neighbouring values have the
           same one where the points hardly move;
@@ -226,9 +226,10 @@ def _of_attractors(
     model: Model, parameter: str, axis: Floats, shape: tuple[int, ...], verdicts: Verdicts, told: Told
 ) -> Variables:
     dims = ("path", "start", parameter)
+    period = np.where(told.label > 0, verdicts.period, SETTLING).astype(np.int32)
     time = {"long_name": "duration of a period", "units": time_unit(model)}
     return {
-        "period": (dims, verdicts.period.reshape(shape), {"long_name": "number of distinct section points"}),
+        "period": (dims, period.reshape(shape), {"long_name": "number of distinct section points"}),
         "period_time": (dims, told.duration.reshape(shape), time),
         "attractor": (dims, told.label.reshape(shape), {"long_name": "label of the attractor"}),
         "symmetric": (

@@ -29,6 +29,7 @@ from .verdicts import Judge
 if TYPE_CHECKING:
     import xarray as xr
 
+_NOT_RUN = [INTERRUPTED, START_OUTSIDE]
 _FINAL = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
 
 
@@ -89,8 +90,8 @@ def basins(
         points, ``period_time``, ``mirror`` (the number of the mirror image, 0 where none was met), and an
         orbit: the components of the state at ``point``.
 
-        Over ``ending``, the attractors and other outcomes: ``fraction`` of the initial states that end so,
-        and ``fraction_error``.
+        Over ``ending``, the attractors and other outcomes: ``fraction`` of the initial states that end so, of
+        those that were run, and ``fraction_error``.
 
         Over ``stride``: ``uncertain``, the fraction of pairs of initial states at this distance that end
         differently; ``uncertainty_exponent`` and ``uncertainty_exponent_error`` from it.
@@ -188,12 +189,12 @@ def _arrays(crowd: Crowd, axes: dict[str, Floats]) -> tuple[Variables, Variables
     model = crowd.runner.model
     shape = tuple(len(values) for values in axes.values())
     found, number = crowd.ranked()
-    others = [k for k in range(1, len(ALL_OUTCOMES)) if (crowd.outcome == k).any()]
+    others = [k for k in range(1, len(ALL_OUTCOMES)) if k not in _NOT_RUN and (crowd.outcome == k).any()]
     endings = [f"attractor {k + 1}" for k in range(len(found))] + [ALL_OUTCOMES[k] for k in others]
     ends = number - 1
     for place, k in enumerate(others):
         ends[crowd.outcome == k] = len(found) + place
-    run = np.where(np.isin(crowd.outcome, [INTERRUPTED, START_OUTSIDE]), -1, ends).reshape(shape)
+    run = np.where(np.isin(crowd.outcome, _NOT_RUN), -1, ends).reshape(shape)
     final = np.where(np.isin(crowd.outcome, [FINISHED, *_FINAL]), ends, -1).reshape(shape)
     share, error = shares(run, len(endings))
     fine = uncertainty(final)

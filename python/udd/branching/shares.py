@@ -45,8 +45,9 @@ def shares(ends: NDArray[np.int32], count: int) -> tuple[Floats, Floats]:
         here = (groups == k).sum(axis=1)
         share[k] = here.sum() / total
         with np.errstate(divide="ignore", invalid="ignore"):
-            # n/(n - 1) sum (x - mean)^2 of zeros and ones; a cell alone is taken for half of a pair.
-            within = np.where(size > 1, size / (size - 1) * here * (1 - here / size), 0.25)
+            # n/(n - 1) sum (x - mean)^2 of zeros and ones; a cell alone is taken for any other.
+            alone = share[k] * (1 - share[k])
+            within = np.where(size > 1, size / (size - 1) * here * (1 - here / size), alone)
         error[k] = np.sqrt(within[size > 0].sum()) / total
     return share, error
 

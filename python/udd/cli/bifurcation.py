@@ -114,8 +114,9 @@ def _text(found: xr.Dataset, data: dict[str, Any]) -> str:
     ]
     if len(data["stretches"]) <= _MANY:
         for s in data["stretches"]:
-            period = {0: "aperiodic", -1: "undecided"}.get(s["period"], f"period {s['period']}")
+            period = {0: "aperiodic", -1: "no verdict"}.get(s["period"], f"period {s['period']}")
             on = f", attractor {s['attractor']}" if s["attractor"] else ""
+            on += ", its own mirror image" if s["symmetric"] == 1 else ""
             way = f"{s['path']}: " if shape["path"] > 1 else ""
             lines.append(f"  {way}{name} = {s['first']:.6g} to {s['last']:.6g}: {period}{on}")
     for first, last in data["hysteresis"] or []:

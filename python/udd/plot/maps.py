@@ -87,7 +87,9 @@ def bifurcation(
 
 
 def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Which initial states end where: a colour for each attractor, grey for what ends on none.
+    """Which initial states end where: a colour for each attractor, greys for what ends on none.
+
+    What was not run, as starts off the wheels, is white.
 
     Parameters
     ----------
@@ -124,7 +126,7 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.pcolormesh(
         x_factor * result[across].to_numpy(),
         y_factor * result[up].to_numpy(),
-        ends,
+        np.ma.masked_less(ends, 0),
         cmap=ListedColormap(shades),
         norm=BoundaryNorm(np.arange(len(titles) + 1) - 0.5, len(titles)),
         shading="nearest",
