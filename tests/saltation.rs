@@ -331,8 +331,8 @@ fn exponents_through_stick_and_slip_are_those_of_neighbours() {
     let (tangent, shadow, stuck) = growth(true);
     assert!(stuck > 20 && tangent > 0.2, "{tangent}, stuck {stuck} times");
     // The shadow feels the second order, 1e-8 of the first but for near grazes.
-    assert_relative_eq!(tangent, shadow, max_relative = 1e-3);
-    assert!((growth(false).0 - shadow).abs() > 0.01 * shadow);
+    assert_relative_eq!(tangent, shadow, max_relative = 2e-4);
+    assert!((growth(false).0 - shadow).abs() > 1e-3 * shadow);
 }
 
 /// A law that pushes back from either side of a surface, and knows no way to stay on it.
