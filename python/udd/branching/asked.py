@@ -12,7 +12,7 @@ from udd.crew import thread_count
 from udd.errors import ModelError
 from udd.exponents import default_start
 from udd.models import Model
-from udd.sections import _CLOCKS, _clock, _surfaces
+from udd.sections import CLOCKS, clock_of, surfaces_of
 from udd.trajectory import initial_state, tolerances
 
 from .coordinates import Floats
@@ -43,10 +43,10 @@ def runner_of(
     """
     if not isinstance(section, str | None):
         raise ModelError(f"section must be one expression such as 'z', not {section!r}")
-    surfaces, ways = _surfaces(model, section, direction)
+    surfaces, ways = surfaces_of(model, section, direction)
     rtol, atol = tolerances(rtol, atol)
     mean = None if t_max is None else number("t_max", t_max, above=0.0) / each
-    t_each = _CLOCKS * _clock(model, rows) if mean is None else mean
+    t_each = CLOCKS * clock_of(model, rows) if mean is None else mean
     return Runner(model, surfaces, ways, rtol, atol, thread_count(threads), t_each)
 
 

@@ -100,7 +100,7 @@ def bifurcation(
 
         - the components of the state at the section, NaN where there are fewer points;
         - ``outcome``: how each job ended;
-        - ``period``: the number of distinct points, 0 not periodic, -1 no verdict (it still settles, or leaves);
+        - ``period``: the number of distinct points, 0 not periodic, -1 without a verdict;
         - ``period_time``: how long a period takes;
         - ``attractor``: a label from 1 on, 0 where there is none; attractors of neighbouring values have the
           same one where the points hardly move;
