@@ -30,7 +30,7 @@ _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 # Named surfaces of a component X: the zero of its rate, and the direction that the name implies.
 _EXTREMA = {"maxima": -1, "minima": 1, "turning points": 0}
 _EXTREMUM = re.compile(rf"({'|'.join(_EXTREMA)}) of (\w+)")
-_CLOCKS = 100.0  # typical times that a crossing may take on average
+CLOCKS = 100.0  # typical times that a crossing may take on average
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,12 +276,12 @@ def poincare(
     """
     if not isinstance(model, Model):
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
-    surfaces, ways = _surfaces(model, section, direction)
+    surfaces, ways = surfaces_of(model, section, direction)
     count, skipped = _whole("n", n, 1), _whole("transient", transient, 0)
     rtol, atol = tolerances(rtol, atol)
     shape, rows, starts = _jobs(model, parameters or {}, state0)
     if t_max is None:
-        end = _CLOCKS * _clock(model, rows) * (count + skipped)
+        end = CLOCKS * clock_of(model, rows) * (count + skipped)
     else:
         end = number("t_max", t_max, above=0.0)
     jobs = max(len(rows), len(starts))
@@ -336,7 +336,7 @@ def poincare(
     )
 
 
-def _surfaces(
+def surfaces_of(
     model: Model, section: str | Sequence[str] | None, direction: str | Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """The expressions, and the signs of the directions in which they are crossed."""
@@ -429,8 +429,8 @@ def _inside(model: Model, rows: _Floats, starts: _Floats) -> None:
         raise ModelError(f"{int(off.sum())} of the starts are off the wheels: Y^2 + Z^2 must be below R^2")
 
 
-def _clock(model: Model, rows: _Floats) -> float:
-    """A typical time between crossings, that of the slowest orbit."""
+def clock_of(model: Model, rows: _Floats) -> float:
+    """A typical time between crossings, that of the slowest orbit; `rows` are the orbits' parameters."""
     p = dict(zip(model.parameters, rows.T, strict=True))
     if model.kind == "dle":
         # The symmetric orbit at strong drive takes 10.6 / sqrt(w).

@@ -64,7 +64,9 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
     ax.set_xlabel(_label(result, across))
     ax.set_ylabel(_label(result, up))
     if len(result.section) > 1:
-        ax.legend(frameon=False, markerscale=6)
+        legend = ax.legend(frameon=False)
+        for handle in legend.legend_handles:
+            handle.set_markersize(5)  # type: ignore[union-attr]
     tidy(ax)
     return ax
 
@@ -128,7 +130,12 @@ def _checked(result: Any) -> None:
 
 def _dots(ax: Axes, x: NDArray[Any], y: NDArray[Any], shade: str, said: str | None) -> None:
     size = min(4.0, max(0.5, 60.0 / np.sqrt(max(len(x), 1))))
-    style = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "rasterized": len(x) > _MANY}
+    style: dict[str, Any] = {
+        "linestyle": "none",
+        "marker": "o",
+        "markeredgewidth": 0,
+        "rasterized": len(x) > _MANY,
+    }
     ax.plot(x, y, color=shade, markersize=size, label=said, **style)
 
 
