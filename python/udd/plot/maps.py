@@ -67,7 +67,7 @@ def bifurcation(
             half = _half_step(result[parameter].to_numpy(), first, last)
             ax.axvspan(first - half[0], last + half[1], color="#fbe9c6", linewidth=0, label="hysteresis")
     for shade, label, chosen in _layers(result, points, colour):
-        size = min(2.0, max(0.3, 60.0 / np.sqrt(max(chosen.sum(), 1))))
+        size = min(2.5, max(0.4, 120.0 / result.sizes[parameter]))  # of lines where values are dense
         ax.plot(
             np.broadcast_to(x, points.shape)[chosen],
             factor * points[chosen],
@@ -140,6 +140,8 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(f"{x_words} at the start [{x_unit}]")
     ax.set_ylabel(f"{y_words} at the start [{y_unit}]")
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
+    if x_unit == y_unit != "1":
+        ax.set_aspect("equal")
     tidy(ax, grid=False)
     return ax
 
