@@ -169,15 +169,25 @@ def test_maps() -> None:
     assert np.median(jumps) < 0.02 * np.ptp(next_height)
 
 
-def test_friction_that_sticks_and_bristles_have_sections() -> None:
+def test_friction_that_sticks_has_sections() -> None:
     swing = udd.Pendulum(0.25, k0=1e-4)
     plain = udd.poincare(swing, n=20, state0=[0.0, 1.0], transient=0)
-    ratios = plain.component("Omega")[1:] / plain.component("Omega")[:-1]
-    assert (ratios < 1).all()
-    lugre = udd.Pendulum(0.25, effects=[udd.effects.coulomb(c=1e-3, treatment="lugre")])
-    found = udd.poincare(lugre, n=3, state0=[0.0, 1.0, 0.0], transient=0, rtol=1e-10)
-    run = udd.simulate(lugre, [0.0, *found.t], [0.0, 1.0, 0.0], rtol=1e-11)
+    speeds = plain.component("Omega")
+    assert (speeds[1:] < speeds[:-1]).all()
+    dry = udd.Pendulum(0.25, effects=[udd.effects.coulomb(c=0.1, treatment="set-valued")])
+    with pytest.warns(IncompleteWarning, match="time ran out"):
+        found = udd.poincare(dry, n=100, state0=[0.0, 1.0], transient=0, t_max=60.0)
+    run = udd.simulate(dry, [0.0, *found.t], [0.0, 1.0], rtol=1e-11, atol=1e-13)
     np.testing.assert_allclose(run.state[1:], found.state, atol=1e-7)
+    # It comes to rest, where it is held: no crossing comes after.
+    rest = udd.simulate(dry, 60.0, [0.0, 1.0])
+    assert rest.events.kind[-1] == "stick"
+    assert 1 < found.found < 20
+    assert found.t[-1] < rest.events.t[-1]
+    np.testing.assert_allclose(found.end, rest.state[-1], atol=1e-6)
+    lugre = udd.Pendulum(0.25, effects=[udd.effects.coulomb(c=0.1, treatment="lugre")])
+    with pytest.raises(ModelError, match="lugre"):
+        udd.poincare(lugre)
 
 
 def test_ctrl_c_keeps_what_is_found() -> None:
