@@ -158,7 +158,6 @@ def test_the_trap_at_4_5_is_no_attractor() -> None:
     # physics.md: a window 3e-5 wide, after a chaotic transient of mean length 8200.
     found = udd.basins(udd.DLE(4.5), square(2, 8), state0=[0, 0.5, 0], extend=16)
     assert (found["kind"] == 1).all()
-    assert set(found["ending"].to_numpy().tolist()) - {"undecided"}
     assert float(found["fraction"].sel(ending="undecided")) > 0
 
 

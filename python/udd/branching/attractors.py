@@ -81,8 +81,10 @@ class Attractor:
 
 def alike(one: Attractor, other: Attractor, tight: Tightness) -> bool:
     """Whether two records are of one attractor."""
-    if "aperiodic" in (one.kind, other.kind) and one.kind != other.kind:
-        return False
+    if one.kind != other.kind and "aperiodic" in (one.kind, other.kind):
+        # Chaos in bands too narrow to be told from points.
+        periodic, bands = (other, one) if one.kind == "aperiodic" else (one, other)
+        return bool(periodic.holds(bands.points, tight))
     return bool(one.holds(other.points, tight) and other.holds(one.points, tight))
 
 

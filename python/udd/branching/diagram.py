@@ -17,12 +17,12 @@ from udd.models import Model
 from .asked import parameter_rows, parameter_values, runner_of, start_states, whole
 from .branches import intervals
 from .coordinates import Floats, coordinates_of
-from .crossings import INTERRUPTED, parts
+from .crossings import INTERRUPTED, UNDECIDED, parts
 from .labels import Variables, of_outcomes, of_parameter, of_result, of_state, require_xarray, time_unit
 from .paths import PATHS, kick, nothing, walk
 from .recurrence import SETTLING, tightness
-from .telling import Told, aperiodic, tell
-from .verdicts import Judge, Verdicts, again, follow, put
+from .telling import Told, tell
+from .verdicts import Judge, Verdicts, again, decided, follow, put
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,7 +125,7 @@ def bifurcation(
     Notes
     -----
     Not periodic means chaos, a quasi-periodic motion, or a long period. A chaotic transient that outlives the
-    run looks like chaos; where the ways up and down differ, aperiodic motions are followed to the length of
+    run looks like chaos; where the ways up and down differ, all are followed to the length of
     `extend` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the way up
     or down begins at its initial state again with the next value.
 
@@ -180,10 +180,11 @@ def bifurcation(
             told = tell(judge, found, verdicts, places, reach)
         if told.differ.any() and not interrupted:
             unsure = places[:, :, told.differ].ravel()
-            unsure = unsure[aperiodic(found, verdicts)[unsure]]
+            unsure = unsure[decided(found, verdicts)[unsure]]
             for part in parts(len(unsure), longest + n):
                 if not again(runner, judge, rows, of_job, found, verdicts, unsure[part], longest, n):
                     raise KeyboardInterrupt
+            found.outcome[unsure[verdicts.period[unsure] == SETTLING]] = UNDECIDED
             told = tell(judge, found, verdicts, places, reach)
     except KeyboardInterrupt:
         interrupted = True

@@ -59,8 +59,9 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
 
     Notes
     -----
-    With d the change from one period to the next and r the ratio of its early and late values, what is still
-    to come is d r/(1 - r). So a slow transient, as near a bifurcation, is not taken for its end.
+    With d the change from one period to the next, which falls by r each time, what is still to come is
+    d r/(1 - r). So a slow transient, as near a bifurcation, is not taken for its end. Periods above a
+    quarter of n must have settled to the last digits.
     """
     jobs, n, _ = points.shape
     result = np.zeros(jobs, dtype=np.int32)
@@ -75,13 +76,7 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
         rows = np.flatnonzero((result <= 0) & near[:, p - 1])
         if not len(rows):
             continue
-        change = np.abs(points[rows, p:] - points[rows, :-p]).max(axis=2)
-        late = change[:, -p:].max(axis=1)
-        lag = max(1, n // (2 * p) - 1)
-        early = change[:, -(lag + 1) * p : -lag * p].max(axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = (late / early) ** (1.0 / lag)
-            to_come = np.where(ratio < 1.0, late * ratio / (1.0 - ratio), np.inf)
+        late, to_come = _changes(points[rows], p)
         settled = (late < tight.noise) | (to_come < tight.settled)
         result[rows[settled]] = p
         result[rows[~settled & (late < _NEAR)]] = SETTLING
@@ -89,6 +84,22 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
         rows = np.flatnonzero(result == p)
         result[rows] = _shortest(points[rows], p, 4.0 * tight.settled)
     return result
+
+
+def _changes(points: Floats, p: int) -> tuple[Floats, Floats]:
+    """The last change from period to period, and what is to come of it."""
+    n = points.shape[1]
+    change = np.abs(points[:, p:] - points[:, :-p]).max(axis=2)
+    late = change[:, -p:].max(axis=1)
+    if 4 * p > n:
+        return late, np.full(len(points), np.inf)
+    # Over the last half of the points, in two spans: in chaos both seldom shrink, and the slower counts.
+    lag = max(1, n // (4 * p) - 1)
+    middle, early = (change[:, -(k * lag + 1) * p : -k * lag * p].max(axis=1) for k in (1, 2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.fmax(late / middle, middle / early) ** (1.0 / lag)
+        to_come = np.where(ratio < 1.0, late * ratio / (1.0 - ratio), np.inf)
+    return late, to_come
 
 
 def _shortest(points: Floats, period: int, close: float) -> NDArray[np.int32]:

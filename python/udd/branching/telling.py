@@ -11,7 +11,6 @@ from .attractors import Attractor
 from .branches import Tracks, groups, partners
 from .coordinates import Floats
 from .crossings import Crossings
-from .recurrence import APERIODIC
 from .verdicts import Judge, Verdicts, decided
 
 
@@ -103,9 +102,3 @@ def _families(
     for job, j in zip(here, first, strict=True):
         told.symmetric[job] = own[j]
     return family
-
-
-def aperiodic(found: Crossings, verdicts: Verdicts) -> NDArray[np.bool_]:
-    """Which jobs have ended on an aperiodic motion, as far as can be seen."""
-    some: NDArray[np.bool_] = decided(found, verdicts) & (verdicts.period == APERIODIC) & ~verdicts.rest
-    return some
