@@ -13,6 +13,7 @@ from udd.models import Model
 from udd.outcomes import OUTCOMES
 
 from .coordinates import Floats
+from .pressed import noticed
 
 START_OUTSIDE = len(OUTCOMES)
 UNDECIDED = START_OUTSIDE + 1
@@ -78,19 +79,22 @@ class Runner:
         )
         runs = np.flatnonzero(~outside)
         if len(runs):
-            got = _core.sections(
-                self.model,
-                np.ascontiguousarray(values[runs]),
-                np.ascontiguousarray(starts[runs]),
-                list(self.section),
-                list(self.direction),
-                skip,
-                count,
-                self.t_each * (skip + count),
-                self.rtol,
-                self.atol,
-                self.threads,
-            )
+            with noticed() as pressed:
+                got = _core.sections(
+                    self.model,
+                    np.ascontiguousarray(values[runs]),
+                    np.ascontiguousarray(starts[runs]),
+                    list(self.section),
+                    list(self.direction),
+                    skip,
+                    count,
+                    self.t_each * (skip + count),
+                    self.rtol,
+                    self.atol,
+                    self.threads,
+                )
+            if pressed() and not (got["outcome"] == INTERRUPTED).any():
+                raise KeyboardInterrupt  # it came just as all were finished
             found.points[runs], found.t[runs] = got["points"], got["t"]
             found.outcome[runs], found.end[runs], found.t_end[runs] = got["outcome"], got["end"], got["t_end"]
             cut = found.outcome == INTERRUPTED
