@@ -119,10 +119,14 @@ mod tests {
         let mut chi2 = 0.0;
         for _ in 0..runs {
             let mut blocks = Blocks::<1>::new(1.0);
-            let mut value = 0.0;
+            let (mut value, mut sum, mut time) = (0.0, 0.0, 0.0);
             for _ in 0..steps {
                 value = 0.9 * value + noise(&mut seed);
-                blocks.push([value], 1.0);
+                (sum, time) = (sum + value, time + 1.0);
+                if time >= blocks.span {
+                    blocks.push([sum], time);
+                    (sum, time) = (0.0, 0.0);
+                }
             }
             let average = blocks.average();
             chi2 += (average.value[0] / average.standard_error[0]).powi(2) / f64::from(runs);
