@@ -28,7 +28,11 @@ SAMPLES = {
 def main(folder: Path) -> None:
     """Write both films."""
     for seed, (name, hidden) in enumerate(SAMPLES.items()):
-        effects = (s.make(momentum="constraint", **hidden[s.name]) for s in library() if s.name in hidden)
+        effects = (
+            s.make(momentum="constraint", treatment=None, **hidden[s.name])
+            for s in library()
+            if s.name in hidden
+        )
         run = between_wheels(tuple(effects), seed)
         film = render(run, folder / name, quality=QUALITY, seed=seed, progress=sys.stderr.isatty())
         size = film.path.stat().st_size / 1e6

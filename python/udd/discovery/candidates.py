@@ -62,7 +62,7 @@ def library(model: Model) -> list[Candidate]:
         for momentum in spec.momenta or (None,):
             for values in itertools.product(*(p.grid for p in shapes)):
                 given = dict(zip((p.name for p in shapes), values, strict=True))
-                effect = spec.make(momentum=momentum, **given)
+                effect = spec.make(momentum=momentum, treatment=None, **given)
                 notes = [str(momentum)] if len(spec.momenta) > 1 else []
                 notes += [f"{p.name} = {given[p.name]:g}" for p in shapes if len(p.grid) > 1]
                 title = spec.title + (f" ({', '.join(notes)})" if notes else "")
