@@ -3,6 +3,7 @@
 use std::array::from_fn;
 
 use proptest::prelude::*;
+use udd::integrate::Tolerance;
 use udd::model::effects::{Kind, Role, Treatment};
 use udd::model::{
     DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, Parameter, PendulumFamily, Sides, System, sides_of,
@@ -224,7 +225,7 @@ fn run<S: Scalar, const D: usize, const N: usize>(
     while t.less(end).any() {
         let sides = sides_of(system, S::lift(t), &x);
         jets.expand(tape, p, S::lift(t), &x, &sides);
-        let h = jets.radius(rtol, rtol * 1e-3).min(end - t);
+        let h = jets.radius(&Tolerance { rtol, atol: rtol * 1e-3 }).min(end - t);
         x = jets.at(h);
         t += h;
     }
@@ -406,9 +407,9 @@ fn a_radius_that_is_no_number() {
     let mut jets = Jets::<f64, 3, 21>::new(&tape, Isa::best());
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         jets.expand(&tape, &[1.0, 0.0], 0.0, &[bad, 1.0, 1.0], &[true; MAX_SURFACES]);
-        assert!(jets.radius(1e-9, 1e-12).is_nan(), "{bad}");
+        assert!(jets.radius(&Tolerance { rtol: 1e-9, atol: 1e-12 }).is_nan(), "{bad}");
     }
     // At rest every step is good.
     jets.expand(&tape, &[1.0, 0.0], 0.0, &[1.0, 1.0, 0.0], &[true; MAX_SURFACES]);
-    assert!(jets.radius(1e-9, 1e-12) > 1e6);
+    assert!(jets.radius(&Tolerance { rtol: 1e-9, atol: 1e-12 }) > 1e6);
 }

@@ -194,36 +194,43 @@ where
     }
 
     /// What is integrated.
+    #[inline(always)]
     pub fn system(&self) -> &M {
         &self.system
     }
 
     /// The time reached.
+    #[inline(always)]
     pub fn t(&self) -> S::Real {
         self.at.t
     }
 
     /// The state reached.
+    #[inline(always)]
     pub fn x(&self) -> &[S; D] {
         &self.at.x
     }
 
     /// The sides that the law is taken on.
+    #[inline(always)]
     pub fn sides(&self) -> &crate::model::Sides<S> {
         &self.at.sides
     }
 
     /// The size of the next trial step.
+    #[inline(always)]
     pub fn h(&self) -> S::Real {
         self.h
     }
 
     /// The time at which the last accepted step began.
+    #[inline(always)]
     pub fn from(&self) -> S::Real {
         self.from
     }
 
     /// The last accepted step's size (times are rounded, sizes are not).
+    #[inline(always)]
     pub fn size(&self) -> S::Real {
         self.size
     }
@@ -247,6 +254,7 @@ where
     }
 
     /// Goes on from another state at the same time, as when tangents are scaled back.
+    #[inline(always)]
     pub fn set_state(&mut self, lanes: S::Mask, x: [S; D]) {
         self.at.x = vector!(S, D; n => S::select(lanes, x[n], self.at.x[n]));
         self.begin(lanes);
@@ -260,7 +268,7 @@ where
         // An end that is not a number leaves its lane active, to fail.
         let active = is_zero(remaining).not();
         let targets = self.wall || self.system.surfaces() > 0;
-        let landing = self.landing.lanes();
+        let landing = if targets { self.landing.lanes() } else { S::mask(false) };
 
         let cut = self.h.abs().scale(1.01).less(remaining.abs()).not();
         let mut h = S::Real::select(cut, remaining, self.h);
@@ -276,13 +284,16 @@ where
         self.work.trials = tick(active, self.work.trials, 1.0);
 
         let judged = active.and(landing.not());
-        let (good, factor) = self.controller.judge(trial.error, judged);
+        // A series knows its own size: there is nothing to learn from one step for the next.
+        let (good, factor) = match K::SERIES {
+            true => (trial.error.finite(), S::Real::one()),
+            false => self.controller.judge(trial.error, judged),
+        };
         let accepted = judged.and(good);
         let rejected = judged.and(good.not());
         last = last.and(accepted);
         let mut failed = S::mask(false);
         if K::SERIES {
-            // A series knows its own size: there is nothing to learn from one step for the next.
             last = last.and(trial.size.abs().less(asked.abs()).not());
             failed = rejected.or(accepted.and(S::Mask::from_lanes(|i| {
                 let (t, size) = (self.at.t.lane(i), trial.size.lane(i));
@@ -462,6 +473,7 @@ where
         S::Real::constant(MOST_JUMPS).less(self.jumps.0)
     }
 
+    #[inline(always)]
     fn begin(&mut self, lanes: S::Mask) {
         self.method.begin(&self.system, &self.at, lanes);
         self.work.beside = tick(lanes, self.work.beside, 1.0);

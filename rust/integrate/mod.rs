@@ -22,5 +22,5 @@ pub use method::{Method, Point, Trial};
 pub use propagate::{propagate, propagate_from};
 pub use runge_kutta::{Dopri5, RungeKutta, step};
 pub use saltation::pass;
-pub use taylor::Taylor;
+pub use taylor::{Taylor, order};
 pub use tolerance::{ErrorNorm, Failure, Tolerance, WithTangents};

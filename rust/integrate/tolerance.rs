@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::scalar::elementary::log2_rough;
 use crate::scalar::{Dual, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
@@ -10,11 +11,12 @@ pub trait ErrorNorm<S: Scalar, const D: usize> {
     /// The norm of the error of a step from one state to another: 1 where it is just allowed.
     fn of_step(&self, error: &[S; D], before: &[S; D], after: &[S; D]) -> S::Real;
 
+    /// Roughly the binary logarithm of the square of the norm of a term in a series that starts with
+    /// `start`.
+    fn log2_of_term(&self, term: &[S; D], start: &[S; D]) -> S::Real;
+
     /// What is allowed for the state alone.
     fn state(&self) -> &Tolerance;
-
-    /// Whether more than the state counts.
-    const TANGENTS: bool = false;
 }
 
 /// The error that a step may make in component `n`: `atol + rtol |x_n|`.
@@ -57,6 +59,16 @@ impl<S: Scalar, const D: usize> ErrorNorm<S, D> for Tolerance {
         self.norm(real(error), real(before), real(after))
     }
 
+    #[inline(always)]
+    fn log2_of_term(&self, term: &[S; D], start: &[S; D]) -> S::Real {
+        let mut sum = S::Real::zero();
+        unroll!(n in 0..D => {
+            let allowed = start[n].real().abs().scale(self.rtol) + S::Real::constant(self.atol);
+            sum += (term[n].real() * (S::Real::one() / allowed)).square();
+        });
+        log2_rough(sum.scale(1.0 / D as f64))
+    }
+
     fn state(&self) -> &Tolerance {
         self
     }
@@ -74,26 +86,36 @@ impl<R: Real, const D: usize, const N: usize> ErrorNorm<Dual<R, N>, D> for WithT
     fn of_step(&self, error: &[Dual<R, N>; D], before: &[Dual<R, N>; D], after: &[Dual<R, N>; D]) -> R {
         let mut worst = self.0.of_step(error, before, after);
         for i in 0..N {
-            let length = |v: &[Dual<R, N>; D]| {
-                let mut sum = R::zero();
-                for n in 0..D {
-                    sum += v[n].d[i] * v[n].d[i];
-                }
-                sum
-            };
-            let allowed = length(before).max(length(after)).scale(self.0.rtol * self.0.rtol);
-            let ratio = (length(error) / allowed).sqrt();
+            let allowed = square(before, i).max(square(after, i)).scale(self.0.rtol * self.0.rtol);
+            let ratio = (square(error, i) / allowed).sqrt();
             // A tangent of no length has no error; what is not a number stays.
             worst = R::select(R::zero().less(allowed).and(ratio.less(worst).not()), ratio, worst);
         }
         worst
     }
 
+    #[inline(always)]
+    fn log2_of_term(&self, term: &[Dual<R, N>; D], start: &[Dual<R, N>; D]) -> R {
+        let mut worst = self.0.log2_of_term(term, start);
+        unroll!(i in 0..N => {
+            let allowed = square(start, i).scale(self.0.rtol * self.0.rtol);
+            let own = log2_rough(square(term, i)) - log2_rough(allowed);
+            worst = R::select(R::zero().less(allowed).and(own.less(worst).not()), own, worst);
+        });
+        worst
+    }
+
     fn state(&self) -> &Tolerance {
         &self.0
     }
+}
 
-    const TANGENTS: bool = true;
+/// The square of the length of tangent `i`.
+#[inline(always)]
+fn square<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: usize) -> R {
+    let mut sum = R::zero();
+    unroll!(n in 0..D => { sum += x[n].d[i] * x[n].d[i]; });
+    sum
 }
 
 /// Why a run could not go on.

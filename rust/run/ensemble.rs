@@ -4,9 +4,9 @@ use super::fleet::{Crew, Fleet, Queue, sail};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::ship::{Ship, Start};
 use super::trajectory::Outcome;
-use crate::integrate::{Failure, Tolerance};
+use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
-use crate::scalar::{Mask, Real, Scalar};
+use crate::scalar::{Isa, Mask, Real, Scalar};
 use crate::tape::Tape;
 
 /// How steps are taken.
@@ -46,11 +46,19 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Passage<D>>> {
         let runs = self.values.len().max(self.starts.len());
         match self.stepper {
-            Stepper::Dopri5 => sail(&Sampled { ensemble: self, recipe: ByDopri5 }, runs, crew),
+            Stepper::Dopri5 => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa: crew.isa }, runs, crew),
             Stepper::Taylor => match Tape::record(self.family, &known(self.values)) {
-                Ok(tape) => sail(&Sampled { ensemble: self, recipe: ByTaylor(&tape, crew.isa) }, runs, crew),
+                Ok(tape) => sail(
+                    &Sampled {
+                        ensemble: self,
+                        recipe: ByTaylor { tape: &tape, order: order(&self.tolerance), isa: crew.isa },
+                        isa: crew.isa,
+                    },
+                    runs,
+                    crew,
+                ),
                 // A law that no series follows.
-                Err(_) => sail(&Sampled { ensemble: self, recipe: ByDopri5 }, runs, crew),
+                Err(_) => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa: crew.isa }, runs, crew),
             },
         }
     }
@@ -77,6 +85,7 @@ pub fn known(rows: &[Vec<f64>]) -> Vec<Option<f64>> {
 struct Sampled<'a, F, const D: usize, T> {
     ensemble: &'a Ensemble<'a, F, D>,
     recipe: T,
+    isa: Isa,
 }
 
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
@@ -84,11 +93,13 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
 
+    #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Passage<D>)>) {
         let Ensemble { family, times, tolerance, .. } = self.ensemble;
         let Some(first) = queue.take() else { return };
         let start = |run| self.ensemble.start::<R>(run);
-        let mut ship = Ship::new(*family, |values| self.recipe.make(values), start(first), tolerance);
+        let mut ship =
+            Ship::new(self.isa, *family, |values| self.recipe.make(values), start(first), tolerance);
         let mut states: Vec<Vec<[f64; D]>> = vec![Vec::new(); R::LANES];
         // The time of each lane's next sample.
         let mut wanted = R::constant(f64::INFINITY);

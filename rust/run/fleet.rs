@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::ThreadPoolBuilder;
 
 use super::Stop;
-use crate::scalar::{Isa, LANES, Packet, Real};
+use crate::scalar::{Instructions, Isa, LANES, Packet, Real, Work};
 
 /// Jobs numbered from 0, each taken once.
 #[derive(Debug)]
@@ -44,6 +44,8 @@ pub trait Fleet: Sync {
     const PACKETS: bool;
 
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
+    ///
+    /// To be `#[inline(always)]`.
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Self::Yield)>);
 }
 
@@ -63,10 +65,28 @@ pub struct Crew<'a> {
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
     spread(jobs, crew, |queue, yields| {
         if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
-            return fleet.sail::<Packet<LANES>>(queue, yields);
+            return crew.isa.run(InPackets { fleet, queue, yields });
         }
         fleet.sail::<f64>(queue, yields);
     })
+}
+
+/// The whole of the work, compiled for each instruction set.
+struct InPackets<'a, 'b, T: Fleet> {
+    fleet: &'a T,
+    queue: &'a Queue<'b>,
+    yields: &'a mut Vec<(usize, T::Yield)>,
+}
+
+impl<T: Fleet> Work for InPackets<'_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        if const { T::PACKETS && !matches!(V::ISA, Isa::Baseline) } {
+            self.fleet.sail::<Packet<LANES, V>>(self.queue, self.yields);
+        }
+    }
 }
 
 fn spread<Y: Send>(

@@ -1,6 +1,10 @@
 //! Frames of tangents.
 
-use crate::scalar::{Dual, Mask, Real};
+use super::ship::work;
+use crate::integrate::{Driver, ErrorNorm, Method};
+use crate::model::System;
+use crate::scalar::{Dual, Instructions, Isa, Mask, Real, Work};
+use crate::unroll::unroll;
 
 /// The state with `N` orthonormal tangents that no symmetry singles out.
 pub fn tangents<R: Real, const D: usize, const N: usize>(x: [f64; D]) -> [Dual<R, N>; D] {
@@ -19,31 +23,29 @@ pub fn tangents<R: Real, const D: usize, const N: usize>(x: [f64; D]) -> [Dual<R
 ///
 /// A tangent that has vanished, as where a contact sticks, has length 0; it is replaced by some direction
 /// perpendicular to the ones before it, so that the others go on.
-#[inline(never)]
+#[inline(always)]
 pub fn orthonormalise<R: Real, const D: usize, const N: usize>(
     x: &[Dual<R, N>; D],
 ) -> ([Dual<R, N>; D], [R; N]) {
     let mut x = *x;
     let mut lengths = [R::zero(); N];
-    for i in 0..N {
-        for j in 0..i {
-            subtract(&mut x, i, j);
-        }
+    unroll!(i in 0..N => {
+        unroll!(j in 0..N => {
+            if j < i {
+                subtract(&mut x, i, j);
+            }
+        });
         let mut square = R::zero();
-        for n in 0..D {
-            square += x[n].d[i] * x[n].d[i];
-        }
+        unroll!(n in 0..D => { square += x[n].d[i] * x[n].d[i]; });
         lengths[i] = square.sqrt();
         let inverse = R::one() / lengths[i];
-        for n in 0..D {
-            x[n].d[i] = x[n].d[i] * inverse;
-        }
+        unroll!(n in 0..D => { x[n].d[i] = x[n].d[i] * inverse; });
         let gone = lengths[i].less(R::constant(1e-150));
         if gone.any() {
             lengths[i] = R::select(gone, R::zero(), lengths[i]);
             replace(&mut x, i, gone);
         }
-    }
+    });
     (x, lengths)
 }
 
@@ -51,12 +53,8 @@ pub fn orthonormalise<R: Real, const D: usize, const N: usize>(
 #[inline(always)]
 fn subtract<R: Real, const D: usize, const N: usize>(x: &mut [Dual<R, N>; D], i: usize, j: usize) {
     let mut along = R::zero();
-    for n in 0..D {
-        along += x[n].d[i] * x[n].d[j];
-    }
-    for n in 0..D {
-        x[n].d[i] -= along * x[n].d[j];
-    }
+    unroll!(n in 0..D => { along += x[n].d[i] * x[n].d[j]; });
+    unroll!(n in 0..D => { x[n].d[i] -= along * x[n].d[j]; });
 }
 
 /// Puts the axis with the most room beside the tangents before `i` in its place, in these lanes.
@@ -76,5 +74,107 @@ fn replace<R: Real, const D: usize, const N: usize>(x: &mut [Dual<R, N>; D], i: 
         for n in 0..D {
             x[n].d[i].set_lane(lane, new[n] / length);
         }
+    }
+}
+
+/// How much tangents have grown: `ln(product) + sum`, so that a step costs a multiplication.
+#[derive(Clone, Copy, Debug)]
+pub struct Growth<R, const N: usize> {
+    product: [R; N],
+    sum: [R; N],
+}
+
+impl<R: Real, const N: usize> Growth<R, N> {
+    pub fn none() -> Self {
+        Self { product: [R::one(); N], sum: [R::zero(); N] }
+    }
+
+    /// Forgets a lane's.
+    pub fn clear(&mut self, lane: usize) {
+        for n in 0..N {
+            self.product[n].set_lane(lane, 1.0);
+            self.sum[n].set_lane(lane, 0.0);
+        }
+    }
+
+    /// The logarithms of a lane's.
+    pub fn lane(&self, lane: usize) -> [f64; N] {
+        std::array::from_fn(|n| self.sum[n].lane(lane) + self.product[n].lane(lane).ln())
+    }
+
+    /// Makes the tangents in these lanes orthonormal again, and adds what they had grown.
+    #[inline(always)]
+    pub fn renew<M, const D: usize, E, K>(
+        &mut self,
+        isa: Isa,
+        driver: &mut Driver<M, Dual<R, N>, D, E, K>,
+        lanes: R::Mask,
+    ) where
+        M: System<Dual<R, N>, D>,
+        E: ErrorNorm<Dual<R, N>, D> + Copy,
+        K: Method<Dual<R, N>, D>,
+    {
+        work::<R, _>(isa, Renewal { growth: self, driver, lanes });
+    }
+
+    /// The same where it has to be: several tangents lean towards each other with every step, a single one
+    /// only must not leave the range of numbers.
+    #[inline(always)]
+    pub fn keep<M, const D: usize, E, K>(
+        &mut self,
+        isa: Isa,
+        driver: &mut Driver<M, Dual<R, N>, D, E, K>,
+        moved: R::Mask,
+    ) where
+        M: System<Dual<R, N>, D>,
+        E: ErrorNorm<Dual<R, N>, D> + Copy,
+        K: Method<Dual<R, N>, D>,
+    {
+        let mut lanes = moved;
+        if const { N == 1 } {
+            let mut square = R::zero();
+            unroll!(n in 0..D => { square += driver.x()[n].d[0] * driver.x()[n].d[0]; });
+            let near = R::constant(1e-40).less(square).and(square.less(R::constant(1e40)));
+            lanes = moved.and(near.not());
+        }
+        if lanes.any() {
+            self.renew(isa, driver, lanes);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, lengths: [R; N], lanes: R::Mask) {
+        unroll!(n in 0..N => {
+            let grown = R::select(lanes, self.product[n] * lengths[n], self.product[n]);
+            self.product[n] = grown;
+            // A length of zero stays one.
+            let far = grown.less(R::constant(1e-100)).or(R::constant(1e100).less(grown));
+            if far.any() {
+                self.sum[n] = R::select(far, self.sum[n] + grown.ln(), self.sum[n]);
+                self.product[n] = R::select(far, R::one(), grown);
+            }
+        });
+    }
+}
+
+struct Renewal<'a, M, R: Real, const D: usize, const N: usize, E, K> {
+    growth: &'a mut Growth<R, N>,
+    driver: &'a mut Driver<M, Dual<R, N>, D, E, K>,
+    lanes: R::Mask,
+}
+
+impl<M, R: Real, const D: usize, const N: usize, E, K> Work for Renewal<'_, M, R, D, N, E, K>
+where
+    M: System<Dual<R, N>, D>,
+    E: ErrorNorm<Dual<R, N>, D> + Copy,
+    K: Method<Dual<R, N>, D>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        let (x, lengths) = orthonormalise(self.driver.x());
+        self.driver.set_state(self.lanes, x);
+        self.growth.add(lengths, self.lanes);
     }
 }

@@ -3,15 +3,18 @@
 use super::blocks::{Average, Blocks};
 use super::ensemble::known;
 use super::fleet::{Crew, Fleet, Queue, sail};
-use super::frame::{orthonormalise, tangents};
+use super::frame::{Growth, tangents};
 use super::moments::Moments;
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::ship::{Ship, Start};
 use super::trajectory::Outcome;
-use crate::integrate::{Failure, Tolerance, WithTangents};
+use crate::integrate::{Failure, Tolerance, WithTangents, order};
 use crate::model::Family;
-use crate::scalar::{Dual, Mask, Real};
+use crate::scalar::{Dual, Isa, Mask, Real};
 use crate::tape::Tape;
+
+/// A block is no shorter than this many steps.
+const LEAST_STEPS: f64 = 16.0;
 
 /// How exponents are estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,12 +67,18 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
         let orbits = self.values.len().max(self.starts.len());
         match Tape::record(self.family, &known(self.values)) {
             Ok(tape) => sail(
-                &Tangents::<_, D, N, _> { orbits: self, recipe: ByTaylor(&tape, crew.isa) },
+                &Tangents::<_, D, N, _> {
+                    orbits: self,
+                    recipe: ByTaylor { tape: &tape, order: order(&self.options.tolerance), isa: crew.isa },
+                    isa: crew.isa,
+                },
                 orbits,
                 crew,
             ),
             // A law that no series follows.
-            Err(_) => sail(&Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5 }, orbits, crew),
+            Err(_) => {
+                sail(&Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5, isa: crew.isa }, orbits, crew)
+            }
         }
     }
 
@@ -87,6 +96,7 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
 struct Tangents<'a, F, const D: usize, const N: usize, T> {
     orbits: &'a Lyapunov<'a, F, D>,
     recipe: T,
+    isa: Isa,
 }
 
 impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tangents<'_, F, D, N, T> {
@@ -94,16 +104,18 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
 
+    #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Exponents<D, N>)>) {
         let LyapunovOptions { time, transient, goal, tolerance } = self.orbits.options;
         let Some(first) = queue.take() else { return };
         let span = (time - transient) / (8 * Blocks::<N>::MOST) as f64;
         let start = |orbit| self.orbits.start::<R, N>(orbit);
         let norm = WithTangents(tolerance);
-        let mut ship = Ship::new(self.orbits.family, |v| self.recipe.make(v), start(first), &norm);
+        let mut ship = Ship::new(self.isa, self.orbits.family, |v| self.recipe.make(v), start(first), &norm);
         let mut blocks = vec![Blocks::<N>::new(span); R::LANES];
-        let mut growth = [R::zero(); N];
-        let mut since = R::zero();
+        let mut growth = Growth::<R, N>::none();
+        // When each lane's block began, and its steps since.
+        let (mut since, mut steps) = (R::zero(), R::zero());
         let mut full_at = R::constant(f64::INFINITY);
         let mut moments = Moments::<R, D>::zero();
         let mut waiting = Some(first);
@@ -120,27 +132,24 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             let progress = ship.trial();
             let moved = progress.moved;
             if const { N == D } {
-                moments.add(&ship.driver, moved.and(counting));
+                moments.add(self.isa, &ship.driver, moved.and(counting));
             }
-            let (x, lengths) = orthonormalise(ship.driver.x());
-            ship.driver.set_state(moved, x);
+            growth.keep(self.isa, &mut ship.driver, moved);
+            steps = R::select(moved, steps + R::one(), steps);
             let t = ship.driver.t();
-            for i in 0..N {
-                growth[i] = R::select(moved, growth[i] + lengths[i].ln(), growth[i]);
-            }
-            let full = moved.and(t.less(full_at).not());
+            let full = moved.and(t.less(full_at).or(steps.less(R::constant(LEAST_STEPS))).not());
             let over = ship.arrived().or(progress.walled()).or(progress.failed);
             if !full.or(over).any() {
                 continue;
             }
+            growth.renew(self.isa, &mut ship.driver, full.or(over));
             for lane in (0..R::LANES).filter(|&lane| full.or(over).lane(lane)) {
                 let Some(orbit) = ship.job(lane) else { continue };
                 let now = t.lane(lane);
                 let own = &mut blocks[lane];
                 let mut converged = false;
                 if counting.lane(lane) && now > since.lane(lane) {
-                    let sums = growth.map(|sum| sum.lane(lane));
-                    let look = own.push(sums, now - since.lane(lane));
+                    let look = own.push(growth.lane(lane), now - since.lane(lane));
                     if look && !own.drop_transient() {
                         converged = own.average().standard_error[0] <= goal;
                     }
@@ -156,8 +165,9 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                     moments.clear(lane);
                 }
                 if full.lane(lane) || settled {
-                    self::clear(&mut growth, lane);
+                    growth.clear(lane);
                     since.set_lane(lane, now);
+                    steps.set_lane(lane, 0.0);
                     full_at.set_lane(lane, now + own.span);
                 }
                 if !(converged || failed || walled || (arrived && !settled)) {
@@ -179,17 +189,12 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                 if let Some(orbit) = queue.take() {
                     ship.load(lane, orbit, start(orbit));
                     blocks[lane].clear(span);
-                    self::clear(&mut growth, lane);
+                    growth.clear(lane);
                     since.set_lane(lane, 0.0);
+                    steps.set_lane(lane, 0.0);
                     full_at.set_lane(lane, if transient > 0.0 { f64::INFINITY } else { span });
                 }
             }
         }
-    }
-}
-
-fn clear<R: Real>(sums: &mut [R], lane: usize) {
-    for sum in sums {
-        sum.set_lane(lane, 0.0);
     }
 }

@@ -1,8 +1,10 @@
 //! Time averages of the state and of the products of its components.
 
+use super::ship::work;
 use crate::integrate::{Driver, ErrorNorm, Method};
 use crate::model::System;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
+use crate::unroll::unroll;
 
 /// Gauss-Legendre nodes on `[0, 1]` and their weights: exact for products of polynomials of degree 5.
 const NODES: [(f64, f64); 6] = [
@@ -30,29 +32,15 @@ impl<R: Real, const D: usize> Moments<R, D> {
     }
 
     /// Adds the last step of the lanes that moved.
-    #[inline(never)]
-    pub fn add<M, S, E, K>(&mut self, driver: &Driver<M, S, D, E, K>, moved: R::Mask)
+    #[inline(always)]
+    pub fn add<M, S, E, K>(&mut self, isa: Isa, driver: &Driver<M, S, D, E, K>, moved: R::Mask)
     where
         S: Scalar<Real = R, Mask = R::Mask>,
         M: System<S, D>,
         E: ErrorNorm<S, D> + Copy,
         K: Method<S, D>,
     {
-        let size = R::select(moved, driver.size(), R::zero());
-        self.time += size;
-        for (node, weight) in NODES {
-            let x = driver.dense_real(size.scale(node));
-            let share = size.scale(weight);
-            for n in 0..D {
-                // Lanes that did not move may hold anything.
-                let own = R::select(moved, x[n], R::zero());
-                self.first[n] += own * share;
-                for m in 0..D {
-                    let other = R::select(moved, x[m], R::zero());
-                    self.second[n][m] += own * other * share;
-                }
-            }
-        }
+        work::<R, _>(isa, Addition { moments: self, driver, moved });
     }
 
     /// Forgets a lane.
@@ -68,5 +56,41 @@ impl<R: Real, const D: usize> Moments<R, D> {
         let time = self.time.lane(lane);
         let mean = |sum: R| sum.lane(lane) / time;
         Moments { time, first: self.first.map(mean), second: self.second.map(|row| row.map(mean)) }
+    }
+}
+
+struct Addition<'a, M, S: Scalar, const D: usize, E, K> {
+    moments: &'a mut Moments<S::Real, D>,
+    driver: &'a Driver<M, S, D, E, K>,
+    moved: S::Mask,
+}
+
+impl<M, S, const D: usize, E, K> Work for Addition<'_, M, S, D, E, K>
+where
+    S: Scalar,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        let Self { moments, driver, moved } = self;
+        let size = S::Real::select(moved, driver.size(), S::Real::zero());
+        moments.time += size;
+        for (node, weight) in NODES {
+            let x = driver.dense_real(size.scale(node));
+            let share = size.scale(weight);
+            unroll!(n in 0..D => {
+                // Lanes that did not move may hold anything.
+                let own = S::Real::select(moved, x[n], S::Real::zero());
+                moments.first[n] += own * share;
+                unroll!(m in 0..D => {
+                    let other = S::Real::select(moved, x[m], S::Real::zero());
+                    moments.second[n][m] += own * other * share;
+                });
+            });
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::signs::{Side, Stretch, judge};
 use crate::integrate::Method;
 use crate::model::choose;
-use crate::scalar::{Isa, Mask, Packet, Real, Work};
+use crate::scalar::{Instructions, Isa, Mask, Packet, Real, Work};
 
 /// No method looks at more places within a step.
 pub const MOST_PROBES: usize = 8;
@@ -38,7 +38,7 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
     pub fn state(&self, s: R) -> [R; D] {
         let mut x = [R::zero(); D];
         for (x, c) in x.iter_mut().zip(&self.coefficients) {
-            *x = self.isa.run(At { c, s });
+            *x = R::work(self.isa, At { c, s });
         }
         x
     }
@@ -46,13 +46,13 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
     /// Looks where a component crosses a value.
     #[inline(always)]
     pub fn signs(&self, n: usize, scan: Scanned<'_, R>, stretches: &mut [Stretch<R>]) -> Side<R> {
-        self.isa.run(Signs { c: self.coefficients[n], scan, stretches })
+        R::work(self.isa, Signs { c: self.coefficients[n], scan, stretches })
     }
 
     /// Where a component has a value, between the two places; `zero` is what counts as that.
     #[inline(always)]
     pub fn root(&self, n: usize, less: f64, low: (R, R), high: (R, R), zero: R, lanes: R::Mask) -> R {
-        self.isa.run(Root { c: self.coefficients[n], less, low, high, zero, lanes })
+        R::work(self.isa, Root { c: self.coefficients[n], less, low, high, zero, lanes })
     }
 }
 
@@ -70,10 +70,10 @@ impl<R: Real, const D: usize> Room<R, D> {
 
 /// The value at `s`; `lift` makes the coefficients as wide as `s`.
 #[inline(always)]
-fn value<R: Real, V: Real>(c: &[R], s: V, lift: impl Fn(R) -> V) -> V {
+fn value<R: Real, P: Real>(c: &[R], s: P, lift: impl Fn(R) -> P) -> P {
     // Two sums side by side; the state itself is added last, which rounds once.
     let square = s * s;
-    let (mut odd, mut even) = (V::zero(), V::zero());
+    let (mut odd, mut even) = (P::zero(), P::zero());
     let (pairs, rest) = c[1..].as_chunks::<2>();
     if let [last] = rest {
         odd = lift(*last);
@@ -94,7 +94,7 @@ impl<R: Real> Work for At<'_, R> {
     type Output = R;
 
     #[inline(always)]
-    fn run<const L: usize>(self) -> R {
+    fn run<V: Instructions>(self) -> R {
         value(self.c, self.s, |c| c)
     }
 }
@@ -120,7 +120,7 @@ impl<R: Real> Work for Signs<'_, R> {
     type Output = Side<R>;
 
     #[inline(always)]
-    fn run<const L: usize>(self) -> Side<R> {
+    fn run<V: Instructions>(self) -> Side<R> {
         let Scanned { less, probes, size, end, side } = self.scan;
         let mut s = [R::zero(); MOST_PROBES];
         for (s, &theta) in s.iter_mut().zip(probes) {
@@ -129,8 +129,8 @@ impl<R: Real> Work for Signs<'_, R> {
         let mut values = [end; MOST_PROBES];
         if const { R::LANES == 1 } {
             // One trajectory: the places side by side, all of them, as vector instructions want it.
-            let places = Packet::<MOST_PROBES>::from_lanes(|i| s[i].lane(0));
-            let found = value(self.c, places, |c| Packet([c.lane(0); MOST_PROBES]));
+            let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
+            let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
             for (i, value) in values.iter_mut().enumerate() {
                 *value = R::constant(found.lane(i)) - R::constant(less);
             }
@@ -159,7 +159,7 @@ impl<R: Real> Work for Root<'_, R> {
     /// Newton's method, with a bisection where it leaves the bracket and every fourth time, which bounds
     /// the work.
     #[inline(always)]
-    fn run<const L: usize>(self) -> R {
+    fn run<V: Instructions>(self) -> R {
         let Self { c, less, mut low, high, zero, mut lanes } = self;
         let rising = low.1.less(high.1);
         let (mut top, mut s) = (high.0, low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1));

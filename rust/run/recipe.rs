@@ -29,9 +29,14 @@ impl<const D: usize> Recipe<D> for ByDopri5 {
     }
 }
 
-/// The Taylor method on this tape, with these instructions.
+/// The Taylor method.
 #[derive(Clone, Copy, Debug)]
-pub struct ByTaylor<'a, const D: usize>(pub &'a Tape<D>, pub Isa);
+pub struct ByTaylor<'a, const D: usize> {
+    pub tape: &'a Tape<D>,
+    pub order: usize,
+    /// The instructions that series are computed with.
+    pub isa: Isa,
+}
 
 impl<'a, const D: usize> Recipe<D> for ByTaylor<'a, D> {
     type Method<S: Scalar> = Taylor<'a, S, D>;
@@ -39,6 +44,6 @@ impl<'a, const D: usize> Recipe<D> for ByTaylor<'a, D> {
     const PACKETS: bool = true;
 
     fn make<S: Scalar>(&self, values: Vec<S>) -> Taylor<'a, S, D> {
-        Taylor::new(self.0, values, self.1)
+        Taylor::new(self.tape, values, self.order, self.isa)
     }
 }

@@ -5,7 +5,7 @@ use super::ensemble::known;
 use super::fleet::{Crew, Fleet, Queue, sail};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::ship::{Ship, Start};
-use crate::integrate::{Failure, Tolerance};
+use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
 use crate::scalar::{Isa, Mask, Real};
 use crate::tape::{Expression, Tape};
@@ -98,7 +98,11 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
         let jobs = self.values.len().max(self.starts.len());
         match Tape::record(self.family, &known(self.values)) {
             Ok(tape) => sail(
-                &Collect { sections: self, recipe: ByTaylor(&tape, crew.isa), isa: crew.isa },
+                &Collect {
+                    sections: self,
+                    recipe: ByTaylor { tape: &tape, order: order(&self.tolerance), isa: crew.isa },
+                    isa: crew.isa,
+                },
                 jobs,
                 crew,
             ),
@@ -129,11 +133,13 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
 
+    #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Crossings<D>)>) {
         let Sections { family, sections, skip, count, bounded, tolerance, .. } = *self.sections;
         let Some(first) = queue.take() else { return };
         let start = |job| self.sections.start::<R>(job);
-        let mut ship = Ship::new(family, |values| self.recipe.make(values), start(first), &tolerance);
+        let mut ship =
+            Ship::new(self.isa, family, |values| self.recipe.make(values), start(first), &tolerance);
         let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa);
         // What each lane has found.
         let mut catches: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];

@@ -1,8 +1,8 @@
 //! A packet of trajectories, each with its own job, parameters, time and end.
 
 use crate::integrate::{Driver, ErrorNorm, Method, Progress};
-use crate::model::Family;
-use crate::scalar::{Mask, Real, Scalar};
+use crate::model::{Family, System};
+use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
 
 /// Where a job starts.
 #[derive(Clone, Copy, Debug)]
@@ -18,12 +18,15 @@ pub struct Start<'a, S, const D: usize> {
 
 /// One [`Driver`] whose lanes are loaded and unloaded one by one.
 pub struct Ship<'a, F: Family<D>, S: Scalar, const D: usize, E, K> {
+    isa: Isa,
     family: &'a F,
     values: Vec<S>,
     /// The packet under way.
     pub driver: Driver<F::Built<S>, S, D, E, K>,
     /// The job in each lane.
     jobs: Vec<Option<usize>>,
+    /// How many there are.
+    under_way: usize,
     /// Where each lane's run ends.
     pub end: S::Real,
 }
@@ -35,13 +38,19 @@ where
     E: ErrorNorm<S, D> + Copy,
     K: Method<S, D>,
 {
-    /// An empty ship, which needs some start to be built from.
-    pub fn new(family: &'a F, method: impl FnOnce(Vec<S>) -> K, like: Start<'_, S, D>, norm: &E) -> Self {
+    /// An empty ship, which needs some start to be built from; packets sail with these instructions.
+    pub fn new(
+        isa: Isa,
+        family: &'a F,
+        method: impl FnOnce(Vec<S>) -> K,
+        like: Start<'_, S, D>,
+        norm: &E,
+    ) -> Self {
         let values: Vec<S> = like.values.iter().map(|&value| S::constant(value)).collect();
         let t = S::Real::constant(like.t);
         let method = method(values.clone());
         let driver = Driver::by(method, family.build(&values), t, like.x, None, norm).with_wall();
-        Self { family, values, driver, jobs: vec![None; S::Real::LANES], end: t }
+        Self { isa, family, values, driver, jobs: vec![None; S::Real::LANES], under_way: 0, end: t }
     }
 
     /// Starts a job in a lane.
@@ -55,13 +64,16 @@ where
         let only = S::Mask::from_lanes(|i| i == lane);
         self.driver.start(only, S::Real::constant(start.t), start.x, None);
         self.end.set_lane(lane, start.end);
+        self.under_way += usize::from(self.jobs[lane].is_none());
         self.jobs[lane] = Some(job);
     }
 
     /// Ends the job in a lane, which from now on stays where it is.
     pub fn unload(&mut self, lane: usize) -> Option<usize> {
         self.end.set_lane(lane, self.driver.t().lane(lane));
-        self.jobs[lane].take()
+        let job = self.jobs[lane].take();
+        self.under_way -= usize::from(job.is_some());
+        job
     }
 
     /// The job in a lane.
@@ -76,14 +88,20 @@ where
     }
 
     /// Whether all lanes are empty.
+    #[inline(always)]
     pub fn is_empty(&self) -> bool {
-        self.jobs.iter().all(Option::is_none)
+        self.under_way == 0
     }
 
     /// Tries a step in every lane.
-    #[inline(never)]
     pub fn trial(&mut self) -> Progress<S::Mask> {
-        self.driver.trial(self.end)
+        let end = self.end;
+        work::<S::Real, _>(self.isa, Trial { driver: &mut self.driver, end })
+    }
+
+    /// The instructions that packets sail with.
+    pub fn isa(&self) -> Isa {
+        self.isa
     }
 
     /// Lanes that are at their end.
@@ -91,5 +109,32 @@ where
     pub fn arrived(&self) -> S::Mask {
         let left = self.end - self.driver.t();
         S::Real::zero().less(left).not()
+    }
+}
+
+/// Does what is worth the best instructions over packets; for a single trajectory a method's kernel alone
+/// is.
+#[inline(always)]
+pub fn work<R: Real, W: Work>(isa: Isa, work: W) -> W::Output {
+    if const { R::LANES > 1 } { R::work(isa, work) } else { work.run::<Plain>() }
+}
+
+struct Trial<'a, M, S: Scalar, const D: usize, E, K> {
+    driver: &'a mut Driver<M, S, D, E, K>,
+    end: S::Real,
+}
+
+impl<M, S, const D: usize, E, K> Work for Trial<'_, M, S, D, E, K>
+where
+    S: Scalar,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    type Output = Progress<S::Mask>;
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> Progress<S::Mask> {
+        self.driver.trial(self.end)
     }
 }

@@ -126,6 +126,15 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         Self { re: self.re.times(factor), d: vector!(S, N; i => self.d[i].times(factor)) }
     }
     #[inline(always)]
+    fn fused(self, a: Self, b: Self) -> Self {
+        let d = vector!(S, N; i => self.d[i].fused(a.d[i], b.re).fused(b.d[i], a.re));
+        Self { re: self.re.fused(a.re, b.re), d }
+    }
+    #[inline(always)]
+    fn fused_times(self, a: Self, b: S::Real) -> Self {
+        Self { re: self.re.fused_times(a.re, b), d: vector!(S, N; i => self.d[i].fused_times(a.d[i], b)) }
+    }
+    #[inline(always)]
     fn less(self, other: Self) -> S::Mask {
         self.re.less(other.re)
     }

@@ -1,5 +1,6 @@
-//! The instruction set, chosen when the program runs. All of the crate's `unsafe` is here.
+//! The instruction set, chosen when the program runs. The crate's `unsafe` is here and in `lanes.rs`.
 
+use std::fmt::Debug;
 use std::sync::OnceLock;
 
 /// Lanes in a packet, the same for every instruction set: one AVX-512 register, two of AVX2, four of SSE2.
@@ -10,17 +11,44 @@ pub const LANES: usize = 8;
 pub enum Isa {
     /// What every machine of the architecture has: SSE2 on x86-64, NEON on AArch64.
     Baseline,
+    /// AVX2 with fused multiply-add.
     Avx2,
     Avx512,
 }
 
-/// Work that is compiled once for each instruction set, with packets of `L` lanes.
+/// Instructions as a type, for [packets](super::Packet) that are made of them.
+///
+/// Those beyond the [`Plain`] ones cannot be named outside of this crate: they are given to [`Work`] where
+/// the machine has them.
+pub trait Instructions: Copy + Debug + PartialEq + Send + Sync + 'static {
+    const ISA: Isa;
+}
+
+/// What the compiler makes of plain loops, on any machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plain;
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Avx2;
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Avx512;
+
+impl Instructions for Plain {
+    const ISA: Isa = Isa::Baseline;
+}
+impl Instructions for Avx2 {
+    const ISA: Isa = Isa::Avx2;
+}
+impl Instructions for Avx512 {
+    const ISA: Isa = Isa::Avx512;
+}
+
+/// Work that is compiled once for each instruction set.
 ///
 /// [`run`](Work::run) and all that it calls on the way must be `#[inline(always)]`: what stays a function
 /// of its own is compiled for the baseline.
 pub trait Work {
     type Output;
-    fn run<const L: usize>(self) -> Self::Output;
+    fn run<V: Instructions>(self) -> Self::Output;
 }
 
 impl Isa {
@@ -29,7 +57,7 @@ impl Isa {
         let mut list = vec![Isa::Baseline];
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx2") {
+            if has_avx2() {
                 list.push(Isa::Avx2);
             }
             if has_avx512() {
@@ -49,6 +77,7 @@ impl Isa {
     ///
     /// # Panics
     /// Where the machine lacks them.
+    #[inline]
     pub fn run<W: Work>(self, work: W) -> W::Output {
         assert!(self <= Isa::best(), "this machine lacks {self:?}");
         #[cfg(target_arch = "x86_64")]
@@ -63,27 +92,49 @@ impl Isa {
     }
 }
 
+/// Does work over packets that are made of the instructions `V` with just these.
+#[inline(always)]
+pub(super) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if const { V::ISA as u8 == Isa::Avx512 as u8 } {
+            // SAFETY: `V` was given where the machine had been seen to have it.
+            return unsafe { avx512(work) };
+        }
+        if const { V::ISA as u8 == Isa::Avx2 as u8 } {
+            // SAFETY: the same.
+            return unsafe { avx2(work) };
+        }
+    }
+    baseline(work)
+}
+
 #[inline(never)]
 fn baseline<W: Work>(work: W) -> W::Output {
-    work.run::<LANES>()
+    work.run::<Plain>()
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
 }
 
 #[cfg(target_arch = "x86_64")]
 fn has_avx512() -> bool {
-    is_x86_feature_detected!("avx2")
+    has_avx2()
         && is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512vl")
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn avx2<W: Work>(work: W) -> W::Output {
-    work.run::<LANES>()
+    work.run::<Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn avx512<W: Work>(work: W) -> W::Output {
-    work.run::<LANES>()
+    work.run::<Avx512>()
 }

@@ -8,11 +8,12 @@
 mod dual;
 pub mod elementary;
 mod isa;
+mod lanes;
 mod packet;
 mod real;
 
 pub use dual::Dual;
-pub use isa::{Isa, LANES, Work};
+pub use isa::{Instructions, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
 
 use std::fmt::Debug;
@@ -48,6 +49,12 @@ pub trait Scalar:
     fn scale(self, factor: f64) -> Self;
     /// The product with a number without derivatives.
     fn times(self, factor: Self::Real) -> Self;
+
+    /// `self + a b`, rounded once: one instruction where the machine has it, slow where it has not. For sums
+    /// of products on the hottest paths, which are compiled for every [instruction set](Isa).
+    fn fused(self, a: Self, b: Self) -> Self;
+    /// The same for a factor without derivatives.
+    fn fused_times(self, a: Self, b: Self::Real) -> Self;
 
     fn zero() -> Self {
         Self::constant(0.0)
@@ -85,6 +92,8 @@ pub trait Real: Scalar<Real = Self> {
     /// How many trajectories it stands for.
     const LANES: usize;
 
+    /// Does work over such numbers with these instructions; packets that are made of some bring their own.
+    fn work<W: Work>(isa: Isa, work: W) -> W::Output;
     /// The number with these lanes.
     fn from_lanes(lane: impl FnMut(usize) -> f64) -> Self;
     /// Lane `i`.

@@ -1,32 +1,54 @@
 //! Several numbers at once: the lanes of a SIMD register.
 
+use std::marker::PhantomData;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::{Mask, Real, Scalar, elementary};
+use super::isa::{self, Instructions, Isa, Plain, Work};
+use super::{Mask, Real, Scalar, elementary, lanes};
 
-/// `L` numbers that go through the same operations, one trajectory each.
+/// `L` numbers that go through the same operations, one trajectory each, by the instructions `V`.
 ///
-/// Every operation is a plain loop over the lanes, which the compiler turns into the vector
-/// instructions of the [instruction set](super::Isa) that the caller was compiled for. A lane's bits do
-/// not depend on that, nor on `L`: nothing is fused or reordered.
+/// A lane's bits depend neither on these nor on `L`: nothing is reordered, and fused only where
+/// [`Scalar::fused`] says so.
 ///
 /// ```
 /// use udd::scalar::{Packet, Real, Scalar};
-/// let x = Packet([1.0, 4.0, 9.0, 16.0]);
+/// let x: Packet<4> = Packet::new([1.0, 4.0, 9.0, 16.0]);
 /// let small = x.less(Packet::constant(5.0));
 /// assert_eq!(Packet::select(small, x, x.sqrt()).lane(3), 4.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
-pub struct Packet<const L: usize>(pub [f64; L]);
+pub struct Packet<const L: usize, V = Plain>([f64; L], PhantomData<V>);
 
 /// One truth value per lane: all bits set where it is true.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub struct LaneMask<const L: usize>([u64; L]);
+pub struct LaneMask<const L: usize, V = Plain>([f64; L], PhantomData<V>);
+
+impl<const L: usize, V: Instructions> Packet<L, V> {
+    /// The packet with these lanes.
+    #[inline(always)]
+    pub fn new(lanes: [f64; L]) -> Self {
+        Self(lanes, PhantomData)
+    }
+}
+
+impl<const L: usize, V: Instructions> PartialEq for LaneMask<L, V> {
+    fn eq(&self, other: &Self) -> bool {
+        (0..L).all(|i| self.lane(i) == other.lane(i))
+    }
+}
+
+impl<const L: usize, V: Instructions> LaneMask<L, V> {
+    #[inline(always)]
+    fn new(lanes: [f64; L]) -> Self {
+        Self(lanes, PhantomData)
+    }
+}
 
 #[inline(always)]
-fn lanes<const L: usize>(mut lane: impl FnMut(usize) -> f64) -> [f64; L] {
+fn each<const L: usize>(mut lane: impl FnMut(usize) -> f64) -> [f64; L] {
     let mut all = [0.0; L];
     for (i, own) in all.iter_mut().enumerate() {
         *own = lane(i);
@@ -34,83 +56,88 @@ fn lanes<const L: usize>(mut lane: impl FnMut(usize) -> f64) -> [f64; L] {
     all
 }
 
+/// What a truth value is in a mask.
 #[inline(always)]
-fn bits<const L: usize>(mut lane: impl FnMut(usize) -> u64) -> [u64; L] {
-    let mut all = [0; L];
-    for (i, own) in all.iter_mut().enumerate() {
-        *own = lane(i);
-    }
-    all
+fn truth(value: bool) -> f64 {
+    f64::from_bits(if value { !0 } else { 0 })
 }
 
-impl<const L: usize> Mask for LaneMask<L> {
+impl<const L: usize, V: Instructions> Mask for LaneMask<L, V> {
     #[inline(always)]
     fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> Self {
-        Self(bits(|i| if lane(i) { !0 } else { 0 }))
+        Self::new(each(|i| truth(lane(i))))
     }
     #[inline(always)]
     fn lane(self, i: usize) -> bool {
-        self.0[i] != 0
+        self.0[i].to_bits() != 0
     }
     #[inline(always)]
     fn and(self, other: Self) -> Self {
-        Self(bits(|i| self.0[i] & other.0[i]))
+        Self::new(lanes::and::<L, V>(&self.0, &other.0))
     }
     #[inline(always)]
     fn or(self, other: Self) -> Self {
-        Self(bits(|i| self.0[i] | other.0[i]))
+        Self::new(lanes::or::<L, V>(&self.0, &other.0))
     }
     #[inline(always)]
     fn not(self) -> Self {
-        Self(bits(|i| !self.0[i]))
+        Self::new(lanes::not::<L, V>(&self.0))
     }
     #[inline(always)]
     fn any(self) -> bool {
-        self.0.iter().fold(0, |any, bits| any | bits) != 0
+        lanes::any::<L, V>(&self.0)
     }
 }
 
-macro_rules! lanewise {
+macro_rules! operators {
     ($($Op:ident :: $op:ident),+) => {$(
-        impl<const L: usize> $Op for Packet<L> {
+        impl<const L: usize, V: Instructions> $Op for Packet<L, V> {
             type Output = Self;
             #[inline(always)]
             fn $op(self, other: Self) -> Self {
-                Self(lanes(|i| self.0[i].$op(other.0[i])))
+                Self::new(lanes::$op::<L, V>(&self.0, &other.0))
             }
         }
     )+};
 }
-lanewise! { Add::add, Sub::sub, Mul::mul, Div::div }
+operators! { Add::add, Sub::sub, Mul::mul, Div::div }
 
-impl<const L: usize> Neg for Packet<L> {
+impl<const L: usize, V: Instructions> Neg for Packet<L, V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.each(|x| -x)
+        Self::new(lanes::neg::<L, V>(&self.0))
     }
 }
 
-impl<const L: usize> AddAssign for Packet<L> {
+impl<const L: usize, V: Instructions> AddAssign for Packet<L, V> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<const L: usize> SubAssign for Packet<L> {
+impl<const L: usize, V: Instructions> SubAssign for Packet<L, V> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl<const L: usize> Real for Packet<L> {
+impl<const L: usize, V: Instructions> Real for Packet<L, V> {
     const LANES: usize = L;
 
     #[inline(always)]
+    fn work<W: Work>(isa: Isa, work: W) -> W::Output {
+        if const { V::ISA as u8 == Isa::Baseline as u8 } {
+            isa.run(work)
+        } else {
+            isa::run_with::<V, W>(work)
+        }
+    }
+    #[inline(always)]
     fn from_lanes(lane: impl FnMut(usize) -> f64) -> Self {
-        Self(lanes(lane))
+        Self::new(each(lane))
     }
     #[inline(always)]
     fn lane(self, i: usize) -> f64 {
@@ -122,21 +149,33 @@ impl<const L: usize> Real for Packet<L> {
     }
     #[inline(always)]
     fn each(self, f: impl Fn(f64) -> f64) -> Self {
-        Self(lanes(|i| f(self.0[i])))
+        Self::new(each(|i| f(self.0[i])))
     }
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(lanes(|i| f(self.0[i], other.0[i])))
+        Self::new(each(|i| f(self.0[i], other.0[i])))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self::new(lanes::abs::<L, V>(&self.0))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::new(lanes::max::<L, V>(&self.0, &other.0))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self::new(lanes::min::<L, V>(&self.0, &other.0))
     }
 }
 
-impl<const L: usize> Scalar for Packet<L> {
+impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
     type Real = Self;
-    type Mask = LaneMask<L>;
+    type Mask = LaneMask<L, V>;
 
     #[inline(always)]
     fn constant(value: f64) -> Self {
-        Self([value; L])
+        Self::new([value; L])
     }
     #[inline(always)]
     fn lift(value: Self) -> Self {
@@ -148,28 +187,35 @@ impl<const L: usize> Scalar for Packet<L> {
     }
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
-        self.each(|x| x * factor)
+        self * Self::constant(factor)
     }
     #[inline(always)]
     fn times(self, factor: Self) -> Self {
         self * factor
     }
     #[inline(always)]
-    fn less(self, other: Self) -> LaneMask<L> {
-        LaneMask::from_lanes(|i| self.0[i] < other.0[i])
+    fn fused(self, a: Self, b: Self) -> Self {
+        Self::new(lanes::fused::<L, V>(&a.0, &b.0, &self.0))
     }
     #[inline(always)]
-    fn select(mask: LaneMask<L>, yes: Self, no: Self) -> Self {
-        let pick = |i: usize| (yes.0[i].to_bits() & mask.0[i]) | (no.0[i].to_bits() & !mask.0[i]);
-        Self(lanes(|i| f64::from_bits(pick(i))))
+    fn fused_times(self, a: Self, b: Self) -> Self {
+        self.fused(a, b)
     }
     #[inline(always)]
-    fn mask(value: bool) -> LaneMask<L> {
-        LaneMask([if value { !0 } else { 0 }; L])
+    fn less(self, other: Self) -> LaneMask<L, V> {
+        LaneMask::new(lanes::less::<L, V>(&self.0, &other.0))
+    }
+    #[inline(always)]
+    fn select(mask: LaneMask<L, V>, yes: Self, no: Self) -> Self {
+        Self::new(lanes::select::<L, V>(&mask.0, &yes.0, &no.0))
+    }
+    #[inline(always)]
+    fn mask(value: bool) -> LaneMask<L, V> {
+        LaneMask::new([truth(value); L])
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        self.each(f64::sqrt)
+        Self::new(lanes::sqrt::<L, V>(&self.0))
     }
     // Not inlined: models use these seldom, and their code is long over eight lanes. What is hot calls
     // `elementary` itself.

@@ -1,6 +1,6 @@
 //! `f64` as a [`Scalar`]: one lane, no derivatives.
 
-use super::{Mask, Real, Scalar, elementary};
+use super::{Isa, Mask, Real, Scalar, Work, elementary};
 
 impl Scalar for f64 {
     type Real = f64;
@@ -25,6 +25,14 @@ impl Scalar for f64 {
     #[inline(always)]
     fn times(self, factor: f64) -> f64 {
         self * factor
+    }
+    #[inline(always)]
+    fn fused(self, a: f64, b: f64) -> f64 {
+        a.mul_add(b, self)
+    }
+    #[inline(always)]
+    fn fused_times(self, a: f64, b: f64) -> f64 {
+        self.fused(a, b)
     }
     #[inline(always)]
     fn less(self, other: f64) -> bool {
@@ -71,6 +79,10 @@ impl Scalar for f64 {
 impl Real for f64 {
     const LANES: usize = 1;
 
+    #[inline(always)]
+    fn work<W: Work>(isa: Isa, work: W) -> W::Output {
+        isa.run(work)
+    }
     #[inline(always)]
     fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> f64 {
         lane(0)

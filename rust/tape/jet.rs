@@ -4,27 +4,28 @@ use super::known::{Disk, Dle, Known, Program};
 use super::node::{INVERSE, hold};
 use super::{Step, Tape};
 use crate::model::Sides;
-use crate::scalar::{Isa, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
 use crate::unroll::unroll;
+
+/// An order, beside the highest, whose programs are unrolled.
+pub const LOW: usize = 12;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.
 #[derive(Clone, Debug)]
 pub struct Jets<S, const D: usize, const N: usize> {
     isa: Isa,
+    order: usize,
     work: Vec<[S; N]>,
     held: Vec<S>,
 }
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
-    /// The highest order.
-    pub const ORDER: usize = N - 1;
-
     /// Room for this tape, whose series are computed with these instructions.
     /// [`expand`](Jets::expand) allocates nothing.
     pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
         const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
         let zero = [S::zero(); N];
-        Self { isa, work: vec![zero; tape.slots], held: vec![S::zero(); tape.held.len()] }
+        Self { isa, order: N - 1, work: vec![zero; tape.slots], held: vec![S::zero(); tape.held.len()] }
     }
 
     /// The coefficients of the solution through the state `x` at time `t`, all laws taken on these
@@ -33,7 +34,20 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// # Panics
     /// Where the room was made for another tape, or parameters are missing.
     pub fn expand(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
-        self.isa.run(Expansion { jets: self, tape, parameters, t, x, sides });
+        S::Real::work(self.isa, Expansion { jets: self, tape, parameters, t, x, sides });
+    }
+
+    /// Goes up to this order only, at least 4.
+    pub fn with_order(mut self, order: usize) -> Self {
+        assert!((4..N).contains(&order), "there is no room for the order {order}");
+        self.order = order;
+        self
+    }
+
+    /// The highest order.
+    #[inline(always)]
+    pub fn order(&self) -> usize {
+        self.order
     }
 
     /// The instructions that series are computed with.
@@ -44,22 +58,23 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`expand`](Jets::expand), with the caller's instructions.
     #[inline(always)]
     pub fn expand_here(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
-        let Self { work, held, .. } = self;
+        let Self { work, held, order, .. } = self;
+        let order = *order;
         hold(&tape.held, parameters, sides, held);
         // Tangents take so long in each operation that telling which one it is does not count. The number
         // of equations is asked so that no other program is compiled.
-        if const { size_of::<S>() == size_of::<S::Real>() } {
+        {
             if const { D == 3 } && tape.known == Known::Dle {
-                return known::<Dle, S, D, N>(work, held, t, x, sides);
+                return known::<Dle, S, D, N>(work, order, held, t, x, sides);
             }
             if const { D == 4 } && tape.known == Known::Disk {
-                return known::<Disk, S, D, N>(work, held, t, x, sides);
+                return known::<Disk, S, D, N>(work, order, held, t, x, sides);
             }
         }
-        interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], held, t, x, sides);
+        interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], order, held, t, x, sides);
     }
 
-    /// The coefficients of each component, order 0 first.
+    /// The coefficients of each component, order 0 first; those beyond the [`order`](Jets::order) are idle.
     #[inline(always)]
     pub fn coefficients(&self) -> &[[S; N]; D] {
         self.work.first_chunk().expect("a slot for each component")
@@ -80,7 +95,7 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
     type Output = ();
 
     #[inline(always)]
-    fn run<const L: usize>(self) {
+    fn run<V: Instructions>(self) {
         self.jets.expand_here(self.tape, self.parameters, self.t, self.x, self.sides);
     }
 }
@@ -98,18 +113,25 @@ macro_rules! every {
     };
 }
 
+/// A known tape. Where tangents make every operation long, only the operations are unrolled, else the
+/// orders are too.
 #[inline(always)]
 fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     work: &mut [[S; N]],
+    order: usize,
     held: &[S],
     t: S,
     x: &[S; D],
     sides: &Sides<S>,
 ) {
-    if const { size_of::<S>() == size_of::<f64>() } {
-        unrolled::<P, S, D, N>(work, held, t, x, sides);
-    } else {
-        rolled::<P, S, D, N>(&mut work[..P::SLOTS], held, t, x, sides);
+    let work = &mut work[..P::SLOTS];
+    if const { size_of::<S>() > 2 * size_of::<S::Real>() } {
+        return rolled::<P, S, D, N>(work, order, held, t, x, sides);
+    }
+    match order {
+        LOW => unrolled::<P, S, D, N, LOW>(work, held, t, x, sides),
+        _ if order == N - 1 => unrolled::<P, S, D, N, 24>(work, held, t, x, sides),
+        _ => rolled::<P, S, D, N>(work, order, held, t, x, sides),
     }
 }
 
@@ -120,6 +142,7 @@ fn interpreted<S: Scalar, const D: usize, const N: usize>(
     steps: &[Step],
     rates: &[u16; D],
     work: &mut [[S; N]],
+    order: usize,
     held: &[S],
     t: S,
     x: &[S; D],
@@ -128,7 +151,7 @@ fn interpreted<S: Scalar, const D: usize, const N: usize>(
     unroll!(n in 0..D => { work[n][0] = x[n]; });
     begin(steps, work, held, t, sides);
     unroll!(n in 0..D => { work[n][1] = work[usize::from(rates[n])][0]; });
-    for k in 1..N - 1 {
+    for k in 1..order.min(N - 1) {
         for step in steps {
             step.next(work, held, sides, k);
         }
@@ -144,11 +167,11 @@ fn begin<S: Scalar, const N: usize>(steps: &[Step], work: &mut [[S; N]], held: &
     }
 }
 
-/// A known tape over packets: the operations are unrolled, the sums remain loops, whose lanes the
-/// compiler makes vectors of. Orders go in fours, so that it knows their remainders.
+/// With all operations unrolled.
 #[inline(always)]
 fn rolled<P: Program, S: Scalar, const D: usize, const N: usize>(
     work: &mut [[S; N]],
+    order: usize,
     held: &[S],
     t: S,
     x: &[S; D],
@@ -157,36 +180,33 @@ fn rolled<P: Program, S: Scalar, const D: usize, const N: usize>(
     unroll!(n in 0..D => { work[n][0] = x[n]; });
     every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
     unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
-    for four in 0..(N + 1) / 4 {
-        unroll!(r in 1..5 => {
-            let k = 4 * four + r;
-            if k < N - 1 {
-                every!(P, i => { P::STEPS[i].next(work, held, sides, k); });
-                unroll!(n in 0..D => {
-                    work[n][k + 1] = work[usize::from(P::RATES[n])][k].scale(INVERSE[k + 1]);
-                });
-            }
+    for k in 1..order.min(N - 1) {
+        every!(P, i => { P::STEPS[i].next(work, held, sides, k); });
+        unroll!(n in 0..D => {
+            work[n][k + 1] = work[usize::from(P::RATES[n])][k].scale(INVERSE[k + 1]);
         });
     }
 }
 
-/// A known tape over single numbers: everything is unrolled and stays in registers.
+/// With everything unrolled, up to the order `TO` or all.
 #[inline(always)]
-fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize>(
+fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize, const TO: usize>(
     series: &mut [[S; N]],
     held: &[S],
     t: S,
     x: &[S; D],
     sides: &Sides<S>,
 ) {
+    // Single numbers stay in registers.
     let mut room = [[S::zero(); N]; 24];
-    let work = &mut room[..];
+    let single = const { size_of::<S>() == size_of::<f64>() };
+    let work = if single { &mut room[..P::SLOTS] } else { &mut *series };
     unroll!(n in 0..D => { work[n][0] = x[n]; });
     every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
     unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
     macro_rules! orders {
         ($($k:literal)+) => {
-            $(if const { $k < N - 1 } {
+            $(if const { $k < TO && $k < N - 1 } {
                 every!(P, i => { P::STEPS[i].next(work, held, sides, $k); });
                 unroll!(n in 0..D => {
                     work[n][$k + 1] = work[usize::from(P::RATES[n])][$k].scale(INVERSE[$k + 1]);
@@ -195,5 +215,7 @@ fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize>(
         };
     }
     orders!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
-    unroll!(n in 0..D => { series[n] = work[n]; });
+    if single {
+        unroll!(n in 0..D => { series[n] = room[n]; });
+    }
 }

@@ -243,17 +243,17 @@ impl Step {
             Node::Sub(a, b) => of!(a, k) - of!(b, k),
             Node::Plus(a, _) | Node::Minus(a, _) => of!(a, k),
             Node::Scale(a, c) => of!(a, k) * h!(c),
-            Node::Mul(a, b) => sum + (of!(a, 0) * of!(b, k) + of!(a, k) * of!(b, 0)),
-            Node::Square(a) => sum + (of!(a, 0) + of!(a, 0)) * of!(a, k),
+            Node::Mul(a, b) => sum.fused(of!(a, 0), of!(b, k)).fused(of!(a, k), of!(b, 0)),
+            Node::Square(a) => sum.fused(of!(a, 0) + of!(a, 0), of!(a, k)),
             // The quotient q of a = q b.
-            Node::Div(a, b) => ((of!(a, k) - sum) - of!(to, 0) * of!(b, k)) * of!(to + 1, 0),
-            Node::Over(_, b) => -((sum + of!(to, 0) * of!(b, k)) * of!(to + 1, 0)),
+            Node::Div(a, b) => (of!(a, k) - sum.fused(of!(to, 0), of!(b, k))) * of!(to + 1, 0),
+            Node::Over(_, b) => -(sum.fused(of!(to, 0), of!(b, k)) * of!(to + 1, 0)),
             // The root r of a = r^2.
             Node::Sqrt(a) => (of!(a, k) - sum) * of!(to + 1, 0),
             Node::Exp(a) => {
                 let slope = of!(a, k).scale(weight);
                 of!(to + 1, k) = slope;
-                (sum + slope * of!(to, 0)).scale(inverse)
+                sum.fused(slope, of!(to, 0)).scale(inverse)
             }
             // a l' = a'
             Node::Ln(a) => {
@@ -264,10 +264,10 @@ impl Step {
             Node::Sin(a) | Node::Tanh(a) => {
                 let slope = of!(a, k).scale(weight);
                 of!(to + 2, k) = slope;
-                (sum + slope * of!(to + 1, 0)).scale(inverse)
+                sum.fused(slope, of!(to + 1, 0)).scale(inverse)
             }
-            Node::Cos(sine) => (sum + of!(sine + 2, k) * of!(sine, 0)).scale(-inverse),
-            Node::Slope(tanh) => -(sum + (of!(tanh, 0) + of!(tanh, 0)) * of!(tanh, k)),
+            Node::Cos(sine) => sum.fused(of!(sine + 2, k), of!(sine, 0)).scale(-inverse),
+            Node::Slope(tanh) => -sum.fused(of!(tanh, 0) + of!(tanh, 0), of!(tanh, k)),
             Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a, k), of!(b, k)),
         };
     }

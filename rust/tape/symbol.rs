@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::{Mask, Real, Scalar};
+use crate::scalar::{Isa, Mask, Plain, Real, Scalar, Work};
 
 /// What is known of a number while its model is recorded: how it was made, not its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -320,6 +320,12 @@ impl Scalar for Symbol {
     fn times(self, factor: Symbol) -> Symbol {
         self * factor
     }
+    fn fused(self, a: Symbol, b: Symbol) -> Symbol {
+        self + a * b
+    }
+    fn fused_times(self, a: Symbol, b: Symbol) -> Symbol {
+        self + a * b
+    }
     fn less(self, other: Symbol) -> SideOf {
         match RECORDING.with_borrow(|r| r.value(self).zip(r.value(other))) {
             Some((a, b)) => SideOf::Known(a < b),
@@ -365,6 +371,9 @@ impl Scalar for Symbol {
 /// cannot be recorded, and [`Tape::record`](super::Tape::record) says so.
 impl Real for Symbol {
     const LANES: usize = 1;
+    fn work<W: Work>(_isa: Isa, work: W) -> W::Output {
+        work.run::<Plain>()
+    }
 
     fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> Symbol {
         Symbol::constant(lane(0))
