@@ -7,7 +7,7 @@ mod points;
 
 use std::f64::consts::{FRAC_PI_2, LN_2};
 use udd::scalar::elementary::{exp, exp2_rough, ln, log2_rough, pow, sin_cos, tanh};
-use udd::scalar::{Dual, Isa, Packet, Real, Scalar, Work};
+use udd::scalar::{Dual, Instructions, Isa, Packet, Plain, Real, Scalar, Work};
 
 const INF: f64 = f64::INFINITY;
 const LEAST: f64 = 5e-324;
@@ -246,8 +246,8 @@ fn bits(x: f64) -> u64 {
 }
 
 #[inline(always)]
-fn in_packets<const L: usize>(x: &[f64]) -> Vec<[u64; 10]> {
-    let packets = x.chunks(L).map(|part| Packet::<L>::from_lanes(|i| part.get(i).copied().unwrap_or(1.0)));
+fn in_packets<const L: usize, V: Instructions>(x: &[f64]) -> Vec<[u64; 10]> {
+    let packets = x.chunks(L).map(|part| Packet::<L, V>::from_lanes(|i| part.get(i).copied().unwrap_or(1.0)));
     let mut all = Vec::new();
     for values in packets.map(everything) {
         all.extend((0..L).map(|i| values.map(|v| bits(v.lane(i)))));
@@ -262,17 +262,17 @@ impl Work for Everywhere<'_> {
     type Output = Vec<(usize, Vec<[u64; 10]>)>;
 
     #[inline(always)]
-    fn run<const L: usize>(self) -> Self::Output {
+    fn run<V: Instructions>(self) -> Self::Output {
         let single = self.0.iter().map(|&x| everything(x).map(bits)).collect();
         vec![
             (0, single),
-            (1, in_packets::<1>(self.0)),
-            (2, in_packets::<2>(self.0)),
-            (3, in_packets::<3>(self.0)),
-            (4, in_packets::<4>(self.0)),
-            (8, in_packets::<8>(self.0)),
-            (16, in_packets::<16>(self.0)),
-            (L, in_packets::<L>(self.0)),
+            (1, in_packets::<1, V>(self.0)),
+            (2, in_packets::<2, V>(self.0)),
+            (3, in_packets::<3, V>(self.0)),
+            (4, in_packets::<4, V>(self.0)),
+            (8, in_packets::<8, V>(self.0)),
+            (16, in_packets::<16, V>(self.0)),
+            (8, in_packets::<8, Plain>(self.0)),
         ]
     }
 }

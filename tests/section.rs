@@ -72,7 +72,15 @@ fn elsewhere<const D: usize>(
     t: &[f64],
 ) -> Vec<[f64; D]> {
     let times: Vec<f64> = std::iter::once(0.0).chain(t.iter().copied()).collect();
-    let run = trajectory(&family.build(values), Output::At(&times), x0, &TIGHT, false, &Stop::new());
+    let run = trajectory(
+        &family.build(values),
+        Dopri5::default(),
+        Output::At(&times),
+        x0,
+        &TIGHT,
+        false,
+        &Stop::new(),
+    );
     run.unwrap().x[1..].to_vec()
 }
 
@@ -182,7 +190,7 @@ fn a_zero_at_the_end_of_a_step_counts_once() {
     let values = vec![1.0, 0.0];
     let tape = Tape::record(&DleFamily, &[None, Some(0.0)]).unwrap();
     let tolerance = Tolerance::default();
-    let taylor = Taylor::new(&tape, values.clone(), Isa::Baseline);
+    let taylor = Taylor::new(&tape, values.clone(), 18, Isa::Baseline);
     let mut driver = Driver::by(taylor, DleFamily.build(&values), 0.0, START, None, &tolerance);
     for _ in 0..12 {
         driver.advance(1e3).unwrap();

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use approx::assert_relative_eq;
 use proptest::prelude::*;
-use udd::integrate::{Driver, Ending, Taylor, Tolerance, propagate};
+use udd::integrate::{Dopri5, Driver, Ending, Taylor, Tolerance, propagate};
 use udd::model::effects::{At, Contact, Dry, Effect, Kind, Slots, Term, Treatment};
 use udd::model::stick::{REVERSAL, Slider, Sticking};
 use udd::model::{Bristled, Disk, DiskFamily, Family, Pendulum, PendulumFamily, Sides, System, choose};
@@ -23,7 +23,7 @@ fn oscillator(mu: f64, treatment: Treatment, eps: f64) -> Pendulum<f64> {
 }
 
 fn run<M: System<f64, D>, const D: usize>(system: &M, end: f64, x0: [f64; D]) -> Run<D> {
-    trajectory(system, Output::Steps(0.0, end), x0, &TIGHT, false, &Stop::new()).unwrap()
+    trajectory(system, Dopri5::default(), Output::Steps(0.0, end), x0, &TIGHT, false, &Stop::new()).unwrap()
 }
 
 fn named<'a, const D: usize>(
@@ -375,7 +375,7 @@ fn lanes_have_the_bits_of_single_runs() {
     ];
     let family = PendulumFamily { effects };
     let values = [1.0, 1.0, 0.3, 0.01, 1.0, 0.0, 0.05, 0.01, 0.06, 0.5, 0.05];
-    let wide = family.build(&values.map(Packet::<L>::constant));
+    let wide = family.build(&values.map(<Packet<L>>::constant));
     let x0 = from_fn(|n| Packet::from_lanes(|i| starts[i][n]));
     let zero = Packet::constant(0.0);
     let mut driver: Driver<_, Packet<L>, 2> = Driver::new(&wide, zero, x0, None, &TIGHT);
@@ -401,7 +401,7 @@ fn methods_agree_on_when_it_sticks() {
     fn events<F: Family<D>, const D: usize>(family: &F, values: &[f64], x0: [f64; D]) -> (usize, f64) {
         let (system, tape) = (family.build(values), Tape::record(family, &[]).unwrap());
         let mut one: Driver<_, f64, D> = Driver::new(&system, 0.0, x0, None, &TIGHT);
-        let series = Taylor::new(&tape, values.to_vec(), Isa::best());
+        let series = Taylor::new(&tape, values.to_vec(), 18, Isa::best());
         let mut other: Driver<_, f64, D, _, _> = Driver::by(series, &system, 0.0, x0, None, &TIGHT);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         while one.t() < 10.0 {
@@ -461,7 +461,9 @@ impl System<f64, 2> for Ball {
 fn chattering_is_an_outcome() {
     let tolerance = Tolerance::default();
     let times = [0.0, 1.0, 10.0, 40.0, 50.0];
-    let run = trajectory(&Ball, Output::At(&times), [1.0, 0.0], &tolerance, true, &Stop::new()).unwrap();
+    let run =
+        trajectory(&Ball, Dopri5::default(), Output::At(&times), [1.0, 0.0], &tolerance, true, &Stop::new())
+            .unwrap();
     assert_eq!(run.outcome, Outcome::Chattering);
     // It falls for sqrt 2, then flies for 2 sqrt 2 (0.9 + 0.9^2 + ...) = 18 sqrt 2.
     let end = run.t[run.t.len() - 1];
@@ -520,7 +522,7 @@ proptest! {
         let system = PendulumFamily { effects }.build(&values);
         let rtol = 10f64.powf(-digits);
         let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
-        let run = trajectory(&system, Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, &Stop::new());
+        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, &Stop::new());
         let run = run.unwrap();
         prop_assert_eq!(run.outcome, Outcome::Finished);
         // At 1e-12 ten seconds take up to 3000 steps.

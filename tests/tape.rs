@@ -8,7 +8,7 @@ use udd::model::effects::{Kind, Role, Treatment};
 use udd::model::{
     DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, Parameter, PendulumFamily, Sides, System, sides_of,
 };
-use udd::scalar::{Dual, Isa, Mask, Packet, Real, Scalar, Work};
+use udd::scalar::{Dual, Instructions, Isa, LANES, Mask, Packet, Plain, Real, Scalar, Work};
 use udd::tape::{Jets, Tape};
 
 const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
@@ -213,7 +213,7 @@ fn polynomials_solve_the_equations() {
 }
 
 /// Steps of the radius, up to `end`, in every lane.
-#[inline(always)]
+#[inline(never)]
 fn run<S: Scalar, const D: usize, const N: usize>(
     tape: &Tape<D>,
     system: &impl System<S, D>,
@@ -317,29 +317,26 @@ impl<F: Family<D>, const D: usize> Bits<'_, F, D> {
         self.x0.map(|x| x * (1.0 + 0.01 * l as f64))
     }
 
-    #[inline(always)]
     fn one(&self, l: usize, isa: Isa) -> [u64; D] {
         let system = self.family.build(self.p);
         run::<f64, D, 21>(self.tape, &system, (self.p, self.lane(l), self.end), (1e-9, isa)).map(f64::to_bits)
     }
 
-    #[inline(always)]
-    fn many<const L: usize>(&self, isa: Isa) -> Vec<[u64; D]> {
-        let p: Vec<Packet<L>> = self.p.iter().map(|&v| Packet::constant(v)).collect();
+    fn many<const L: usize, V: Instructions>(&self, isa: Isa) -> Vec<[u64; D]> {
+        let p: Vec<Packet<L, V>> = self.p.iter().map(|&v| Packet::constant(v)).collect();
         let x0 = from_fn(|n| Packet::from_lanes(|l| self.lane(l)[n]));
         let system = self.family.build(&p);
-        let x = run::<Packet<L>, D, 21>(self.tape, &system, (&p, x0, self.end), (1e-9, isa));
+        let x = run::<Packet<L, V>, D, 21>(self.tape, &system, (&p, x0, self.end), (1e-9, isa));
         (0..L).map(|l| x.map(|v| v.lane(l).to_bits())).collect()
     }
 
     /// The second lane as one of a packet of tangents.
-    #[inline(always)]
-    fn tangents<const L: usize>(&self, isa: Isa) -> [u64; D] {
-        type T<const L: usize> = Dual<Packet<L>, 1>;
-        let p: Vec<T<L>> = self.p.iter().map(|&v| Dual::constant(v)).collect();
+    fn tangents<V: Instructions>(&self, isa: Isa) -> [u64; D] {
+        type T<V> = Dual<Packet<LANES, V>, 1>;
+        let p: Vec<T<V>> = self.p.iter().map(|&v| Dual::constant(v)).collect();
         let x0 = from_fn(|n| Dual::variable(Packet::from_lanes(|l| self.lane(l)[n]), 0));
         let system = self.family.build(&p);
-        let x = run::<T<L>, D, 21>(self.tape, &system, (&p, x0, self.end), (1e-9, isa));
+        let x = run::<T<V>, D, 21>(self.tape, &system, (&p, x0, self.end), (1e-9, isa));
         x.map(|v| v.re.lane(1).to_bits())
     }
 }
@@ -349,14 +346,14 @@ struct On<'a, F, const D: usize>(&'a Bits<'a, F, D>, Isa);
 impl<F: Family<D>, const D: usize> Work for On<'_, F, D> {
     type Output = (Vec<[u64; D]>, [u64; D], [u64; D]);
     #[inline(always)]
-    fn run<const L: usize>(self) -> Self::Output {
-        (self.0.many::<L>(self.1), self.0.tangents::<L>(self.1), self.0.one(1, self.1))
+    fn run<V: Instructions>(self) -> Self::Output {
+        (self.0.many::<LANES, V>(self.1), self.0.tangents::<V>(self.1), self.0.one(1, self.1))
     }
 }
 
 fn same_bits<F: Family<D>, const D: usize>(bits: &Bits<'_, F, D>) {
     let alone: Vec<[u64; D]> = (0..8).map(|l| bits.one(l, Isa::Baseline)).collect();
-    assert_eq!(bits.many::<2>(Isa::best()), alone[..2]);
+    assert_eq!(bits.many::<2, Plain>(Isa::best()), alone[..2]);
     for isa in Isa::available() {
         let (many, tangents, one) = isa.run(On(bits, isa));
         assert_eq!(many, alone[..many.len()], "{isa:?}");

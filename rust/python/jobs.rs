@@ -1,27 +1,81 @@
 //! Many runs at once: their parameters, starts and outcomes as arrays.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use numpy::PyReadonlyArray2;
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use super::errors::ModelError;
+use super::interrupt;
 use super::model::AnyModel;
 use crate::integrate::Failure;
-use crate::run::Outcome;
+use crate::run::{Crew, Outcome};
+use crate::scalar::Isa;
 
 /// The outcome of a run as a number: its place in `udd`'s list of outcomes.
 pub const FINISHED: u8 = 0;
 pub const EJECTED: u8 = 1;
+pub const TIME_RAN_OUT: u8 = 2;
 pub const FAILED: u8 = 3;
 pub const INTERRUPTED: u8 = 4;
+pub const ESCAPED: u8 = 5;
 pub const CHATTERING: u8 = 6;
 
-/// The number of an outcome.
+/// The number of a run's outcome.
 pub fn outcome_code(outcome: Result<Outcome, Failure>) -> u8 {
     match outcome {
         Ok(Outcome::Finished) => FINISHED,
         Ok(Outcome::Ejected) => EJECTED,
         Ok(Outcome::Chattering) => CHATTERING,
-        Err(_) => FAILED,
+        Err(failure) => failure_code(failure),
+    }
+}
+
+/// The number of a failure.
+pub fn failure_code(failure: Failure) -> u8 {
+    match failure {
+        Failure::Chattering { .. } => CHATTERING,
+        Failure::Interrupted => INTERRUPTED,
+        _ => FAILED,
+    }
+}
+
+/// Jobs that Python watches: on so many threads (0 for one per core), each counted when it is done.
+pub struct Jobs<'a, 'py> {
+    threads: usize,
+    done: AtomicUsize,
+    /// Called with the number of jobs done.
+    progress: &'a Option<Bound<'py, PyAny>>,
+}
+
+impl<'a, 'py> Jobs<'a, 'py> {
+    pub fn new(threads: usize, progress: &'a Option<Bound<'py, PyAny>>) -> Self {
+        Self { threads, done: AtomicUsize::new(0), progress }
+    }
+
+    /// As [`interrupt::watch`]: what the work on a crew yields, and a signal that came meanwhile.
+    pub fn watch<T: Send>(
+        &self,
+        py: Python<'py>,
+        work: impl FnOnce(Crew<'_>) -> T + Send,
+    ) -> PyResult<(T, PyResult<()>)> {
+        let (threads, done, progress) = (self.threads, &self.done, self.progress);
+        let tick = || match progress {
+            Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
+            None => Ok(()),
+        };
+        interrupt::watch(py, tick, |stop| work(Crew { threads, isa: Isa::best(), done, stop }))
+    }
+}
+
+/// A signal that nothing tells of: on Ctrl-C what is finished is kept, and rows that are not say so.
+pub fn lost(py: Python<'_>, signal: PyResult<()>, outcomes: &[u8]) -> PyResult<()> {
+    match signal {
+        Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) && outcomes.contains(&INTERRUPTED) => {
+            Ok(())
+        }
+        signal => signal,
     }
 }
 

@@ -1,18 +1,14 @@
 //! `udd.lyapunov` and `udd.lyapunov_spectrum`.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::interrupt;
-use super::jobs::{self, outcome_code};
+use super::jobs::{self, Jobs, outcome_code};
 use super::model::{AnyModel, with_wide_model};
 use crate::integrate::Tolerance;
 use crate::model::Family;
-use crate::run::{Crew, Exponents, Lyapunov, LyapunovOptions, Stop};
-use crate::scalar::Isa;
+use crate::run::{Crew, Exponents, Lyapunov, LyapunovOptions};
 
 /// Columns, one row for each orbit.
 #[derive(Default)]
@@ -51,14 +47,7 @@ impl Table {
     }
 }
 
-fn table<F: Family<D>, const D: usize>(
-    orbits: &Lyapunov<'_, F, D>,
-    all: bool,
-    threads: usize,
-    done: &AtomicUsize,
-    stop: &Stop,
-) -> Table {
-    let crew = Crew { threads, isa: Isa::best(), done, stop };
+fn table<F: Family<D>, const D: usize>(orbits: &Lyapunov<'_, F, D>, all: bool, crew: Crew<'_>) -> Table {
     let mut table = Table::default();
     if all {
         orbits.run::<D>(crew).into_iter().for_each(|orbit| table.push(orbit));
@@ -91,17 +80,13 @@ fn lyapunov<'py>(
     let model = AnyModel::from_python(model)?;
     let options = LyapunovOptions { time, transient, goal, tolerance: Tolerance { rtol, atol } };
     let rows = jobs::values(&model, &values)?;
-    let done = AtomicUsize::new(0);
-    let tick = || match &progress {
-        Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
-        None => Ok(()),
-    };
+    let jobs = Jobs::new(threads, &progress);
     let (table, width, dimension, signal) = with_wide_model!(&model, |family, _values| {
         let starts = jobs::starts(&starts)?;
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
         let dimension = starts[0].len();
-        let (table, signal) = interrupt::watch(py, tick, |stop| table(&orbits, all, threads, &done, stop))?;
+        let (table, signal) = jobs.watch(py, |crew| table(&orbits, all, crew))?;
         (table, if all { dimension } else { 1 }, dimension, signal)
     });
     signal?;

@@ -1,6 +1,7 @@
 //! The Python module `udd._core`: conversion, errors, interrupts; no numerics.
 
 mod effects;
+mod ensemble;
 mod errors;
 mod estimate;
 mod interrupt;
@@ -20,6 +21,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulate::register(module)?;
     lyapunov::register(module)?;
     section::register(module)?;
+    ensemble::register(module)?;
     estimate::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;

@@ -1,34 +1,26 @@
 //! `udd.poincare`, and what is built upon it.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
-use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::errors::ModelError;
-use super::interrupt;
-use super::jobs;
+use super::jobs::{self, Jobs};
 use super::model::{AnyModel, with_wide_model};
-use crate::integrate::{Failure, Tolerance};
+use crate::integrate::Tolerance;
 use crate::model::Family;
-use crate::run::{Crew, Crossings, Ended, Section, Sections, Stop};
-use crate::scalar::Isa;
+use crate::run::{Crew, Crossings, Ended, Section, Sections};
 use crate::tape::{Expression, Names};
-
-const TIME_RAN_OUT: u8 = 2;
-const ESCAPED: u8 = 5;
 
 fn code(ended: Ended) -> u8 {
     match ended {
         Ended::Finished => jobs::FINISHED,
         Ended::Ejected => jobs::EJECTED,
-        Ended::TimeRanOut => TIME_RAN_OUT,
-        Ended::Failed(Failure::Chattering { .. }) => jobs::CHATTERING,
-        Ended::Failed(_) => jobs::FAILED,
+        Ended::TimeRanOut => jobs::TIME_RAN_OUT,
+        Ended::Failed(failure) => jobs::failure_code(failure),
         Ended::Interrupted => jobs::INTERRUPTED,
-        Ended::Escaped => ESCAPED,
+        Ended::Escaped => jobs::ESCAPED,
     }
 }
 
@@ -125,12 +117,9 @@ impl Table {
 
 fn collect<F: Family<D>, const D: usize>(
     sections: &Sections<'_, F, D>,
-    threads: usize,
-    done: &AtomicUsize,
     mut table: Table,
-    stop: &Stop,
+    crew: Crew<'_>,
 ) -> Table {
-    let crew = Crew { threads, isa: Isa::best(), done, stop };
     sections.run(crew).into_iter().for_each(|crossings| table.push(crossings));
     table
 }
@@ -171,11 +160,7 @@ fn sections<'py>(
     }
     let names = state_names(&model);
     let rows = jobs::values(&model, &values)?;
-    let done = AtomicUsize::new(0);
-    let tick = || match &progress {
-        Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
-        None => Ok(()),
-    };
+    let watched = Jobs::new(threads, &progress);
     let (table, signal) = with_wide_model!(&model, |family, _values| {
         let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
         let pairs = section.iter().zip(&direction);
@@ -195,13 +180,9 @@ fn sections<'py>(
             bounded: std::array::from_fn(|n| bounded(&names[n])),
             tolerance: Tolerance { rtol, atol },
         };
-        interrupt::watch(py, tick, |stop| collect(&sections, threads, &done, table, stop))?
+        watched.watch(py, |crew| collect(&sections, table, crew))?
     });
-    if let Err(error) = signal
-        && !error.is_instance_of::<PyKeyboardInterrupt>(py)
-    {
-        return Err(error);
-    }
+    jobs::lost(py, signal, &table.outcome)?;
     let jobs = table.outcome.len();
     let dict = PyDict::new(py);
     dict.set_item("points", PyArray1::from_vec(py, table.points).reshape([jobs, count, names.len()])?)?;

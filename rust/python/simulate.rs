@@ -7,10 +7,11 @@ use pyo3::types::PyDict;
 use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
 use super::model::{AnyModel, state, with_model};
-use crate::integrate::{Failure, Tolerance};
+use crate::integrate::{Dopri5, Taylor, Tolerance, order};
 use crate::model::{Family, System};
 use crate::observe::Record;
-use crate::run::{Output, Run, Stop, trajectory};
+use crate::run::{Output, Run, Stepper, Stop, rows, trajectory};
+use crate::scalar::Isa;
 
 /// A finished run, its dimension forgotten: states are flat.
 struct Flat {
@@ -41,18 +42,34 @@ impl<const D: usize> Piecewise for Record<D> {
     }
 }
 
+/// How steps are taken, as it is called in Python.
+pub fn stepper(method: &str) -> PyResult<Stepper> {
+    match method {
+        "dopri5" => Ok(Stepper::Dopri5),
+        "taylor" => Ok(Stepper::Taylor),
+        _ => Err(ModelError::new_err(format!("no method is called {method:?}"))),
+    }
+}
+
 fn run<F: Family<D>, const D: usize>(
     family: &F,
     values: &[f64],
-    output: Output<'_>,
-    x0: [f64; D],
-    tolerance: &Tolerance,
-    keep: bool,
+    stepper: Stepper,
+    (output, x0): (Output<'_>, [f64; D]),
+    (tolerance, keep): (&Tolerance, bool),
     stop: &Stop,
-) -> Result<Flat, Failure> {
+) -> Result<Flat, PyErr> {
     let system = family.build(values);
-    let Run { t, x, events, outcome, counts, record } =
-        trajectory(&system, output, x0, tolerance, keep, stop)?;
+    let Run { t, x, events, outcome, counts, record } = match stepper {
+        Stepper::Dopri5 => trajectory(&system, Dopri5::default(), output, x0, tolerance, keep, stop)?,
+        Stepper::Taylor => {
+            let tape = rows::tape(family, &[values.to_vec()]);
+            let message = "the model's law depends on comparisons, which no power series follows; use method=\"dopri5\"";
+            let tape = tape.ok_or_else(|| ModelError::new_err(message))?;
+            let method = Taylor::new(&tape, values.to_vec(), order(tolerance), Isa::best());
+            trajectory(&system, method, output, x0, tolerance, keep, stop)?
+        }
+    };
     Ok(Flat {
         dimension: D,
         t,
@@ -98,7 +115,7 @@ impl Dense {
 /// Runs a model from a state, at the given times or, where none are given, from 0 to `end` with every
 /// accepted step. Returns a dict.
 #[pyfunction]
-#[pyo3(signature = (model, times, end, state0, rtol, atol, dense))]
+#[pyo3(signature = (model, times, end, state0, rtol, atol, method, dense))]
 #[allow(clippy::too_many_arguments)]
 fn simulate<'py>(
     py: Python<'py>,
@@ -108,10 +125,11 @@ fn simulate<'py>(
     state0: Vec<f64>,
     rtol: f64,
     atol: f64,
+    method: &str,
     dense: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    let tolerance = Tolerance { rtol, atol };
+    let (tolerance, stepper) = (Tolerance { rtol, atol }, stepper(method)?);
     let times: Option<Vec<f64>> = times.map(|t| t.as_slice().map(<[f64]>::to_vec)).transpose()?;
     let output = times.as_deref().map_or(Output::Steps(0.0, end), Output::At);
     let flat = with_model!(&model, |family, values| {
@@ -120,7 +138,7 @@ fn simulate<'py>(
             let message = "the initial state lies outside the disk: Y^2 + Z^2 must be below R^2 (or use edge=\"ignore\")";
             return Err(ModelError::new_err(message));
         }
-        interrupt::run(py, |stop| run(family, values, output, x0, &tolerance, dense, stop))?
+        interrupt::run(py, |stop| run(family, values, stepper, (output, x0), (&tolerance, dense), stop))?
     });
 
     let table = |values: Vec<f64>| PyArray1::from_vec(py, values);

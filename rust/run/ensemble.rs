@@ -2,17 +2,18 @@
 
 use super::fleet::{Crew, Fleet, Queue, sail};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::rows;
 use super::ship::{Ship, Start};
 use super::trajectory::Outcome;
 use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
 use crate::scalar::{Isa, Mask, Real, Scalar};
-use crate::tape::Tape;
 
 /// How steps are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stepper {
     Dopri5,
+    /// Where a series follows the law, else as [`Dopri5`](Stepper::Dopri5).
     Taylor,
 }
 
@@ -44,42 +45,29 @@ pub struct Passage<const D: usize> {
 impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     /// Runs them all. `None` stands for runs that were not finished when the work was stopped.
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Passage<D>>> {
-        let runs = self.values.len().max(self.starts.len());
-        match self.stepper {
-            Stepper::Dopri5 => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa: crew.isa }, runs, crew),
-            Stepper::Taylor => match Tape::record(self.family, &known(self.values)) {
-                Ok(tape) => sail(
-                    &Sampled {
-                        ensemble: self,
-                        recipe: ByTaylor { tape: &tape, order: order(&self.tolerance), isa: crew.isa },
-                        isa: crew.isa,
-                    },
-                    runs,
-                    crew,
-                ),
-                // A law that no series follows.
-                Err(_) => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa: crew.isa }, runs, crew),
-            },
+        let (runs, isa) = (rows::count(self.values, self.starts), crew.isa);
+        let tape = match self.stepper {
+            Stepper::Dopri5 => None,
+            Stepper::Taylor => rows::tape(self.family, self.values),
+        };
+        match &tape {
+            Some(tape) => {
+                let recipe = ByTaylor { tape, order: order(&self.tolerance), isa };
+                sail(&Sampled { ensemble: self, recipe, isa }, runs, crew)
+            }
+            None => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa }, runs, crew),
         }
     }
 
     fn start<S: Scalar>(&self, run: usize) -> Start<'_, S, D> {
-        let x = self.starts[run.min(self.starts.len() - 1)];
+        let x = *rows::of(self.starts, run);
         Start {
-            values: &self.values[run.min(self.values.len() - 1)],
+            values: rows::of::<Vec<f64>>(self.values, run),
             t: self.times[0],
             x: x.map(S::constant),
             end: self.times[self.times.len() - 1],
         }
     }
-}
-
-/// The parameters that vanish in all rows: what they multiply need not be computed.
-///
-/// Others stay open, so that a run's bits do not depend on what else is run.
-pub fn known(rows: &[Vec<f64>]) -> Vec<Option<f64>> {
-    let width = rows.first().map_or(0, Vec::len);
-    (0..width).map(|i| rows.iter().all(|row| row[i] == 0.0).then_some(0.0)).collect()
 }
 
 struct Sampled<'a, F, const D: usize, T> {

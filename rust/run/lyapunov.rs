@@ -1,17 +1,16 @@
 //! Lyapunov exponents.
 
 use super::blocks::{Average, Blocks};
-use super::ensemble::known;
 use super::fleet::{Crew, Fleet, Queue, sail};
 use super::frame::{Growth, tangents};
 use super::moments::Moments;
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::rows;
 use super::ship::{Ship, Start};
 use super::trajectory::Outcome;
 use crate::integrate::{Failure, Tolerance, WithTangents, order};
 use crate::model::Family;
 use crate::scalar::{Dual, Isa, Mask, Real};
-use crate::tape::Tape;
 
 /// A block is no shorter than this many steps.
 const LEAST_STEPS: f64 = 16.0;
@@ -64,28 +63,20 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
     /// with the second by more than chance allows, the run was still on its way to the attractor and the
     /// first half is dropped.
     pub fn run<const N: usize>(&self, crew: Crew<'_>) -> Vec<Option<Exponents<D, N>>> {
-        let orbits = self.values.len().max(self.starts.len());
-        match Tape::record(self.family, &known(self.values)) {
-            Ok(tape) => sail(
-                &Tangents::<_, D, N, _> {
-                    orbits: self,
-                    recipe: ByTaylor { tape: &tape, order: order(&self.options.tolerance), isa: crew.isa },
-                    isa: crew.isa,
-                },
-                orbits,
-                crew,
-            ),
-            // A law that no series follows.
-            Err(_) => {
-                sail(&Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5, isa: crew.isa }, orbits, crew)
+        let (orbits, isa) = (rows::count(self.values, self.starts), crew.isa);
+        match &rows::tape(self.family, self.values) {
+            Some(tape) => {
+                let recipe = ByTaylor { tape, order: order(&self.options.tolerance), isa };
+                sail(&Tangents::<_, D, N, _> { orbits: self, recipe, isa }, orbits, crew)
             }
+            None => sail(&Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5, isa }, orbits, crew),
         }
     }
 
     fn start<R: Real, const N: usize>(&self, orbit: usize) -> Start<'_, Dual<R, N>, D> {
-        let x = self.starts[orbit.min(self.starts.len() - 1)];
+        let x = *rows::of(self.starts, orbit);
         Start {
-            values: &self.values[orbit.min(self.values.len() - 1)],
+            values: rows::of::<Vec<f64>>(self.values, orbit),
             t: 0.0,
             x: tangents(x),
             end: if self.options.transient > 0.0 { self.options.transient } else { self.options.time },

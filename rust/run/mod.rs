@@ -9,6 +9,7 @@ mod lyapunov;
 mod moments;
 mod polynomial;
 mod recipe;
+pub mod rows;
 mod section;
 mod ship;
 mod signs;
@@ -17,7 +18,7 @@ mod trajectory;
 
 pub use blocks::{Average, Blocks};
 pub use crossing::Crossed;
-pub use ensemble::{Ensemble, Passage, Stepper, known};
+pub use ensemble::{Ensemble, Passage, Stepper};
 pub use fleet::{Crew, Fleet, Queue, sail};
 pub use lyapunov::{Exponents, Lyapunov, LyapunovOptions};
 pub use moments::Moments;

@@ -22,7 +22,7 @@ pub struct ByDopri5;
 impl<const D: usize> Recipe<D> for ByDopri5 {
     type Method<S: Scalar> = Dopri5<S, D>;
 
-    const PACKETS: bool = false;
+    const PACKETS: bool = true;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
         Dopri5::default()

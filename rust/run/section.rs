@@ -1,14 +1,14 @@
 //! Poincaré sections: where trajectories cross a surface.
 
 use super::crossing::{Crossed, Scan};
-use super::ensemble::known;
 use super::fleet::{Crew, Fleet, Queue, sail};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::rows;
 use super::ship::{Ship, Start};
 use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
 use crate::scalar::{Isa, Mask, Real};
-use crate::tape::{Expression, Tape};
+use crate::tape::Expression;
 
 /// A component of the state beyond this has escaped to infinity.
 pub const FAR: f64 = 1e6;
@@ -95,30 +95,19 @@ pub struct Sections<'a, F, const D: usize> {
 impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
     /// Collects them all. `None` stands for trajectories that were not begun when the work was stopped.
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Crossings<D>>> {
-        let jobs = self.values.len().max(self.starts.len());
-        match Tape::record(self.family, &known(self.values)) {
-            Ok(tape) => sail(
-                &Collect {
-                    sections: self,
-                    recipe: ByTaylor { tape: &tape, order: order(&self.tolerance), isa: crew.isa },
-                    isa: crew.isa,
-                },
-                jobs,
-                crew,
-            ),
-            // A law that no series follows.
-            Err(_) => sail(&Collect { sections: self, recipe: ByDopri5, isa: crew.isa }, jobs, crew),
+        let (jobs, isa) = (rows::count(self.values, self.starts), crew.isa);
+        match &rows::tape(self.family, self.values) {
+            Some(tape) => {
+                let recipe = ByTaylor { tape, order: order(&self.tolerance), isa };
+                sail(&Collect { sections: self, recipe, isa }, jobs, crew)
+            }
+            None => sail(&Collect { sections: self, recipe: ByDopri5, isa }, jobs, crew),
         }
     }
 
     fn start<R: Real>(&self, job: usize) -> Start<'_, R, D> {
-        let x = self.starts[job.min(self.starts.len() - 1)];
-        Start {
-            values: &self.values[job.min(self.values.len() - 1)],
-            t: 0.0,
-            x: x.map(R::constant),
-            end: self.end,
-        }
+        let x = rows::of(self.starts, job);
+        Start { values: rows::of::<Vec<f64>>(self.values, job), t: 0.0, x: x.map(R::constant), end: self.end }
     }
 }
 

@@ -1,6 +1,6 @@
 //! One run, sampled.
 
-use crate::integrate::{Counts, Driver, Ending, Failure, Tolerance};
+use crate::integrate::{Counts, Driver, Ending, Failure, Method, Tolerance};
 use crate::model::System;
 use crate::observe::{Event, Record, Samples};
 use crate::run::Stop;
@@ -49,10 +49,11 @@ pub struct Run<const D: usize> {
     pub record: Option<Record<D>>,
 }
 
-/// Runs the system from `x0`, ending on its wall where it has one. A run that ends there, or where it
+/// Runs the system from `x0` by this method, ending on its wall where it has one. A run that ends there, or where it
 /// chatters, is cut: that point is the last one.
-pub fn trajectory<M: System<f64, D>, const D: usize>(
+pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     system: &M,
+    method: K,
     output: Output<'_>,
     x0: [f64; D],
     tolerance: &Tolerance,
@@ -73,7 +74,7 @@ pub fn trajectory<M: System<f64, D>, const D: usize>(
     let mut record = keep.then(|| Record::new(start, x0));
     let mut outcome = Outcome::Finished;
 
-    let mut driver: Driver<_, f64, D> = Driver::new(system, start, x0, None, tolerance).with_wall();
+    let mut driver = Driver::by(method, system, start, x0, None, tolerance).with_wall();
     while driver.t() < end {
         stop.check()?;
         let ending = match driver.advance(end) {

@@ -113,8 +113,8 @@ macro_rules! every {
     };
 }
 
-/// A known tape. Where tangents make every operation long, only the operations are unrolled, else the
-/// orders are too.
+/// A known tape. Where tangents make every operation long, or there are many of them, only the operations
+/// are unrolled, else the orders are too.
 #[inline(always)]
 fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     work: &mut [[S; N]],
@@ -125,7 +125,7 @@ fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     sides: &Sides<S>,
 ) {
     let work = &mut work[..P::SLOTS];
-    if const { size_of::<S>() > 2 * size_of::<S::Real>() } {
+    if const { size_of::<S>() > if D == 3 { 2 * size_of::<S::Real>() } else { size_of::<f64>() } } {
         return rolled::<P, S, D, N>(work, order, held, t, x, sides);
     }
     match order {

@@ -1,0 +1,112 @@
+//! `udd.ensemble`.
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::jobs::{self, Jobs, outcome_code};
+use super::model::{AnyModel, with_wide_model};
+use super::simulate::stepper;
+use crate::integrate::Tolerance;
+use crate::model::Family;
+use crate::run::{Crew, Ensemble, Passage, rows};
+
+/// Columns, one row for each run.
+struct Table {
+    times: usize,
+    states: Vec<f64>,
+    end: Vec<f64>,
+    t_end: Vec<f64>,
+    outcome: Vec<u8>,
+}
+
+impl Table {
+    fn new(runs: usize, times: usize, dimension: usize) -> PyResult<Self> {
+        let mut table =
+            Self { times, states: Vec::new(), end: Vec::new(), t_end: Vec::new(), outcome: Vec::new() };
+        let numbers = runs.saturating_mul(times).saturating_mul(dimension);
+        let room = table.states.try_reserve_exact(numbers);
+        room.map_err(|_| {
+            PyMemoryError::new_err(format!("there is no room for {runs} runs of {times} states"))
+        })?;
+        Ok(table)
+    }
+
+    fn push<const D: usize>(&mut self, passage: Option<Passage<D>>) {
+        let Some(Passage { states, t, x, outcome }) = passage else {
+            self.states.extend((0..self.times).flat_map(|_| [f64::NAN; D]));
+            self.end.extend([f64::NAN; D]);
+            self.t_end.push(f64::NAN);
+            self.outcome.push(jobs::INTERRUPTED);
+            return;
+        };
+        self.states.extend(states.as_flattened());
+        self.states.extend((states.len()..self.times).flat_map(|_| [f64::NAN; D]));
+        self.end.extend(x);
+        self.t_end.push(t);
+        self.outcome.push(outcome_code(outcome));
+    }
+}
+
+fn collect<F: Family<D>, const D: usize>(
+    ensemble: &Ensemble<'_, F, D>,
+    mut table: Table,
+    crew: Crew<'_>,
+) -> Table {
+    ensemble.run(crew).into_iter().for_each(|passage| table.push(passage));
+    table
+}
+
+/// Runs one model from many states, or with many values of its parameters, on `threads` threads (0 for one
+/// per core).
+///
+/// `values` has one row of parameter values for each run, or a single row for all; `starts` likewise.
+/// `progress` is called with the number of runs done. Returns a dict of columns; on Ctrl-C with what there is.
+#[pyfunction]
+#[pyo3(signature = (model, values, starts, times, rtol, atol, method, threads, progress = None))]
+#[allow(clippy::too_many_arguments)]
+fn ensemble<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    values: PyReadonlyArray2<'py, f64>,
+    starts: PyReadonlyArray2<'py, f64>,
+    times: PyReadonlyArray1<'py, f64>,
+    rtol: f64,
+    atol: f64,
+    method: &str,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let model = AnyModel::from_python(model)?;
+    let (tolerance, stepper) = (Tolerance { rtol, atol }, stepper(method)?);
+    let times = times.as_slice()?.to_vec();
+    if times.is_empty() {
+        return Err(super::errors::ModelError::new_err("at least one time is needed"));
+    }
+    let values = jobs::values(&model, &values)?;
+    let watched = Jobs::new(threads, &progress);
+    let (table, dimension, signal) = with_wide_model!(&model, |family, _values| {
+        let starts = jobs::starts(&starts)?;
+        jobs::agree(values.len(), starts.len())?;
+        let dimension = starts[0].len();
+        let table = Table::new(rows::count(&values, &starts), times.len(), dimension)?;
+        let ensemble =
+            Ensemble { family, values: &values, starts: &starts, times: &times, tolerance, stepper };
+        let (table, signal) = watched.watch(py, |crew| collect(&ensemble, table, crew))?;
+        (table, dimension, signal)
+    });
+    jobs::lost(py, signal, &table.outcome)?;
+    let runs = table.outcome.len();
+    let dict = PyDict::new(py);
+    let states = PyArray1::from_vec(py, table.states).reshape([runs, times.len(), dimension])?;
+    dict.set_item("states", states)?;
+    dict.set_item("end", PyArray1::from_vec(py, table.end).reshape([runs, dimension])?)?;
+    dict.set_item("t_end", PyArray1::from_vec(py, table.t_end))?;
+    dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
+    Ok(dict)
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(ensemble, module)?)
+}
