@@ -113,7 +113,7 @@ def test_the_interpolation_error_is_of_order_4() -> None:
     t = np.linspace(0, 5, 1001)
     sizes, errors = [], []
     for rtol in (1e-6, 1e-7, 1e-8, 1e-9):
-        run = udd.simulate(model, 5.0, start, rtol=rtol, atol=rtol, dense=True)
+        run = udd.simulate(model, 5.0, start, rtol=rtol, atol=rtol, method="dopri5", dense=True)
         sizes.append(5.0 / run.stats.accepted)
         errors.append(np.abs(run(t) - exact(t)).max())
     # The global error of steps and polynomial together: at least order 4, at most 5.
@@ -135,15 +135,15 @@ def test_events_lie_on_their_surfaces() -> None:
 
 def test_a_disk_that_leaves_its_wheels_is_ejected() -> None:
     t = np.arange(0, 200, 0.04)
-    start = [3.0, 0.005, 0.0, 0.0]
-    run = udd.simulate(udd.Disk(0.039), t, start)
+    start = [3.832, -0.003, -0.002, 0.0]  # leaves after 5.8 s, before chaos could decide
+    run = udd.simulate(udd.Disk(0.045), t, start)
     assert run.outcome == "ejected" and run.t[-1] < 60
     assert abs(np.hypot(run.Y[-1], run.Z[-1]) / 0.08 - 1) < 1e-12
     assert run.events[-1].kind == "edge" and run.events[-1].t == run.t[-1]
     np.testing.assert_array_equal(run.events[-1].state, run.state[-1])
     np.testing.assert_array_equal(run.t[:-1], t[: len(run.t) - 1])
     assert (np.hypot(run.Y, run.Z)[:-1] < 0.08).all()
-    beyond = udd.simulate(udd.Disk(0.039, edge="ignore"), t[: len(run.t) + 20], start)
+    beyond = udd.simulate(udd.Disk(0.045, edge="ignore"), t[: len(run.t) + 20], start)
     assert beyond.outcome == "finished"
     # The same steps up to the edge.
     np.testing.assert_array_equal(beyond.state[: len(run.t) - 5], run.state[:-5])

@@ -15,22 +15,28 @@ _PUBLIC = {
     "DLE": "udd.models",
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
+    "Covariant": "udd.spectra",
     "Disk": "udd.models",
+    "Ensemble": "udd.ensembles",
     "Fit": "udd.fitting",
     "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
     "Pendulum": "udd.models",
     "Section": "udd.sections",
+    "Spectrum": "udd.spectra",
     "SweepSpec": "udd.sweeping",
     "Trajectory": "udd.trajectory",
     "UddError": "udd.errors",
     "basins": "udd.branching",
     "bifurcation": "udd.branching",
+    "covariant_vectors": "udd.spectra",
     "discover": "udd.discovery",
     "effects": "udd.effects",
+    "ensemble": "udd.ensembles",
     "errors": "udd.errors",
     "fit": "udd.fitting",
     "lyapunov": "udd.exponents",
+    "lyapunov_spectrum": "udd.spectra",
     "plot": "udd.plot",
     "poincare": "udd.sections",
     "read_measurement": "udd.measurement",
@@ -50,6 +56,8 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
+    from udd.ensembles import Ensemble as Ensemble
+    from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning
     from udd.errors import IncompleteWarning as IncompleteWarning
     from udd.errors import UddError as UddError
@@ -64,6 +72,10 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.models import Pendulum as Pendulum
     from udd.sections import Section as Section
     from udd.sections import poincare as poincare
+    from udd.spectra import Covariant as Covariant
+    from udd.spectra import Spectrum as Spectrum
+    from udd.spectra import covariant_vectors as covariant_vectors
+    from udd.spectra import lyapunov_spectrum as lyapunov_spectrum
     from udd.sweeping import SweepSpec as SweepSpec
     from udd.sweeping.sweeps import sweep as sweep
     from udd.tracking import track as track

@@ -49,6 +49,17 @@ class _Orbits(TypedDict):
     end: _Floats
     outcome: NDArray[np.uint8]
 
+class _Frames(TypedDict):
+    states: _Floats
+    growth: _Floats
+    covariant: _Floats
+
+class _Passages(TypedDict):
+    states: _Floats
+    end: _Floats
+    t_end: _Floats
+    outcome: NDArray[np.uint8]
+
 class _Crossings(TypedDict):
     points: _Floats
     t: _Floats
@@ -95,8 +106,21 @@ def simulate(
     state0: list[float],
     rtol: float,
     atol: float,
+    method: str,
     dense: bool,
 ) -> _Run: ...
+def ensemble(
+    model: Model,
+    values: _Floats,
+    starts: _Floats,
+    times: _Floats,
+    rtol: float,
+    atol: float,
+    method: str,
+    threads: int,
+    progress: Callable[[int], object] | None = None,
+) -> _Passages: ...
+def frames(model: Model, state0: list[float], dt: float, count: int, rtol: float, atol: float) -> _Frames: ...
 def lyapunov(
     model: Model,
     values: _Floats,

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._validate import array, number
+from udd._validate import number
 from udd.crew import bar, thread_count
 from udd.errors import IncompleteWarning, ModelError
-from udd.exponents import default_start
 from udd.models import Model
+from udd.orbits import orbits_of
 from udd.outcomes import OUTCOMES
 from udd.trajectory import tolerances
 
@@ -279,7 +279,7 @@ def poincare(
     surfaces, ways = surfaces_of(model, section, direction)
     count, skipped = _whole("n", n, 1), _whole("transient", transient, 0)
     rtol, atol = tolerances(rtol, atol)
-    shape, rows, starts = _jobs(model, parameters or {}, state0)
+    shape, rows, starts = orbits_of(model, parameters or {}, state0)
     if t_max is None:
         end = CLOCKS * clock_of(model, rows) * (count + skipped)
     else:
@@ -378,55 +378,6 @@ def _whole(name: str, value: Any, least: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ModelError(f"{name} must be a whole number of at least {least}, not {value!r}")
     return int(value)
-
-
-def _jobs(
-    model: Model, parameters: Mapping[str, ArrayLike], state0: ArrayLike | None
-) -> tuple[tuple[int, ...], _Floats, _Floats]:
-    """The leading axes, the parameters of each orbit (or of all), and its start (or that of all)."""
-    states = array("state0", default_start(model) if state0 is None else state0)
-    names = model.state_names
-    if state0 is None and states.shape != (len(names),):
-        states = np.append(states, np.zeros(len(names) - len(states)))
-    if states.ndim == 0 or states.shape[-1] != len(names):
-        raise ModelError(
-            f"state0 must have the {len(names)} components {', '.join(names)} along its last axis, "
-            f"not shape {states.shape}"
-        )
-    values = {name: array(name, value) for name, value in parameters.items()}
-    try:
-        shape = np.broadcast_shapes(states.shape[:-1], *(value.shape for value in values.values()))
-    except ValueError:
-        shapes = ", ".join(str(a.shape) for a in (states, *values.values()))
-        raise ModelError(f"state0 and parameters of the shapes {shapes} do not fit together") from None
-    if 0 in shape:
-        raise ModelError(f"there is no orbit to follow: the shape is {shape}")
-    jobs = int(np.prod(shape, dtype=np.int64))
-    base = np.array(list(model.parameters.values()))
-    if values:
-        for name, value in values.items():
-            for extreme in (value.min(), value.max()):
-                model.with_parameters({name: float(extreme)})
-        rows = np.tile(base, (jobs, 1))
-        for name, value in values.items():
-            rows[:, list(model.parameters).index(name)] = np.broadcast_to(value, shape).ravel()
-    else:
-        rows = base[None]
-    starts = states.reshape(1, -1) if states.ndim == 1 else np.broadcast_to(states, (*shape, len(names)))
-    starts = np.ascontiguousarray(starts).reshape(-1, len(names))
-    _inside(model, rows, starts)
-    return shape, rows, starts
-
-
-def _inside(model: Model, rows: _Floats, starts: _Floats) -> None:
-    """A disk starts on the wheels."""
-    if getattr(model, "edge", "ignore") != "stop":
-        return
-    radius = rows[:, list(model.parameters).index("R")]
-    Y, Z = (starts[:, model.state_names.index(name)] for name in ("Y", "Z"))
-    off = np.hypot(Y, Z) >= radius
-    if off.any():
-        raise ModelError(f"{int(off.sum())} of the starts are off the wheels: Y^2 + Z^2 must be below R^2")
 
 
 def clock_of(model: Model, rows: _Floats) -> float:

@@ -3,13 +3,19 @@
 use super::method::{Method, Point, Trial};
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
-use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
 use crate::tape::{Jets, LOW, Tape};
 use crate::unroll::vector;
 
 /// The highest order.
 const MOST: usize = 18;
 const COEFFICIENTS: usize = MOST + 1;
+
+/// The polynomial's rates may miss those of the law by this times what a step's error may be: well above
+/// what the first term left out makes of it.
+const MOST_DEFECT: f64 = 30.0;
+/// A step is halved no more often.
+const MOST_HALVINGS: usize = 40;
 
 /// The order that is fastest at this tolerance.
 pub fn order(tolerance: &Tolerance) -> usize {
@@ -36,6 +42,23 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     pub fn new(tape: &'a Tape<D>, parameters: Vec<S>, order: usize, isa: Isa) -> Self {
         Self { tape, parameters, jets: Jets::new(tape, isa).with_order(order) }
     }
+
+    /// How far the polynomial's rates are from those of the law at the end of a step, times its size: a
+    /// norm, 1 where that is what a step's error may be.
+    fn defect(
+        &self,
+        system: &impl System<S, D>,
+        at: &Point<S, D>,
+        size: S::Real,
+        x: &[S; D],
+        norm: &impl ErrorNorm<S, D>,
+    ) -> S::Real {
+        let rates = system.rates(S::lift(at.t + size), x, &at.sides);
+        let slope = self.jets.real_slope(size);
+        let real = |x: &[S; D]| vector!(S::Real, D; n => x[n].real());
+        let error = vector!(S::Real, D; n => (slope[n] - rates[n].real()) * size);
+        norm.state().norm(error, real(&at.x), real(x))
+    }
 }
 
 impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
@@ -53,12 +76,12 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 
     fn attempt(
         &mut self,
-        _system: &impl System<S, D>,
+        system: &impl System<S, D>,
         at: &Point<S, D>,
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
-        S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm })
+        S::Real::work(self.jets.isa(), Attempt { method: self, system, at, h, norm })
     }
 
     fn extend(&mut self, _system: &impl System<S, D>, _at: &Point<S, D>) {}
@@ -87,25 +110,41 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 }
 
 /// A step, compiled once for each instruction set.
-struct Attempt<'a, 'b, S: Scalar, const D: usize, E> {
+struct Attempt<'a, 'b, M, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
+    system: &'a M,
     at: &'a Point<S, D>,
     h: S::Real,
     norm: &'a E,
 }
 
-impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, D, E> {
+impl<M: System<S, D>, S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, M, S, D, E> {
     type Output = Trial<S, D>;
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Trial<S, D> {
-        let Self { method, at, h, norm } = self;
+        let Self { method, system, at, h, norm } = self;
         method.jets.expand_here(method.tape, &method.parameters, S::lift(at.t), &at.x, &at.sides);
         let radius = method.jets.radius(norm);
         let short = radius.less(h.abs());
-        let size = S::Real::select(short, radius.zip(h, f64::copysign), h);
+        let mut size = S::Real::select(short, radius.zip(h, f64::copysign), h);
         let known = S::Real::zero().less(radius);
         let error = S::Real::select(known, S::Real::zero(), S::Real::constant(f64::NAN));
-        Trial { x: method.jets.at_here(size), size, error }
+        let mut halvings = 0;
+        loop {
+            let x = method.jets.at_here(size);
+            if method.tape.is_polynomial() || halvings == MOST_HALVINGS {
+                return Trial { x, size, error };
+            }
+            // A law that has nearly levelled off, as tanh does, has terms too small to tell how near its poles
+            // are: beyond them the polynomial does not obey the law.
+            let good = method.defect(system, at, size, &x, norm).less(S::Real::constant(MOST_DEFECT));
+            let bad = good.or(known.not()).not();
+            if !bad.any() {
+                return Trial { x, size, error };
+            }
+            size = S::Real::select(bad, size.scale(0.5), size);
+            halvings += 1;
+        }
     }
 }

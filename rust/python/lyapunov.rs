@@ -4,11 +4,13 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::interrupt;
 use super::jobs::{self, Jobs, outcome_code};
-use super::model::{AnyModel, with_wide_model};
-use crate::integrate::Tolerance;
+use super::model::{AnyModel, state, with_wide_model};
+use crate::integrate::{Dopri5, Failure, Taylor, Tolerance, order};
 use crate::model::Family;
-use crate::run::{Crew, Exponents, Lyapunov, LyapunovOptions};
+use crate::run::{Crew, Exponents, Frames, Lyapunov, LyapunovOptions, Stop, frames as frames_of, rows};
+use crate::scalar::{Dual, Isa, Scalar};
 
 /// Columns, one row for each orbit.
 #[derive(Default)]
@@ -104,6 +106,53 @@ fn lyapunov<'py>(
     Ok(dict)
 }
 
+/// An orbit's states, the growth of its frame and its covariant vectors, at `count` distances `dt` of time.
+#[pyfunction]
+fn frames<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    state0: Vec<f64>,
+    dt: f64,
+    count: usize,
+    rtol: f64,
+    atol: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let model = AnyModel::from_python(model)?;
+    let tolerance = Tolerance { rtol, atol };
+    let (states, growth, covariant, dimension) = with_wide_model!(&model, |family, values| {
+        let x0 = state(&state0)?;
+        let found = interrupt::run(py, |stop| follow(family, values, x0, (dt, count), &tolerance, stop))?;
+        let flat = found.covariant.as_flattened().as_flattened().to_vec();
+        (found.states.into_flattened(), found.growth.into_flattened(), flat, x0.len())
+    });
+    let dict = PyDict::new(py);
+    dict.set_item("states", PyArray1::from_vec(py, states).reshape([count + 1, dimension])?)?;
+    dict.set_item("growth", PyArray1::from_vec(py, growth).reshape([count, dimension])?)?;
+    let covariant = PyArray1::from_vec(py, covariant).reshape([count + 1, dimension, dimension])?;
+    dict.set_item("covariant", covariant)?;
+    Ok(dict)
+}
+
+fn follow<F: Family<D>, const D: usize>(
+    family: &F,
+    values: &[f64],
+    x0: [f64; D],
+    span: (f64, usize),
+    tolerance: &Tolerance,
+    stop: &Stop,
+) -> Result<Frames<D>, Failure> {
+    let wide: Vec<Dual<f64, D>> = values.iter().map(|&value| Dual::constant(value)).collect();
+    let system = family.build(&wide);
+    match &rows::tape(family, &[values.to_vec()]) {
+        Some(tape) => {
+            let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
+            frames_of(system, method, x0, span, tolerance, stop)
+        }
+        None => frames_of(system, Dopri5::default(), x0, span, tolerance, stop),
+    }
+}
+
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(frames, module)?)?;
     module.add_function(wrap_pyfunction!(lyapunov, module)?)
 }

@@ -109,7 +109,8 @@ pub(super) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
     baseline(work)
 }
 
-#[inline(never)]
+// `#[inline]` only so that the compiler spreads the copies over its units: all of them in one take minutes.
+#[inline]
 fn baseline<W: Work>(work: W) -> W::Output {
     work.run::<Plain>()
 }
@@ -128,12 +129,14 @@ fn has_avx512() -> bool {
 }
 
 #[cfg(target_arch = "x86_64")]
+#[inline]
 #[target_feature(enable = "avx2,fma")]
 fn avx2<W: Work>(work: W) -> W::Output {
     work.run::<Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
+#[inline]
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn avx512<W: Work>(work: W) -> W::Output {
     work.run::<Avx512>()

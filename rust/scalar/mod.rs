@@ -56,9 +56,11 @@ pub trait Scalar:
     /// The same for a factor without derivatives.
     fn fused_times(self, a: Self, b: Self::Real) -> Self;
 
+    #[inline(always)]
     fn zero() -> Self {
         Self::constant(0.0)
     }
+    #[inline(always)]
     fn one() -> Self {
         Self::constant(1.0)
     }
@@ -82,6 +84,7 @@ pub trait Scalar:
         (self.sin(), self.cos())
     }
 
+    #[inline(always)]
     fn square(self) -> Self {
         self * self
     }

@@ -44,12 +44,19 @@ pub struct Tape<const D: usize> {
     /// How many series there are; the first `D` are the state.
     pub(crate) slots: usize,
     known: known::Known,
+    polynomial: bool,
 }
 
 impl<const D: usize> Tape<D> {
     /// What changes along a solution, in the order of evaluation.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// Whether the rates are polynomials of the state, whose series converge everywhere near.
+    #[inline(always)]
+    pub fn is_polynomial(&self) -> bool {
+        self.polynomial
     }
 
     /// Whether its series are computed by a program of their own, unrolled when this was compiled.

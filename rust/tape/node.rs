@@ -72,6 +72,12 @@ pub enum Node {
 }
 
 impl Node {
+    /// Whether it is a polynomial of its operands.
+    pub(super) fn is_polynomial(self) -> bool {
+        use Node::*;
+        !matches!(self, Div(..) | Over(..) | Sqrt(_) | Exp(_) | Ln(_) | Sin(_) | Cos(_) | Tanh(_) | Slope(_))
+    }
+
     /// How many slots it needs.
     pub(super) fn slots(self) -> usize {
         match self {

@@ -17,6 +17,15 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(self.isa(), RealValue(self, dt))
     }
 
+    /// The rates of the polynomial at a distance `dt`, without derivatives.
+    pub fn real_slope(&self, dt: S::Real) -> [S::Real; D] {
+        vector!(S::Real, D; n => {
+            let c = &self.coefficients()[n];
+            let terms = (1..=self.order()).rev();
+            terms.fold(S::Real::zero(), |sum, k| sum * dt + c[k].real().scale(k as f64))
+        })
+    }
+
     /// As [`at`](Jets::at), with the caller's instructions.
     #[inline(always)]
     pub fn at_here(&self, dt: S::Real) -> [S; D] {

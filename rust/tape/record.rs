@@ -73,8 +73,15 @@ impl<'a> Lowering<'a> {
     fn tape<const D: usize>(mut self, rates: [Symbol; D]) -> Tape<D> {
         let rates = rates.map(|s| self.slot(s));
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
-        let mut tape =
-            Tape { held: self.held, steps: self.steps, rates, slots: self.slots, known: Known::Not };
+        let polynomial = self.steps.iter().all(|step| step.node.is_polynomial());
+        let mut tape = Tape {
+            held: self.held,
+            steps: self.steps,
+            rates,
+            slots: self.slots,
+            known: Known::Not,
+            polynomial,
+        };
         tape.known = Known::of(&tape);
         tape
     }

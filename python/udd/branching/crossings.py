@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd.models import Model
+from udd.orbits import off_wheels
 from udd.outcomes import OUTCOMES
 
 from .coordinates import Floats
-from .pressed import noticed
 
 START_OUTSIDE = len(OUTCOMES)
 UNDECIDED = START_OUTSIDE + 1
@@ -68,7 +68,7 @@ class Runner:
         Crossings
             Jobs that were stopped by Ctrl-C have the outcome "interrupted".
         """
-        outside = self._outside(values, starts)
+        outside = off_wheels(self.model, values, starts)
         jobs = len(starts)
         found = Crossings(
             np.full((jobs, count, starts.shape[1]), np.nan),
@@ -79,37 +79,24 @@ class Runner:
         )
         runs = np.flatnonzero(~outside)
         if len(runs):
-            with noticed() as pressed:
-                got = _core.sections(
-                    self.model,
-                    np.ascontiguousarray(values[runs]),
-                    np.ascontiguousarray(starts[runs]),
-                    list(self.section),
-                    list(self.direction),
-                    skip,
-                    count,
-                    self.t_each * (skip + count),
-                    self.rtol,
-                    self.atol,
-                    self.threads,
-                )
-            if pressed() and not (got["outcome"] == INTERRUPTED).any():
-                raise KeyboardInterrupt  # it came just as all were finished
+            got = _core.sections(
+                self.model,
+                np.ascontiguousarray(values[runs]),
+                np.ascontiguousarray(starts[runs]),
+                list(self.section),
+                list(self.direction),
+                skip,
+                count,
+                self.t_each * (skip + count),
+                self.rtol,
+                self.atol,
+                self.threads,
+            )
             found.points[runs], found.t[runs] = got["points"], got["t"]
             found.outcome[runs], found.end[runs], found.t_end[runs] = got["outcome"], got["end"], got["t_end"]
             cut = found.outcome == INTERRUPTED
             found.points[cut], found.t[cut] = np.nan, np.nan
         return found
-
-    def _outside(self, values: Floats, starts: Floats) -> NDArray[np.bool_]:
-        """Which jobs start where the disk has left the wheels already."""
-        if getattr(self.model, "edge", "ignore") != "stop":
-            return np.zeros(len(starts), dtype=bool)
-        names, states = list(self.model.parameters), self.model.state_names
-        radius = values[:, names.index("R")]
-        Y, Z = starts[:, states.index("Y")], starts[:, states.index("Z")]
-        outside: NDArray[np.bool_] = np.hypot(Y, Z) >= radius
-        return outside
 
 
 def parts(jobs: int, each: int) -> Iterator[slice]:

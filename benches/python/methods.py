@@ -1,0 +1,58 @@
+"""Work and precision of the methods: `python methods.py` prints the table behind ``method="auto"``.
+
+Each model is run by each method at several tolerances; the error is that of the state at the end against a
+run at rtol = 1e-13, the median over starts, relative to the size of the motion.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+import udd
+
+effects = udd.effects
+disk = udd.Disk(0.039, edge="ignore")
+MODELS = {
+    "DLE, w = 1": (udd.DLE(1.0), 30.0, np.array([1.0, 1.0, 0.01])),
+    "disk": (disk, 4.0, np.array([3.0, 0.005, 0.0, 0.0])),
+    "disk, relaxation": (disk.with_effects(effects.relaxation(b=5.0)), 4.0, np.array([3.0, 0.005, 0.0, 0.0])),
+    "disk, Coulomb": (disk.with_effects(effects.coulomb(c=0.002)), 4.0, np.array([3.0, 0.005, 0.0, 0.0])),
+    "pendulum": (udd.Pendulum(0.5, k0=0.01), 20.0, np.array([0.0, 1.0])),
+    "pendulum, drag": (
+        udd.Pendulum(0.5, k0=0.01).with_effects(effects.quadratic_drag(c=0.01)),
+        20.0,
+        np.array([0.0, 1.0]),
+    ),
+}
+RTOL = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+
+
+def measured(model: udd.models.Model, end: float, start: np.ndarray, method: str, rtol: float) -> tuple[float, float]:
+    """The error at the end and the model's time per second of work."""
+    scale = np.abs(start) + 1e-3
+    starts = start + 0.1 * scale * np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(start)))
+    exact = [udd.simulate(model, [0.0, end], s, rtol=1e-13, atol=1e-16, method="dopri5").state[-1] for s in starts]
+    began = time.perf_counter()
+    repeats = 0
+    while time.perf_counter() - began < 0.2:
+        found = [
+            udd.simulate(model, [0.0, end], s, rtol=rtol, atol=1e-3 * rtol, method=method).state[-1] for s in starts
+        ]
+        repeats += 1
+    rate = repeats * len(starts) * end / (time.perf_counter() - began)
+    size = np.abs(exact).max(axis=0)
+    return float(np.median(np.abs(np.subtract(found, exact) / size).max(axis=1))), rate
+
+
+def main() -> None:
+    print(f"{'model':18s} {'rtol':>7s}   {'dopri5: error':>14s} {'time/s':>9s}   {'taylor: error':>14s} {'time/s':>9s}")
+    for name, (model, end, start) in MODELS.items():
+        for rtol in RTOL:
+            (e5, r5), (et, rt) = (measured(model, end, start, method, rtol) for method in ("dopri5", "taylor"))
+            print(f"{name:18s} {rtol:7.0e}   {e5:14.1e} {r5:9.2e}   {et:14.1e} {rt:9.2e}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,158 @@
+"""One model from many states, or with many values of its parameters."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._validate import array, number
+from udd.crew import bar, thread_count
+from udd.errors import IncompleteWarning, ModelError
+from udd.models import Model
+from udd.orbits import orbits_of
+from udd.outcomes import OUTCOMES
+from udd.trajectory import method_for, tolerances
+
+__all__ = ["Ensemble", "ensemble"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Many runs of one model at common times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (times,)
+        Times, in s (dimensionless for the DLE).
+    state : ndarray, shape (..., times, dim)
+        States, in the order of ``model.state_names``; NaN after a run's end.
+    outcome : ndarray of str, shape (...)
+        ``"finished"``, ``"ejected"`` (the disk left the wheels), ``"failed"`` (the solution blew up),
+        ``"chattering"``, ``"interrupted"``.
+    end : ndarray, shape (..., dim)
+        Each run's last state.
+    t_end : ndarray, shape (...)
+        The time of that.
+    model : Model
+        What was run, before parameters were varied.
+    """
+
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+    outcome: NDArray[Any]
+    end: NDArray[np.float64]
+    t_end: NDArray[np.float64]
+    model: Model
+
+    def __repr__(self) -> str:
+        return f"<Ensemble of {self.model!r}: runs {self.outcome.shape}, {len(self.t)} times>"
+
+
+def ensemble(
+    model: Model,
+    t: ArrayLike,
+    state0: ArrayLike | None = None,
+    *,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    method: str = "auto",
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Ensemble:
+    """Run a model from many states, or with many values of its parameters, on all cores.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+    t : array_like, shape (times,), or float
+        Times at which the states are wanted, increasing; the first is the initial time. A number stands for
+        the end of runs from 0, of which only the states there are wanted.
+    state0 : array_like, shape (..., dim), optional
+        Initial states.
+    parameters : mapping of str to array_like, optional
+        Other values of some of the model's parameters, of shapes that broadcast with one another and with
+        the leading axes of `state0`; the result has these axes.
+    rtol, atol, method
+        As for :func:`udd.simulate`.
+    threads : int, optional
+        How many threads to use, by default one per core. No bit of the result depends on it.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default for many runs, where stderr is a terminal.
+
+    Returns
+    -------
+    Ensemble
+        Runs that end early say why; they raise nothing.
+
+    Raises
+    ------
+    ModelError
+        Times, states or parameters that cannot be used.
+
+    Warns
+    -----
+    IncompleteWarning
+        On Ctrl-C: the runs that are not finished are NaN.
+
+    Examples
+    --------
+    Ten thousand orbits spread over the attractor, on which <omega^2> = w:
+
+    >>> import numpy as np
+    >>> import udd
+    >>> starts = np.random.default_rng(1).normal(size=(10_000, 3))
+    >>> end = udd.ensemble(udd.DLE(1.0), 50.0, starts, rtol=1e-6).end
+    >>> bool(abs((end[:, 0] ** 2).mean() - 1.0) < 0.03)
+    True
+    """
+    rtol, atol = tolerances(rtol, atol)
+    times = array("t", t)
+    if times.ndim == 0:
+        times = np.array([0.0, number("t", float(times), least=0.0)])
+        wanted = slice(1, 2)
+        if times[1] == 0.0:
+            times = times[:1]
+            wanted = slice(0, 1)
+    elif times.ndim == 1 and times.size:
+        wanted = slice(None)
+    else:
+        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
+    if not (np.diff(times) > 0).all():
+        raise ModelError("the times must increase, without duplicates")
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    given = dict(parameters or {})
+    for name in given:
+        if name not in model.parameters:
+            raise ModelError(
+                f"{type(model).__name__} has no parameter {name!r}; it has {', '.join(model.parameters)}"
+            )
+    shape, rows, starts = orbits_of(model, given, state0)
+    runs = max(len(rows), len(starts))
+    stepper = method_for(model, method, rtol)
+    with bar(runs, "run", progress) as since:
+        found = _core.ensemble(
+            model, rows, starts, times, rtol, atol, stepper, thread_count(threads), since(0)
+        )
+    names = np.array(OUTCOMES)[found["outcome"]]
+    stopped = int((names == "interrupted").sum())
+    if stopped:
+        message = f"{stopped} of {runs} runs were interrupted and are NaN"
+        warnings.warn(IncompleteWarning(message, interrupted=True), stacklevel=2)
+    states = found["states"][:, wanted]
+    return Ensemble(
+        times[wanted],
+        states.reshape(*shape, *states.shape[1:]),
+        names.reshape(shape),
+        found["end"].reshape(*shape, -1),
+        found["t_end"].reshape(shape),
+        model,
+    )

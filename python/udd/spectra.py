@@ -1,0 +1,391 @@
+"""The Lyapunov spectrum: all exponents, what they say of the motion, and the vectors that belong to them."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._validate import number
+from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError, ModelError
+from udd.exponents import default_start, span
+from udd.models import DLE, Disk, Model
+from udd.outcomes import FINISHED, OUTCOMES
+from udd.trajectory import initial_state, tolerances
+
+__all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
+
+_Floats = NDArray[np.float64]
+
+_SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_POINTS = 600  # section points in which a periodic motion shows itself
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """The Lyapunov exponents of an orbit.
+
+    Attributes
+    ----------
+    exponents : ndarray, shape (dim,)
+        Largest first, per unit of time (1/s for a model with units); -inf where a contact sticks.
+    standard_errors : ndarray, shape (dim,)
+        From the scatter of the means over blocks of the run.
+    dimension : float
+        The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero.
+    verdict : {"chaos", "periodic orbit", "equilibrium", "undecided"}
+        What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which comes
+        back or rests; chaos by a largest exponent at least four standard errors above zero.
+    period : float
+        The period of a periodic orbit, else NaN.
+    invariants : dict of str to float
+        What must vanish on every bounded orbit, such as ``"<z>"`` or the sum of the exponents less the mean
+        divergence: how far the run is from it. Averages of chaotic motion scatter like the exponents do.
+    t : float
+        The time that the averages cover, after the transient.
+    end : ndarray, shape (dim,)
+        The last state.
+    converged : bool
+        Whether the largest exponent's standard error met the tolerance.
+    model : Model
+        What was run.
+    """
+
+    exponents: _Floats
+    standard_errors: _Floats
+    dimension: float
+    verdict: str
+    period: float
+    invariants: dict[str, float]
+    t: float
+    end: _Floats
+    converged: bool
+    model: Model
+
+    def __repr__(self) -> str:
+        pairs = zip(self.exponents, self.standard_errors, strict=True)
+        values = ", ".join(f"{value:.5g}({error:.1g})" for value, error in pairs)
+        return f"<Spectrum of {self.model!r}: {values}; {self.verdict}, dimension {self.dimension:.4g}>"
+
+
+def lyapunov_spectrum(
+    w: float | Model,
+    *,
+    t: float | None = None,
+    tol: float | None = None,
+    transient: float | None = None,
+    state0: ArrayLike | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+) -> Spectrum:
+    """All Lyapunov exponents of an orbit, and a verdict on its motion.
+
+    Parameters
+    ----------
+    w : float or Model
+        Drive of the undamped diffusionless Lorenz equations, or any model.
+    t : float, optional
+        Time to run at most; by default 2e5, or 5e4 s for a model with units.
+    tol : float, optional
+        The run ends once the standard error of the largest exponent is down to this; by default 1e-3 per
+        unit of time, or 4e-3 /s.
+    transient : float, optional
+        Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
+        Should the first half of what follows disagree with the second, it is left out too.
+    state0 : array_like, shape (dim,), optional
+        Initial state. Where several attractors coexist it decides between them.
+    rtol, atol : float
+        Tolerances of the run.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    ModelError
+        A drive or an option that cannot be used.
+    IntegrationError
+        The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up.
+
+    Warns
+    -----
+    ConvergenceWarning
+        Where the standard error does not meet `tol` after the time `t`.
+
+    Notes
+    -----
+    Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
+    (G. Benettin et al., Meccanica 15 (1980) 9). Where the run ended on a periodic orbit or at rest, but the
+    exponents still remember a chaotic transient, they are taken again from there. Transients longer than `t`
+    are not seen as such: near w = 4.5 a mean 8200, and 27000 at B = 0.2, w = 3.7.
+
+    Examples
+    --------
+    >>> import udd
+    >>> found = udd.lyapunov_spectrum(1.0, tol=5e-3)
+    >>> found.verdict, round(found.exponents.sum(), 6)
+    ('chaos', -1.0)
+    >>> udd.lyapunov_spectrum(10.0).verdict
+    'periodic orbit'
+    """
+    model = w if isinstance(w, Model) else DLE(number("w", w, least=0.0))
+    slow = 1.0 if isinstance(model, DLE) else 0.25  # the disk's unit of time is 0.27 s
+    time, skipped = span(t, transient, longest=2e5 * slow, skip=400.0 * slow)
+    goal = number("tol", 1e-3 / slow if tol is None else tol, above=0.0)
+    rtol, atol = tolerances(rtol, atol)
+    start = initial_state(model, default_start(model) if state0 is None else state0)
+
+    run = _Run(model, rtol, atol)
+    found = run(start, time, skipped, goal)
+    rest, period = run.settled(found["end"][0])
+    spent, finer = float(found["time"][0]), goal
+    while not (rest or np.isfinite(period) or _positive(found)) and spent < time:
+        # Neither order nor chaos yet: on from here, for longer.
+        finer /= 2.0
+        found = run(found["end"][0], time - spent, 0.0, finer)
+        rest, period = run.settled(found["end"][0])
+        spent += float(found["time"][0])
+    ordered = rest or bool(np.isfinite(period))
+    if ordered and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
+        found = run(found["end"][0], time, 0.0, goal)
+    values, errors = found["value"][0], found["standard_error"][0]
+    converged = bool(errors[0] <= goal)
+    if not converged:
+        warnings.warn(
+            f"the largest exponent has a standard error of {errors[0]:.2g}, above tol = {goal:g}; "
+            f"a longer t (now {time:g}) would help",
+            ConvergenceWarning,
+            stacklevel=2,
+        )
+    if rest:
+        verdict = "equilibrium"
+    elif ordered:
+        verdict = "periodic orbit"
+    else:
+        verdict = "chaos" if _positive(found) else "undecided"
+    order = np.argsort(-values, kind="stable")
+    values, errors = values[order], errors[order]
+    # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
+    dimension = {"equilibrium": 0.0, "periodic orbit": 1.0}.get(verdict) or kaplan_yorke(values)
+    return Spectrum(
+        values,
+        errors,
+        0.0 if rest else dimension,
+        verdict,
+        period,
+        _invariants(model, values, found["mean"][0], found["product"][0]),
+        float(found["time"][0]),
+        found["end"][0],
+        converged,
+        model,
+    )
+
+
+def _positive(found: _core._Orbits) -> bool:
+    """Whether neighbouring orbits part."""
+    return bool(found["value"][0, 0] > _SIGMAS * found["standard_error"][0, 0])
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One orbit's exponents and fate."""
+
+    model: Model
+    rtol: float
+    atol: float
+
+    def __call__(self, start: _Floats, time: float, skipped: float, goal: float) -> _core._Orbits:
+        row = np.array([list(self.model.parameters.values())])
+        found = _core.lyapunov(
+            self.model, row, start[None, :], True, time, skipped, goal, self.rtol, self.atol, 1, None
+        )
+        outcome = int(found["outcome"][0])
+        if outcome != FINISHED:
+            reasons = {
+                "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
+                "failed": "the solution blew up",
+            }
+            raise IntegrationError(
+                f"there is no spectrum: {reasons.get(OUTCOMES[outcome], OUTCOMES[outcome])}"
+            )
+        return found
+
+    def settled(self, end: _Floats) -> tuple[bool, float]:
+        """Whether the orbit rests from here on, and its period where it has one, else NaN."""
+        from udd.branching.coordinates import coordinates_of
+        from udd.branching.recurrence import periods, tightness
+        from udd.sections import poincare
+
+        tight = tightness(self.rtol)
+        coordinates = coordinates_of(self.model, end[None])
+        if coordinates.speed(self.model, end[None])[0] < tight.settled:
+            return True, np.nan
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IncompleteWarning)
+            points = poincare(
+                self.model, n=_POINTS, state0=end, transient=0, rtol=self.rtol, atol=self.atol, threads=1
+            )
+        if points.outcome != "finished":
+            return False, np.nan
+        period = int(periods(coordinates(points.state)[None], tight)[0])
+        return False, float(points.t[-1] - points.t[-1 - period]) if period > 0 else np.nan
+
+
+def kaplan_yorke(exponents: ArrayLike) -> float:
+    """The Kaplan-Yorke dimension of exponents in falling order.
+
+    Parameters
+    ----------
+    exponents : array_like, shape (dim,)
+
+    Returns
+    -------
+    float
+        The number k of leading exponents whose sum is not negative, and the part of the next one that brings
+        it to zero: ``k + sum / |next|`` (J. L. Kaplan and J. A. Yorke, Lecture Notes in Mathematics 730
+        (1979) 204).
+
+    Examples
+    --------
+    >>> from udd.spectra import kaplan_yorke
+    >>> round(kaplan_yorke([0.21016, 0.0, -1.21016]), 5)
+    2.17366
+    """
+    values = np.asarray(exponents, dtype=np.float64)
+    sums = np.cumsum(values)
+    leading = int(np.argmax(sums < 0.0)) if (sums < 0.0).any() else len(values)
+    if leading in (0, len(values)):
+        return float(leading)
+    return float(leading + sums[leading - 1] / abs(values[leading]))
+
+
+def _invariants(model: Model, exponents: _Floats, mean: _Floats, product: _Floats) -> dict[str, float]:
+    """How far exact averages are from what they must be.
+
+    They follow from the rates of functions of the state, which average to zero on bounded orbits.
+    """
+    p = model.parameters
+    if isinstance(model, DLE):
+        w, B = p["w"], p["B"]
+        z, zz = mean[2], product[2, 2]
+        return {
+            "sum of exponents + 1 + B w": float(exponents.sum() + 1.0 + B * w),
+            "<omega y> - w (1 - B <z>)": float(product[0, 1] - w * (1.0 - B * z)),
+            "<omega^2> - <omega y>": float(product[0, 0] - product[0, 1]),
+            "<omega z>": float(product[0, 2]),
+            "<z> - B <z^2>": float(z - B * zz),
+        }
+    if isinstance(model, Disk) and not model.effects:
+        return {"<Y Omega> - W": float(product[1, 0] - p["W"]), "<Z Omega>": float(product[2, 0])}
+    return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Covariant:
+    """The covariant Lyapunov vectors along an orbit, and the exponents of finite times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n + 1,)
+        Times.
+    state : ndarray, shape (n + 1, dim)
+        States.
+    vectors : ndarray, shape (n + 1, dim, dim)
+        ``vectors[k, i]`` is the unit vector i at time k: it grows at the rate of exponent i, forwards and
+        backwards in time.
+    local_exponents : ndarray, shape (n, dim)
+        The mean growth rates of the orthonormal frame in each interval: the exponents of finite time,
+        whose mean over all intervals is the spectrum.
+    """
+
+    t: _Floats
+    state: _Floats
+    vectors: _Floats
+    local_exponents: _Floats
+
+    @property
+    def angles(self) -> _Floats:
+        """The angles in rad between the first vector and the others, shape (n + 1, dim - 1)."""
+        along = np.einsum("kn,kin->ki", self.vectors[:, 0], self.vectors[:, 1:])
+        angles: _Floats = np.arccos(np.clip(np.abs(along), 0.0, 1.0))
+        return angles
+
+
+def covariant_vectors(
+    model: Model,
+    n: int = 1000,
+    *,
+    dt: float | None = None,
+    state0: ArrayLike | None = None,
+    transient: float | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+) -> Covariant:
+    """Covariant Lyapunov vectors and finite-time exponents along an orbit.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+    n : int
+        How many intervals are wanted.
+    dt : float, optional
+        Their length, by default 0.5, or 0.125 s.
+    state0 : array_like, shape (dim,), optional
+        Initial state.
+    transient : float, optional
+        Time run before the first and after the last interval, in which the frame and the vectors converge, by
+        default 200, or 50 s.
+    rtol, atol : float
+        Tolerances of the run.
+
+    Returns
+    -------
+    Covariant
+
+    Raises
+    ------
+    ModelError
+        Options that cannot be used.
+    IntegrationError
+        The disk leaves the wheels, the solution blows up, or a direction dies out where a contact sticks.
+
+    Notes
+    -----
+    The method is that of F. Ginelli et al., Physical Review Letters 99 (2007) 130601: forwards the frame is
+    made orthonormal after each interval, backwards vectors inside it converge to the covariant ones.
+
+    Examples
+    --------
+    The vector of the zero exponent is the direction of the flow:
+
+    >>> import numpy as np
+    >>> import udd
+    >>> found = udd.covariant_vectors(udd.DLE(1.0), 100)
+    >>> flow = udd.DLE(1.0).rates(found.t, found.state)
+    >>> flow /= np.linalg.norm(flow, axis=1, keepdims=True)
+    >>> bool(abs(np.einsum("kn,kn->k", flow, found.vectors[:, 1])).min() > 1 - 1e-6)
+    True
+    """
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise ModelError(f"n must be a whole number of at least 1, not {n!r}")
+    slow = 1.0 if isinstance(model, DLE) else 0.25
+    step = number("dt", 0.5 * slow if dt is None else dt, above=0.0)
+    aside = number("transient", 200.0 * slow if transient is None else transient, least=0.0)
+    rtol, atol = tolerances(rtol, atol)
+    start = initial_state(model, default_start(model) if state0 is None else state0)
+    extra = int(np.ceil(aside / step))
+    found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol)
+    kept = slice(extra, extra + n + 1)
+    return Covariant(
+        np.arange(extra, extra + n + 1) * step,
+        found["states"][kept],
+        found["covariant"][kept],
+        found["growth"][extra : extra + n] / step,
+    )

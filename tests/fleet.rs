@@ -1,0 +1,133 @@
+//! Many runs: the same bits however they are spread, and the right numbers.
+
+use std::sync::atomic::AtomicUsize;
+
+use udd::integrate::Tolerance;
+use udd::model::effects::Kind;
+use udd::model::{DiskFamily, DleFamily, Effect, Family};
+use udd::run::{Crew, Ensemble, Lyapunov, LyapunovOptions, Stepper, Stop};
+use udd::scalar::Isa;
+
+const TOLERANCE: Tolerance = Tolerance { rtol: 1e-9, atol: 1e-12 };
+
+/// Does work on every kind of crew.
+fn on_each<T>(mut work: impl FnMut(Crew<'_>) -> T) -> Vec<(String, T)> {
+    let stop = Stop::new();
+    let mut all = Vec::new();
+    for isa in Isa::available() {
+        for threads in [1, 2, 3] {
+            let done = AtomicUsize::new(0);
+            let result = work(Crew { threads, isa, done: &done, stop: &stop });
+            all.push((format!("{isa:?}, {threads} threads"), result));
+        }
+    }
+    all
+}
+
+fn starts(n: usize) -> Vec<[f64; 3]> {
+    let part = |i: usize, by: f64| 4.0 * (i as f64 * by).fract() - 2.0;
+    (0..n).map(|i| [part(i, 0.618), part(i, 0.414), part(i, 0.732)]).collect()
+}
+
+#[test]
+fn an_ensemble_has_the_same_bits_everywhere() {
+    let starts = starts(37);
+    for values in [vec![vec![1.0, 0.0]], (0..37).map(|i| vec![0.5 + 0.1 * f64::from(i), 0.1]).collect()] {
+        for stepper in [Stepper::Taylor, Stepper::Dopri5] {
+            let times = [0.0, 1.0, 7.5, 60.0];
+            let ensemble = Ensemble {
+                family: &DleFamily,
+                values: &values,
+                starts: &starts,
+                times: &times,
+                tolerance: TOLERANCE,
+                stepper,
+            };
+            let bits = |crew: Crew<'_>| -> Vec<u64> {
+                let all = ensemble.run(crew).into_iter().flatten();
+                all.flat_map(|run| run.states).flatten().map(f64::to_bits).collect()
+            };
+            let found = on_each(bits);
+            assert_eq!(found[0].1.len(), 37 * 4 * 3);
+            for (crew, bits) in &found {
+                assert!(*bits == found[0].1, "{stepper:?}, {crew}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_disks_ensemble_has_the_same_bits_everywhere() {
+    let family = DiskFamily { effects: vec![Effect::new(Kind::QuadraticDrag)], edge: true };
+    let mut values: Vec<f64> = vec![0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
+    values.resize(family.parameters().len(), 1e-4);
+    let starts: Vec<[f64; 4]> = (0..11).map(|i| [3.0 + 0.1 * f64::from(i), 0.005, 0.0, 0.0]).collect();
+    for stepper in [Stepper::Taylor, Stepper::Dopri5] {
+        let ensemble = Ensemble {
+            family: &family,
+            values: &[values.clone()],
+            starts: &starts,
+            times: &[0.0, 5.0],
+            tolerance: TOLERANCE,
+            stepper,
+        };
+        let bits = |crew: Crew<'_>| -> Vec<u64> {
+            let all = ensemble.run(crew).into_iter().flatten();
+            all.flat_map(|run| [run.t.to_bits()].into_iter().chain(run.x.map(f64::to_bits))).collect()
+        };
+        let found = on_each(bits);
+        for (crew, bits) in &found {
+            assert!(*bits == found[0].1, "{stepper:?}, {crew}");
+        }
+    }
+}
+
+/// Exponents of drives from order to chaos, one and all of them.
+#[test]
+fn exponents_have_the_same_bits_everywhere() {
+    let values: Vec<Vec<f64>> = (0..21).map(|i| vec![0.25 + 0.4 * f64::from(i), 0.0]).collect();
+    let options = LyapunovOptions { time: 150.0, transient: 20.0, goal: 0.02, tolerance: TOLERANCE };
+    let orbits =
+        Lyapunov { family: &DleFamily, values: &values, starts: &[[1.0, 1.0, 0.01]], options };
+    let one = |crew: Crew<'_>| -> Vec<u64> {
+        let all = orbits.run::<1>(crew).into_iter().flatten();
+        all.flat_map(|e| [e.exponents.value[0], e.exponents.standard_error[0], e.t]).map(f64::to_bits).collect()
+    };
+    let three = |crew: Crew<'_>| -> Vec<u64> {
+        let all = orbits.run::<3>(crew).into_iter().flatten();
+        all.flat_map(|e| e.exponents.value.into_iter().chain(e.moments.second.into_iter().flatten()))
+            .map(f64::to_bits)
+            .collect()
+    };
+    let (ones, threes) = (on_each(one), on_each(three));
+    assert_eq!((ones[0].1.len(), threes[0].1.len()), (21 * 3, 21 * 12));
+    for (crew, bits) in ones.iter().chain(&threes) {
+        let expected = if bits.len() == 63 { &ones[0].1 } else { &threes[0].1 };
+        assert!(bits == expected, "{crew}");
+    }
+}
+
+/// Digits on which independent integrators agree, by each method in packets.
+#[test]
+fn reference_states() {
+    let starts = [[1.0, 1.0, 0.01]; 9];
+    let (expected, stop) = ([0.32011311025, -0.38840279112, -0.23230343728], Stop::new());
+    for stepper in [Stepper::Taylor, Stepper::Dopri5] {
+        let ensemble = Ensemble {
+            family: &DleFamily,
+            values: &[vec![1.0, 0.0]],
+            starts: &starts,
+            times: &[0.0, 10.0, 30.0],
+            tolerance: Tolerance { rtol: 1e-13, atol: 1e-16 },
+            stepper,
+        };
+        let done = AtomicUsize::new(0);
+        let crew = Crew { threads: 1, isa: Isa::best(), done: &done, stop: &stop };
+        for run in ensemble.run(crew).into_iter().flatten() {
+            for n in 0..3 {
+                // The last digit given, and rounding grown by e^(0.21 * 30) = 550.
+                assert!((run.states[2][n] - expected[n]).abs() < 2e-11, "{stepper:?} {:?}", run.states[2]);
+            }
+        }
+    }
+}
