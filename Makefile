@@ -22,10 +22,10 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean bench-peers
+.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 install: .venv/.udd ## make .venv from the lock file and install the release build into it
 
@@ -60,6 +60,16 @@ format: .venv/.deps ## format the Rust and the Python code
 
 dist: .venv/.deps ## build the wheel and the source distribution into dist/
 	$(BIN)/maturin build --release --locked --strip --sdist --out dist
+
+bench: ## time the core's hot paths (ARGS="section --quick" for some of them, in short)
+	cargo bench --locked --bench paths -- $(ARGS)
+
+bench-count: .venv/.made ## count their instructions; fails where one takes over 3 % more than committed (ARGS=--update to refresh)
+	$(PY) benches/count.py $(ARGS)
+
+bench-startup: .venv/.udd ## what importing udd takes in seconds, and a long sweep in memory
+	$(PY) benches/python/startup.py
+	$(PY) benches/python/memory.py
 
 bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)
 	cd benches/python && PYTHONPATH=. $(CURDIR)/$(PEERS)/python -m peers $(ARGS)

@@ -1,0 +1,198 @@
+//! The core's hot paths: timed by criterion, or run once for `count.py` to count their instructions.
+
+use std::hint::black_box;
+use std::sync::atomic::AtomicUsize;
+
+use criterion::{Criterion, Throughput};
+use nalgebra::{SMatrix, SVector};
+use rayon::ThreadPoolBuilder;
+use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role};
+use udd::integrate::{Dopri5, Tolerance, propagate};
+use udd::model::effects::{Effect, Kind};
+use udd::model::{DiskFamily, DleFamily, Family};
+use udd::run::{
+    Crew, Ensemble, Lyapunov, LyapunovOptions, Output, Section, Sections, Stepper, Stop, trajectory,
+};
+use udd::scalar::Isa;
+use udd::tape::{Expression, Names};
+
+/// One piece of work, always the same, on one thread.
+struct Path {
+    name: &'static str,
+    /// How much it is, in time units, points or frames.
+    units: u64,
+    work: Box<dyn Fn(Isa)>,
+}
+
+const START: [f64; 3] = [1.0, 1.0, 0.01];
+const TIGHT: f64 = 1e-9;
+const LOOSE: f64 = 1e-6;
+
+fn tolerance(rtol: f64) -> Tolerance {
+    Tolerance { rtol, atol: 1e-3 * rtol }
+}
+
+fn with_crew<T>(isa: Isa, work: impl FnOnce(Crew<'_>) -> T) {
+    let (done, stop) = (AtomicUsize::new(0), Stop::new());
+    black_box(work(Crew { threads: 1, isa, done: &done, stop: &stop }));
+}
+
+/// Spread over the cube of side 4 around the origin.
+fn starts(n: u32) -> Vec<[f64; 3]> {
+    let spread = |i: u32, by: f64| 4.0 * (f64::from(i) * by).fract() - 2.0;
+    (0..n).map(|i| [spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051)]).collect()
+}
+
+fn drives(n: u32) -> Vec<Vec<f64>> {
+    (0..n).map(|i| vec![0.05 + 9.95 * f64::from(i) / f64::from(n), 0.0]).collect()
+}
+
+fn ensemble(name: &'static str, stepper: Stepper, rtol: f64, starts: Vec<[f64; 3]>, end: u32) -> Path {
+    let units = u64::from(end) * starts.len() as u64;
+    let work = move |isa| {
+        let times = [0.0, f64::from(end)];
+        let values = [vec![1.0, 0.0]];
+        let tolerance = tolerance(rtol);
+        let (family, starts) = (&DleFamily, &starts[..]);
+        with_crew(isa, |crew| {
+            Ensemble { family, values: &values, starts, times: &times, tolerance, stepper }.run(crew)
+        });
+    };
+    Path { name, units, work: Box::new(work) }
+}
+
+fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>>, end: u32) -> Path {
+    let units = u64::from(end) * values.len() as u64;
+    let time = f64::from(end);
+    let options = LyapunovOptions { time, transient: 0.1 * time, goal: 0.0, tolerance: tolerance(rtol) };
+    let work = move |isa| {
+        let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[START], options };
+        with_crew(isa, |crew| orbits.run::<N>(crew));
+    };
+    Path { name, units, work: Box::new(work) }
+}
+
+fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
+    let units = (count * values.len()) as u64;
+    let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+    let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "B"]));
+    let function = Expression::parse("z", Names { states: &states, parameters: &parameters }).unwrap();
+    let surface = [Section { function, rising: true, falling: false }];
+    let work = move |isa| {
+        let wanted = Sections {
+            family: &DleFamily,
+            values: &values,
+            starts: &[START],
+            sections: &surface,
+            skip: 20,
+            count,
+            end: 1e6,
+            bounded: [true; 3],
+            tolerance: tolerance(TIGHT),
+        };
+        with_crew(isa, |crew| wanted.run(crew));
+    };
+    Path { name, units, work: Box::new(work) }
+}
+
+const DISK: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
+
+fn disk(name: &'static str, effects: &[(Kind, &[f64])], end: u32) -> Path {
+    let values: Vec<f64> = DISK.iter().chain(effects.iter().flat_map(|(_, own)| *own)).copied().collect();
+    let effects = effects.iter().map(|&(kind, _)| Effect::new(kind)).collect();
+    let system = DiskFamily { effects, edge: true }.build::<f64>(&values);
+    let work = move |_| {
+        let times: Vec<f64> = (0..=25 * end).map(|i| 0.04 * f64::from(i)).collect();
+        let (x0, tolerance) = ([1.0, 0.01, -0.02, 0.3], tolerance(TIGHT));
+        let (method, output) = (Dopri5::default(), Output::At(&times));
+        black_box(trajectory(&system, method, output, x0, &tolerance, false, &Stop::new()).unwrap());
+    };
+    Path { name, units: u64::from(end), work: Box::new(work) }
+}
+
+/// The drive and two constants of friction from a noise-free film, begun 5 % off.
+fn fit(name: &'static str, frames: usize) -> Path {
+    let family = DiskFamily { effects: vec![], edge: false };
+    let (system, tight) = (family.build::<f64>(&DISK), tolerance(1e-10));
+    let mut states = vec![[1.0, 0.01, -0.02, 0.3]];
+    for i in 1..frames {
+        states.push(propagate(&system, 0.0, 0.04, states[i - 1], &tight).unwrap());
+    }
+    let record = Record {
+        t: (0..frames).map(|i| 0.04 * i as f64).collect(),
+        seen: states.iter().map(|x| SVector::from([x[1], x[2], x[3]])).collect(),
+        information: vec![SMatrix::from_diagonal(&SVector::from([4e6, 4e6, 1e4])); frames],
+        linked: vec![true; frames - 1],
+    };
+    let mut model = DISK.to_vec();
+    let free = [0, 3, 4].map(|j| {
+        model[j] *= 1.05;
+        Free { role: Role::Model(j), mean: DISK[j], sd: f64::INFINITY }
+    });
+    let estimator = Estimator {
+        family,
+        sensor: DiskCamera,
+        record,
+        free: free.to_vec(),
+        diffusion: [3e-3, 1e-5, 1e-5, 1e-4].map(|q: f64| q / 0.2),
+        tolerance: tolerance(1e-8),
+    };
+    let work = move |_| {
+        let start = Point { states: states.clone(), model: model.clone(), camera: vec![0.0; 8], clock: 0.0 };
+        black_box(estimator.solve(start, &Options::default(), &Stop::new()).unwrap());
+    };
+    Path { name, units: frames as u64, work: Box::new(work) }
+}
+
+fn paths() -> Vec<Path> {
+    let one = || vec![vec![1.0, 0.0]];
+    vec![
+        ensemble("trajectory", Stepper::Taylor, TIGHT, vec![START], 10_000),
+        ensemble("trajectory by dopri5", Stepper::Dopri5, LOOSE, vec![START], 2_000),
+        ensemble("starts", Stepper::Taylor, LOOSE, starts(400), 100),
+        ensemble("starts by dopri5", Stepper::Dopri5, LOOSE, starts(400), 100),
+        exponents::<1>("exponents", LOOSE, drives(64), 500),
+        exponents::<3>("spectrum", TIGHT, one(), 2_000),
+        exponents::<3>("spectra", TIGHT, drives(64), 100),
+        sections("section", one(), 1_000),
+        sections("sections", drives(64), 100),
+        disk("disk", &[], 500),
+        disk("disk with effects", &[(Kind::QuadraticDrag, &[1e-4]), (Kind::Relaxation, &[1.0])], 50),
+        fit("fit", 100),
+    ]
+}
+
+/// What callgrind is told to count.
+#[inline(never)]
+fn counted(work: &dyn Fn(Isa)) {
+    work(Isa::Avx2);
+}
+
+fn speed() {
+    let mut criterion = Criterion::default().sample_size(20).without_plots().configure_from_args();
+    let mut group = criterion.benchmark_group("paths");
+    for Path { name, units, work } in paths() {
+        group.throughput(Throughput::Elements(units));
+        group.bench_function(name, |bencher| bencher.iter(|| work(Isa::best())));
+    }
+    group.finish();
+}
+
+fn main() {
+    // Also for work that takes all cores by itself: what other threads do is not counted.
+    let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    alone.build_global().expect("the first pool");
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match &arguments[..] {
+        // Without a name: the names. Valgrind knows no AVX-512.
+        [mode] if mode == "--count" && Isa::available().contains(&Isa::Avx2) => {
+            paths().iter().for_each(|path| println!("{}", path.name));
+        }
+        [mode] if mode == "--count" => {}
+        [mode, name] if mode == "--count" => {
+            let path = paths().into_iter().find(|path| path.name == name).expect("no such path");
+            counted(&path.work);
+        }
+        _ => speed(),
+    }
+}
