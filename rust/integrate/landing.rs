@@ -84,6 +84,7 @@ where
             Found { crossing: [never; TARGETS], stale: [never; TARGETS], dt: infinite, high: infinite, zero };
         let mut earliest = infinite;
         let mut stale = never;
+        let probes = method.probes(h);
         for target in self.targets() {
             let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
@@ -92,7 +93,8 @@ where
             let (mut wrong, mut early) = (never, never);
             for (i, &theta) in K::PROBES.iter().enumerate() {
                 let dt = h.scale(theta);
-                let value = on(dt);
+                let x = vector!(S, D; n => S::lift(probes[i][n]));
+                let value = self.value(target, self.at.t + dt, &x);
                 scale = scale.max(value.abs());
                 let new = value.less(zero).and(wrong.not());
                 high = pick(new, (dt, value), high);

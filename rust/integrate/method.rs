@@ -5,6 +5,9 @@ use crate::model::{Sides, System};
 use crate::scalar::Scalar;
 use crate::unroll::vector;
 
+/// No method looks at more places within a step.
+pub const MOST_PROBES: usize = 8;
+
 /// Where a run stands, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<S: Scalar, const D: usize> {
@@ -65,6 +68,16 @@ pub trait Method<S: Scalar, const D: usize> {
     fn real_at(&self, dt: S::Real) -> [S::Real; D] {
         let x = self.at(dt);
         vector!(S::Real, D; n => x[n].real())
+    }
+
+    /// The states at the method's [places](Method::PROBES) in the last trial, of size `h`, without derivatives.
+    #[inline(always)]
+    fn probes(&self, h: S::Real) -> [[S::Real; D]; MOST_PROBES] {
+        let mut states = [[S::Real::zero(); D]; MOST_PROBES];
+        for (state, &theta) in states.iter_mut().zip(Self::PROBES) {
+            *state = self.real_at(h.scale(theta));
+        }
+        states
     }
 
     /// The coefficients of one component's polynomial over the time since the step's start, lowest first,

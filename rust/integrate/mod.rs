@@ -18,7 +18,7 @@ mod tolerance;
 
 pub use driver::{Counts, Driver, Ending, Progress};
 pub use landing::{TARGETS, WALL};
-pub use method::{Method, Point, Trial};
+pub use method::{MOST_PROBES, Method, Point, Trial};
 pub use propagate::{propagate, propagate_from};
 pub use runge_kutta::{Dopri5, RungeKutta, step};
 pub use saltation::pass;

@@ -1,6 +1,6 @@
 //! The Taylor method.
 
-use super::method::{Method, Point, Trial};
+use super::method::{MOST_PROBES, Method, Point, Trial};
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
 use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
@@ -95,6 +95,11 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 
     fn real_at(&self, dt: S::Real) -> [S::Real; D] {
         self.jets.real_at(dt)
+    }
+
+    fn probes(&self, h: S::Real) -> [[S::Real; D]; MOST_PROBES] {
+        const { assert!(MOST_PROBES == Self::PROBES.len()) };
+        self.jets.real_at_parts(h, Self::PROBES)
     }
 
     #[inline(always)]

@@ -1,11 +1,11 @@
 //! Crossings of surfaces within a step.
 
-use super::polynomial::{MOST_PROBES, Polynomials, Room, Scanned};
+use super::polynomial::{Polynomials, Room, Scanned};
 use super::section::Section;
 use super::ship::Ship;
 use super::signs::{Side, Stretch, judge, leave_out};
 use crate::integrate::root::bracketed;
-use crate::integrate::{ErrorNorm, Method};
+use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
 use crate::scalar::{Isa, Mask, Real};
 use crate::tape::{Binary, Expression, Leaf, Op, Place};
@@ -162,6 +162,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
     }
 
     /// Looks at the last step, in the lanes that moved. Returns whether there is any crossing.
+    #[inline(always)]
     pub fn look<F, E, K>(&mut self, ship: &Ship<'_, F, R, D, E, K>, moved: R::Mask) -> bool
     where
         F: Family<D>,
@@ -218,6 +219,7 @@ impl<R: Real> Surface<'_, R> {
     }
 
     /// Its value within the step.
+    #[inline(always)]
     fn inside<M: System<R, D>, const D: usize>(
         &mut self,
         law: &Law<'_, M, R>,
@@ -228,6 +230,7 @@ impl<R: Real> Surface<'_, R> {
     }
 
     /// Looks where the function changes its sign: after which of the method's places before.
+    #[inline(always)]
     fn signs<M: System<R, D>, const D: usize>(
         &mut self,
         law: &Law<'_, M, R>,
@@ -259,6 +262,7 @@ impl<R: Real> Surface<'_, R> {
     }
 
     /// Finds the crossings in the stretches that have one.
+    #[inline(always)]
     fn find<M: System<R, D>, const D: usize>(
         &mut self,
         law: &Law<'_, M, R>,

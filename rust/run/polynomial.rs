@@ -1,12 +1,9 @@
 //! The polynomials of a step, looked at with the best instructions that there are.
 
 use super::signs::{Side, Stretch, judge};
-use crate::integrate::Method;
+use crate::integrate::{MOST_PROBES, Method};
 use crate::model::choose;
 use crate::scalar::{Instructions, Isa, Mask, Packet, Real, Work};
-
-/// No method looks at more places within a step.
-pub const MOST_PROBES: usize = 8;
 
 /// The polynomials of a step, one for each component of the state, in their own unit of time.
 pub struct Polynomials<'a, R: Real, const D: usize> {
@@ -79,10 +76,10 @@ fn value<R: Real, P: Real>(c: &[R], s: P, lift: impl Fn(R) -> P) -> P {
         odd = lift(*last);
     }
     for pair in pairs.iter().rev() {
-        odd = odd * square + lift(pair[0]);
-        even = even * square + lift(pair[1]);
+        odd = lift(pair[0]).fused(odd, square);
+        even = lift(pair[1]).fused(even, square);
     }
-    lift(c[0]) + (odd + even * s) * s
+    lift(c[0]).fused(odd.fused(even, s), s)
 }
 
 struct At<'a, R> {
@@ -200,11 +197,11 @@ fn value_and_slope<R: Real>(c: &[R], s: R) -> (R, R) {
         (odd, odd_slope) = (*last, last.scale(k + 1.0));
     }
     for pair in pairs.iter().rev() {
-        odd = odd * square + pair[0];
-        even = even * square + pair[1];
-        odd_slope = odd_slope * square + pair[0].scale(k - 1.0);
-        even_slope = even_slope * square + pair[1].scale(k);
+        odd = pair[0].fused(odd, square);
+        even = pair[1].fused(even, square);
+        odd_slope = pair[0].scale(k - 1.0).fused(odd_slope, square);
+        even_slope = pair[1].scale(k).fused(even_slope, square);
         k -= 2.0;
     }
-    (c[0] + (odd + even * s) * s, odd_slope + even_slope * s)
+    (c[0].fused(odd.fused(even, s), s), odd_slope.fused(even_slope, s))
 }

@@ -3,7 +3,7 @@
 use super::Jets;
 use crate::integrate::ErrorNorm;
 use crate::scalar::elementary::exp2_rough;
-use crate::scalar::{Instructions, Real, Scalar, Work};
+use crate::scalar::{Instructions, Packet, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
@@ -17,6 +17,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(self.isa(), RealValue(self, dt))
     }
 
+    /// The same at these parts of a distance.
+    pub fn real_at_parts<const P: usize>(&self, dt: S::Real, parts: &[f64]) -> [[S::Real; D]; P] {
+        S::Real::work(self.isa(), Parts::<S, D, N, P>(self, dt, parts))
+    }
+
     /// The rates of the polynomial at a distance `dt`, without derivatives.
     pub fn real_slope(&self, dt: S::Real) -> [S::Real; D] {
         vector!(S::Real, D; n => {
@@ -24,6 +29,28 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             let terms = (1..=self.order()).rev();
             terms.fold(S::Real::zero(), |sum, k| sum * dt + c[k].real().scale(k as f64))
         })
+    }
+
+    /// A component's value at `dt`, by the operations of [`at`](Jets::at); `lift` makes coefficients as wide.
+    #[inline(always)]
+    fn real_value<P: Real>(&self, n: usize, dt: P, lift: impl Fn(S::Real) -> P) -> P {
+        let order = self.order().min(N - 1);
+        let c = |k: usize| lift(self.coefficients()[n][k].real());
+        let dt2 = dt * dt;
+        let dt4 = dt2 * dt2;
+        let rounds = order.div_ceil(4) - 1;
+        let mut sums = [P::zero(); 4];
+        unroll!(r in 0..4 => {
+            let k = 4 * rounds + 1 + r;
+            if k <= order {
+                sums[r] = c(k);
+            }
+        });
+        for round in (0..rounds).rev() {
+            unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused(sums[r], dt4); });
+        }
+        let (low, high) = (sums[0].fused(sums[1], dt), sums[2].fused(sums[3], dt));
+        c(0).fused(low.fused(high, dt2), dt)
     }
 
     /// As [`at`](Jets::at), with the caller's instructions.
@@ -96,7 +123,38 @@ impl<S: Scalar, const D: usize, const N: usize> Work for RealValue<'_, S, D, N> 
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> [S::Real; D] {
-        let x = self.0.at_here(self.1);
-        vector!(S::Real, D; n => x[n].real())
+        let Self(jets, dt) = self;
+        vector!(S::Real, D; n => jets.real_value(n, dt, |c| c))
+    }
+}
+
+struct Parts<'a, S: Scalar, const D: usize, const N: usize, const P: usize>(
+    &'a Jets<S, D, N>,
+    S::Real,
+    &'a [f64],
+);
+
+impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Parts<'_, S, D, N, P> {
+    type Output = [[S::Real; D]; P];
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> [[S::Real; D]; P] {
+        let Self(jets, dt, parts) = self;
+        let mut states = [[S::Real::zero(); D]; P];
+        if const { S::Real::LANES == 1 } {
+            // One trajectory: the places side by side, as vector instructions want it.
+            let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * parts[i]);
+            unroll!(n in 0..D => {
+                let found = jets.real_value(n, places, |c| Packet::new([c.lane(0); P]));
+                for (i, state) in states.iter_mut().enumerate() {
+                    state[n] = S::Real::constant(found.lane(i));
+                }
+            });
+        } else {
+            for (state, &part) in states.iter_mut().zip(parts) {
+                *state = vector!(S::Real, D; n => jets.real_value(n, dt.scale(part), |c| c));
+            }
+        }
+        states
     }
 }
