@@ -87,11 +87,12 @@ fn a_disks_ensemble_has_the_same_bits_everywhere() {
 fn exponents_have_the_same_bits_everywhere() {
     let values: Vec<Vec<f64>> = (0..21).map(|i| vec![0.25 + 0.4 * f64::from(i), 0.0]).collect();
     let options = LyapunovOptions { time: 150.0, transient: 20.0, goal: 0.02, tolerance: TOLERANCE };
-    let orbits =
-        Lyapunov { family: &DleFamily, values: &values, starts: &[[1.0, 1.0, 0.01]], options };
+    let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[[1.0, 1.0, 0.01]], options };
     let one = |crew: Crew<'_>| -> Vec<u64> {
         let all = orbits.run::<1>(crew).into_iter().flatten();
-        all.flat_map(|e| [e.exponents.value[0], e.exponents.standard_error[0], e.t]).map(f64::to_bits).collect()
+        all.flat_map(|e| [e.exponents.value[0], e.exponents.standard_error[0], e.t])
+            .map(f64::to_bits)
+            .collect()
     };
     let three = |crew: Crew<'_>| -> Vec<u64> {
         let all = orbits.run::<3>(crew).into_iter().flatten();

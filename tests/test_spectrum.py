@@ -8,7 +8,11 @@ import pytest
 import udd
 from udd.spectra import kaplan_yorke
 
-REFERENCE = {1.0: (0.21016, 7e-5, 2.17366), 3.4693: (0.30803, 1.5e-4, 2.23549), 3.9: (0.21479, 1.9e-4, 2.1768)}
+REFERENCE = {
+    1.0: (0.21016, 7e-5, 2.17366),
+    3.4693: (0.30803, 1.5e-4, 2.23549),
+    3.9: (0.21479, 1.9e-4, 2.1768),
+}
 
 
 @pytest.mark.parametrize("w", REFERENCE)
@@ -113,7 +117,7 @@ def test_error_bars_are_honest():
     """A hundred orbits: they scatter as much as their standard errors say."""
     starts = np.random.default_rng(5).normal(size=(100, 3))
     with pytest.warns(udd.ConvergenceWarning):
-        found = [udd.lyapunov(udd.DLE(1.0), state0=s, t=3000.0, tol=1e-9, with_error=True) for s in starts]
+        found = [udd.lyapunov(udd.DLE(1.0), state0=s, t=3e4, tol=1e-9, with_error=True) for s in starts]
     values, errors = np.array(found).T
     chi2 = ((values - 0.21016) ** 2 / errors**2).mean()
     # The mean of 100 squares of normal deviates, 1 +- 0.14; blocks are few, which widens their tails.

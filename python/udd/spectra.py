@@ -37,8 +37,8 @@ class Spectrum:
     dimension : float
         The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero.
     verdict : {"chaos", "periodic orbit", "equilibrium", "undecided"}
-        What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which comes
-        back or rests; chaos by a largest exponent at least four standard errors above zero.
+        What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which
+        comes back or rests; chaos by a largest exponent at least four standard errors above zero.
     period : float
         The period of a periodic orbit, else NaN.
     invariants : dict of str to float

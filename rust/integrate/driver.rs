@@ -267,7 +267,7 @@ where
         let remaining = end - self.at.t;
         // An end that is not a number leaves its lane active, to fail.
         let active = is_zero(remaining).not();
-        let targets = self.wall || self.system.surfaces() > 0;
+        let targets = !M::SMOOTH && (self.wall || self.system.surfaces() > 0);
         let landing = if targets { self.landing.lanes() } else { S::mask(false) };
 
         let cut = self.h.abs().scale(1.01).less(remaining.abs()).not();
@@ -317,7 +317,7 @@ where
 
         let mut progress =
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
-        if targets {
+        if const { !M::SMOOTH } && targets {
             let accepted = progress.moved;
             self.on_surfaces(&trial, accepted, landing, factor, (end, last), &mut progress);
         } else {

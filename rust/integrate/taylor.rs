@@ -43,21 +43,31 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         Self { tape, parameters, jets: Jets::new(tape, isa).with_order(order) }
     }
 
-    /// How far the polynomial's rates are from those of the law at the end of a step, times its size: a
-    /// norm, 1 where that is what a step's error may be.
-    fn defect(
+    /// Halves steps at whose end the polynomial does not obey the law.
+    ///
+    /// A law that has nearly levelled off, as tanh does, has terms too small to tell how near its poles are.
+    #[inline(never)]
+    fn obey(
         &self,
         system: &impl System<S, D>,
         at: &Point<S, D>,
-        size: S::Real,
-        x: &[S; D],
         norm: &impl ErrorNorm<S, D>,
-    ) -> S::Real {
-        let rates = system.rates(S::lift(at.t + size), x, &at.sides);
-        let slope = self.jets.real_slope(size);
+        trial: &mut Trial<S, D>,
+    ) {
         let real = |x: &[S; D]| vector!(S::Real, D; n => x[n].real());
-        let error = vector!(S::Real, D; n => (slope[n] - rates[n].real()) * size);
-        norm.state().norm(error, real(&at.x), real(x))
+        for _ in 0..MOST_HALVINGS {
+            let Trial { x, size, error } = *trial;
+            let rates = system.rates(S::lift(at.t + size), &x, &at.sides);
+            let slope = self.jets.real_slope(size);
+            let defect = vector!(S::Real, D; n => (slope[n] - rates[n].real()) * size);
+            let defect = norm.state().norm(defect, real(&at.x), real(&x));
+            let bad = error.finite().and(defect.less(S::Real::constant(MOST_DEFECT)).not());
+            if !bad.any() {
+                return;
+            }
+            trial.size = S::Real::select(bad, size.scale(0.5), size);
+            trial.x = self.jets.at(trial.size);
+        }
     }
 }
 
@@ -81,7 +91,11 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
-        S::Real::work(self.jets.isa(), Attempt { method: self, system, at, h, norm })
+        let mut trial = S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm });
+        if !self.tape.is_polynomial() {
+            self.obey(system, at, norm, &mut trial);
+        }
+        trial
     }
 
     fn extend(&mut self, _system: &impl System<S, D>, _at: &Point<S, D>) {}
@@ -115,41 +129,25 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 }
 
 /// A step, compiled once for each instruction set.
-struct Attempt<'a, 'b, M, S: Scalar, const D: usize, E> {
+struct Attempt<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
-    system: &'a M,
     at: &'a Point<S, D>,
     h: S::Real,
     norm: &'a E,
 }
 
-impl<M: System<S, D>, S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, M, S, D, E> {
+impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, D, E> {
     type Output = Trial<S, D>;
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Trial<S, D> {
-        let Self { method, system, at, h, norm } = self;
+        let Self { method, at, h, norm } = self;
         method.jets.expand_here(method.tape, &method.parameters, S::lift(at.t), &at.x, &at.sides);
         let radius = method.jets.radius(norm);
         let short = radius.less(h.abs());
-        let mut size = S::Real::select(short, radius.zip(h, f64::copysign), h);
+        let size = S::Real::select(short, radius.zip(h, f64::copysign), h);
         let known = S::Real::zero().less(radius);
         let error = S::Real::select(known, S::Real::zero(), S::Real::constant(f64::NAN));
-        let mut halvings = 0;
-        loop {
-            let x = method.jets.at_here(size);
-            if method.tape.is_polynomial() || halvings == MOST_HALVINGS {
-                return Trial { x, size, error };
-            }
-            // A law that has nearly levelled off, as tanh does, has terms too small to tell how near its poles
-            // are: beyond them the polynomial does not obey the law.
-            let good = method.defect(system, at, size, &x, norm).less(S::Real::constant(MOST_DEFECT));
-            let bad = good.or(known.not()).not();
-            if !bad.any() {
-                return Trial { x, size, error };
-            }
-            size = S::Real::select(bad, size.scale(0.5), size);
-            halvings += 1;
-        }
+        Trial { x: method.jets.at_here(size), size, error }
     }
 }

@@ -20,6 +20,8 @@ pub struct Dle<S> {
 }
 
 impl<S: Scalar> System<S, 3> for Dle<S> {
+    const SMOOTH: bool = true;
+
     #[inline(always)]
     fn rates(&self, _t: S, &[omega, y, z]: &[S; 3], _sides: &Sides<S>) -> [S; 3] {
         [y - omega, omega * z, self.w - omega * y - self.b * self.w * z]

@@ -29,6 +29,9 @@ pub type Sides<S> = [<S as Scalar>::Mask; MAX_SURFACES];
 
 /// A system of `D` ordinary differential equations.
 pub trait System<S: Scalar, const D: usize>: Sync {
+    /// Whether there is neither a switching surface nor a wall: what deals with them is then not compiled.
+    const SMOOTH: bool = false;
+
     /// The right-hand side at time `t` and state `x`, each piecewise law continued smoothly from
     /// the given side of its surface.
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];
@@ -70,6 +73,8 @@ pub trait System<S: Scalar, const D: usize>: Sync {
 }
 
 impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
+    const SMOOTH: bool = M::SMOOTH;
+
     #[inline(always)]
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         (**self).rates(t, x, sides)

@@ -129,7 +129,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             surfaces: sections.iter().map(surface).collect(),
             sides: [R::mask(true); MAX_SURFACES],
             room: Room::new(),
-            crossed: vec![Vec::with_capacity(MOST_PROBES * sections.len()); R::LANES],
+            crossed: (0..R::LANES).map(|_| Vec::with_capacity(MOST_PROBES * sections.len())).collect(),
             skip: vec![0; R::LANES],
             counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
         }

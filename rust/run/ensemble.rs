@@ -79,7 +79,7 @@ struct Sampled<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
     type Yield = Passage<D>;
 
-    const PACKETS: bool = F::PACKETS && T::PACKETS;
+    const PACKETS: bool = F::PACKETS;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Passage<D>)>) {

@@ -103,7 +103,8 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
         let start = |orbit| self.orbits.start::<R, N>(orbit);
         let norm = WithTangents(tolerance);
         let mut ship = Ship::new(self.isa, self.orbits.family, |v| self.recipe.make(v), start(first), &norm);
-        let mut blocks = vec![Blocks::<N>::new(span); R::LANES];
+        // Not cloned: clones have no room beforehand.
+        let mut blocks: Vec<Blocks<N>> = (0..R::LANES).map(|_| Blocks::new(span)).collect();
         let mut growth = Growth::<R, N>::none();
         // When each lane's block began, and its steps since.
         let (mut since, mut steps) = (R::zero(), R::zero());

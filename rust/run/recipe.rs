@@ -8,7 +8,7 @@ use crate::tape::Tape;
 pub trait Recipe<const D: usize>: Sync {
     type Method<S: Scalar>: Method<S, D>;
 
-    /// Whether its steps over packets are compiled for every instruction set.
+    /// Whether analyses run it in packets: those that fall back to it need not.
     const PACKETS: bool;
 
     /// The method for systems whose parameters have these values.
@@ -22,7 +22,7 @@ pub struct ByDopri5;
 impl<const D: usize> Recipe<D> for ByDopri5 {
     type Method<S: Scalar> = Dopri5<S, D>;
 
-    const PACKETS: bool = true;
+    const PACKETS: bool = false;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
         Dopri5::default()
