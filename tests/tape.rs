@@ -351,6 +351,13 @@ impl<F: Family<D>, const D: usize> Work for On<'_, F, D> {
     }
 }
 
+/// Each instruction set gives a single trajectory the same bits.
+fn same_bits_alone<F: Family<D>, const D: usize>(bits: &Bits<'_, F, D>) {
+    for isa in Isa::available() {
+        assert_eq!(bits.one(1, isa), bits.one(1, Isa::Baseline), "{isa:?}");
+    }
+}
+
 fn same_bits<F: Family<D>, const D: usize>(bits: &Bits<'_, F, D>) {
     let alone: Vec<[u64; D]> = (0..8).map(|l| bits.one(l, Isa::Baseline)).collect();
     assert_eq!(bits.many::<2, Plain>(Isa::best()), alone[..2]);
@@ -367,9 +374,10 @@ fn same_bits_for_every_width_and_instruction_set() {
     same_bits(&Bits { family: &DleFamily, tape: &tape, p: &[3.9, 0.0], x0: [1.0, 1.0, 0.01], end: 50.0 });
     let tape = Tape::record(&DleFamily, &[]).unwrap();
     same_bits(&Bits { family: &DleFamily, tape: &tape, p: &[3.7, 0.2], x0: [1.0, 1.0, 0.01], end: 50.0 });
+    // Disks are run one by one.
     for (family, p) in disks() {
         let tape = Tape::record(&family, &[]).unwrap();
-        same_bits(&Bits { family: &family, tape: &tape, p: &p, x0: [3.0, 0.01, 0.03, 0.4], end: 0.2 });
+        same_bits_alone(&Bits { family: &family, tape: &tape, p: &p, x0: [3.0, 0.01, 0.03, 0.4], end: 0.2 });
     }
 }
 

@@ -4,12 +4,10 @@ use super::method::{MOST_PROBES, Method, Point, Trial};
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
 use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
-use crate::tape::{Jets, LOW, Tape};
+use crate::tape::{HIGH, Jets, LOW, Tape};
 use crate::unroll::vector;
 
-/// The highest order.
-const MOST: usize = 18;
-const COEFFICIENTS: usize = MOST + 1;
+const COEFFICIENTS: usize = HIGH + 1;
 
 /// The polynomial's rates may miss those of the law by this times what a step's error may be: well above
 /// what the first term left out makes of it.
@@ -21,7 +19,7 @@ const MOST_HALVINGS: usize = 40;
 pub fn order(tolerance: &Tolerance) -> usize {
     match tolerance.rtol {
         1e-7.. => LOW,
-        _ => MOST,
+        _ => HIGH,
     }
 }
 
@@ -72,7 +70,7 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
 }
 
 impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
-    const ORDER: i32 = MOST as i32;
+    const ORDER: i32 = HIGH as i32;
     const EVALUATIONS: usize = 1;
     const SERIES: bool = true;
     const PROBES: &'static [f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];

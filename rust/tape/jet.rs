@@ -7,8 +7,9 @@ use crate::model::Sides;
 use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
 use crate::unroll::unroll;
 
-/// An order, beside the highest, whose programs are unrolled.
+/// The orders whose programs are unrolled, which takes long to compile.
 pub const LOW: usize = 12;
+pub const HIGH: usize = 18;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.
 #[derive(Clone, Debug)]
@@ -125,12 +126,13 @@ fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     sides: &Sides<S>,
 ) {
     let work = &mut work[..P::SLOTS];
-    if const { size_of::<S>() > if D == 3 { 2 * size_of::<S::Real>() } else { size_of::<f64>() } } {
+    if const { N != HIGH + 1 || size_of::<S>() > if D == 3 { 2 * size_of::<S::Real>() } else { size_of::<f64>() } }
+    {
         return rolled::<P, S, D, N>(work, order, held, t, x, sides);
     }
     match order {
         LOW => unrolled::<P, S, D, N, LOW>(work, held, t, x, sides),
-        _ if order == N - 1 => unrolled::<P, S, D, N, 24>(work, held, t, x, sides),
+        HIGH => unrolled::<P, S, D, N, HIGH>(work, held, t, x, sides),
         _ => rolled::<P, S, D, N>(work, order, held, t, x, sides),
     }
 }

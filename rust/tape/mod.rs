@@ -15,7 +15,7 @@ mod series;
 mod symbol;
 
 pub use expression::{Binary, Expression, Leaf, Mistake, Names, Op, Place, Unary};
-pub use jet::{Jets, LOW};
+pub use jet::{HIGH, Jets, LOW};
 pub use node::{Held, Node, Step};
 pub use record::Unrecordable;
 pub use symbol::{Function, SideOf, Symbol};
