@@ -42,7 +42,7 @@ def main() -> None:
     run = [sys.executable, __file__, "sweep"]
     growth, size = map(int, subprocess.run(run, check=True, stdout=subprocess.PIPE, text=True).stdout.split())
     print(
-        f"{DRIVES:,} drives: {growth / 1e6:.0f} MB beyond import and drives for a result of {size / 1e6:.0f} MB,"
+        f"{DRIVES:,} drives: {growth / 1e6:.0f} MB beyond import and drives, result {size / 1e6:.0f} MB,"
         f" {growth / size:.2f} times its size (at most {LIMIT})"
     )
     sys.exit(growth > LIMIT * size)

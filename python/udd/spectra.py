@@ -383,8 +383,9 @@ def covariant_vectors(
     extra = int(np.ceil(aside / step))
     found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol)
     kept = slice(extra, extra + n + 1)
+    times: _Floats = step * np.arange(extra, extra + n + 1, dtype=np.float64)
     return Covariant(
-        np.arange(extra, extra + n + 1) * step,
+        times,
         found["states"][kept],
         found["covariant"][kept],
         found["growth"][extra : extra + n] / step,
