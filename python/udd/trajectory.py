@@ -203,7 +203,7 @@ def simulate(
     *,
     rtol: float = 1e-9,
     atol: float = 1e-12,
-    method: str = "auto",
+    method: str = "dopri5",
     dense: bool = False,
 ) -> Trajectory:
     """Run a model from an initial state.
@@ -220,7 +220,7 @@ def simulate(
     rtol, atol : float
         Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
         in the state's units.
-    method : {"auto", "dopri5", "taylor"}
+    method : {"dopri5", "taylor", "auto"}
         ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4. ``"taylor"``
         follows the solution's power series to order 12 or 18, by the tolerance; its dense output is as
         accurate as its steps. Both land on the surfaces where the law changes. ``"auto"`` takes the faster
