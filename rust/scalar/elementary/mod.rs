@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use udd::scalar::{Packet, Real, Scalar, elementary};
-//! let angle = Packet([0.1, 1.0, 10.0, 100.0]);
+//! let angle: Packet<4> = Packet::new([0.1, 1.0, 10.0, 100.0]);
 //! let (sin, cos) = elementary::sin_cos(angle);
 //! assert_eq!(sin.lane(2).to_bits(), elementary::sin_cos(10.0_f64).0.to_bits());
 //! assert!((cos.lane(3) - 100f64.cos()).abs() < 2e-16);
