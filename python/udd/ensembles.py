@@ -129,13 +129,7 @@ def ensemble(
         raise ModelError("the times must increase, without duplicates")
     if not isinstance(model, Model):
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
-    given = dict(parameters or {})
-    for name in given:
-        if name not in model.parameters:
-            raise ModelError(
-                f"{type(model).__name__} has no parameter {name!r}; it has {', '.join(model.parameters)}"
-            )
-    shape, rows, starts = orbits_of(model, given, state0)
+    shape, rows, starts = orbits_of(model, parameters or {}, state0)
     runs = max(len(rows), len(starts))
     stepper = method_for(model, method, rtol)
     with bar(runs, "run", progress) as since:

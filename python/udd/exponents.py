@@ -222,18 +222,23 @@ def _tell(outcomes: list[int], n: int, single: bool) -> None:
     """Says what became of the orbits that have no exponent."""
     counts = {OUTCOMES[code]: outcomes.count(code) for code in sorted(set(outcomes))}
     if single:
-        reasons = {
-            "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
-            "failed": "the solution blew up",
-        }
         (outcome,) = counts
-        raise IntegrationError(f"there is no exponent: {reasons.get(outcome, outcome)}")
+        raise IntegrationError(f"there is no exponent: {reason(outcome)}")
     list_ = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
     warnings.warn(
         f"{len(outcomes)} of {n} orbits have no exponent ({list_}) and are NaN",
         ConvergenceWarning,
         stacklevel=3,
     )
+
+
+def reason(outcome: str) -> str:
+    """Why a run that ended so has no exponents."""
+    reasons = {
+        "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
+        "failed": "the solution blew up",
+    }
+    return reasons.get(outcome, outcome)
 
 
 def span(t: float | None, transient: float | None, *, longest: float, skip: float) -> tuple[float, float]:

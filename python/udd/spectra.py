@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import number
 from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError, ModelError
-from udd.exponents import default_start, span
+from udd.exponents import default_start, reason, span
 from udd.models import DLE, Disk, Model
 from udd.outcomes import FINISHED, OUTCOMES
 from udd.trajectory import initial_state, tolerances
@@ -205,13 +205,7 @@ class _Run:
         )
         outcome = int(found["outcome"][0])
         if outcome != FINISHED:
-            reasons = {
-                "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
-                "failed": "the solution blew up",
-            }
-            raise IntegrationError(
-                f"there is no spectrum: {reasons.get(OUTCOMES[outcome], OUTCOMES[outcome])}"
-            )
+            raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome])}")
         return found
 
     def settled(self, end: _Floats) -> tuple[bool, float]:

@@ -112,7 +112,7 @@ class Trajectory:
     dense: _core.Dense | None = None
 
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The state at any times within the run, to order 4.
+        """The state at any times within the run, as accurate as the method's dense output.
 
         Parameters
         ----------
@@ -160,9 +160,10 @@ METHODS = ("auto", "dopri5", "taylor")
 def method_for(model: Model, method: str, rtol: float) -> str:
     """The method that is meant: for ``"auto"`` the faster one at equal error, as measured.
 
-    `benches/python/methods.py` prints the table that decides: the series wins for the DLE at any tolerance
-    and for a plain disk from rtol = 1e-5 on. With effects each operation of the law costs a series of its
-    own: there it wins from 1e-8 on, but not where the friction sticks, of which it knows no all treatments.
+    The choice follows the table that `benches/python/methods.py` prints: the series wins for the DLE at any
+    tolerance and for a plain disk from rtol = 1e-5 on. With effects each operation of the law costs a series
+    of its own, and it wins from 1e-8 on. Friction with modes is left to Dormand-Prince, which knows all its
+    treatments.
     """
     if method not in METHODS:
         raise ModelError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
