@@ -127,7 +127,7 @@ def lyapunov_spectrum(
     --------
     >>> import udd
     >>> found = udd.lyapunov_spectrum(1.0, tol=5e-3)
-    >>> found.verdict, round(found.exponents.sum(), 6)
+    >>> found.verdict, round(float(found.exponents.sum()), 6)
     ('chaos', -1.0)
     >>> udd.lyapunov_spectrum(10.0).verdict
     'periodic orbit'

@@ -7,7 +7,7 @@
 
 use std::array::from_fn;
 
-use super::method::{Method, Point};
+use super::method::{MOST_PROBES, Method, Point};
 use super::root::bracketed;
 use crate::model::{MAX_SURFACES, System};
 use crate::scalar::{Mask, Real, Scalar};
@@ -86,15 +86,23 @@ where
         let mut stale = never;
         let probes = method.probes(h);
         for target in self.targets() {
+            let mut values = [zero; MOST_PROBES];
+            let mut any = never;
+            for (i, &theta) in K::PROBES.iter().enumerate() {
+                let x = vector!(S, D; n => S::lift(probes[i][n]));
+                values[i] = self.value(target, self.at.t + h.scale(theta), &x);
+                any = any.or(values[i].less(zero));
+            }
+            if !any.and(lanes).any() {
+                continue;
+            }
             let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
             let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
             for (i, &theta) in K::PROBES.iter().enumerate() {
-                let dt = h.scale(theta);
-                let x = vector!(S, D; n => S::lift(probes[i][n]));
-                let value = self.value(target, self.at.t + dt, &x);
+                let (dt, value) = (h.scale(theta), values[i]);
                 scale = scale.max(value.abs());
                 let new = value.less(zero).and(wrong.not());
                 high = pick(new, (dt, value), high);

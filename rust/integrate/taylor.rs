@@ -90,7 +90,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
         let mut trial = S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm });
-        if !self.tape.is_polynomial() {
+        if self.tape.levels_off() {
             self.obey(system, at, norm, &mut trial);
         }
         trial

@@ -99,11 +99,6 @@ where
         work::<S::Real, _>(self.isa, Trial { driver: &mut self.driver, end })
     }
 
-    /// The instructions that packets sail with.
-    pub fn isa(&self) -> Isa {
-        self.isa
-    }
-
     /// Lanes that are at their end.
     #[inline(always)]
     pub fn arrived(&self) -> S::Mask {

@@ -97,11 +97,11 @@ impl Isa {
 pub(super) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        if const { V::ISA as u8 == Isa::Avx512 as u8 } {
+        if const { matches!(V::ISA, Isa::Avx512) } {
             // SAFETY: `V` was given where the machine had been seen to have it.
             return unsafe { avx512(work) };
         }
-        if const { V::ISA as u8 == Isa::Avx2 as u8 } {
+        if const { matches!(V::ISA, Isa::Avx2) } {
             // SAFETY: the same.
             return unsafe { avx2(work) };
         }

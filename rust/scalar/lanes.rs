@@ -14,7 +14,7 @@ macro_rules! lanewise {
         pub fn $name<const L: usize, V: Instructions>($($a: &[f64; L]),+) -> [f64; L] {
             let mut result = [0.0; L];
             #[cfg(target_arch = "x86_64")]
-            if const { V::ISA as u8 == Isa::Avx512 as u8 && L.is_multiple_of(8) } {
+            if const { matches!(V::ISA, Isa::Avx512) && L.is_multiple_of(8) } {
                 let mut i = 0;
                 while i < L {
                     // SAFETY: the arrays have eight lanes from `i` on, and `V` exists only where the machine
@@ -28,7 +28,7 @@ macro_rules! lanewise {
                 return result;
             }
             #[cfg(target_arch = "x86_64")]
-            if const { V::ISA as u8 != Isa::Baseline as u8 && L.is_multiple_of(4) } {
+            if const { !matches!(V::ISA, Isa::Baseline) && L.is_multiple_of(4) } {
                 let mut i = 0;
                 while i < L {
                     // SAFETY: the same for four lanes.
@@ -83,7 +83,7 @@ lanewise! {
 #[inline(always)]
 pub fn any<const L: usize, V: Instructions>(mask: &[f64; L]) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if const { V::ISA as u8 == Isa::Avx512 as u8 && L.is_multiple_of(8) } {
+    if const { matches!(V::ISA, Isa::Avx512) && L.is_multiple_of(8) } {
         let mut any = 0;
         let mut i = 0;
         while i < L {
@@ -95,7 +95,7 @@ pub fn any<const L: usize, V: Instructions>(mask: &[f64; L]) -> bool {
         return any != 0;
     }
     #[cfg(target_arch = "x86_64")]
-    if const { V::ISA as u8 != Isa::Baseline as u8 && L.is_multiple_of(4) } {
+    if const { !matches!(V::ISA, Isa::Baseline) && L.is_multiple_of(4) } {
         let mut any = 0;
         let mut i = 0;
         while i < L {

@@ -62,15 +62,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let Self { work, held, order, .. } = self;
         let order = *order;
         hold(&tape.held, parameters, sides, held);
-        // Tangents take so long in each operation that telling which one it is does not count. The number
-        // of equations is asked so that no other program is compiled.
-        {
-            if const { D == 3 } && tape.known == Known::Dle {
-                return known::<Dle, S, D, N>(work, order, held, t, x, sides);
-            }
-            if const { D == 4 } && tape.known == Known::Disk {
-                return known::<Disk, S, D, N>(work, order, held, t, x, sides);
-            }
+        // The number of equations is asked so that no other program is compiled.
+        if const { D == 3 } && tape.known == Known::Dle {
+            return known::<Dle, S, D, N>(work, order, held, t, x, sides);
+        }
+        if const { D == 4 } && tape.known == Known::Disk {
+            return known::<Disk, S, D, N>(work, order, held, t, x, sides);
         }
         interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], order, held, t, x, sides);
     }
@@ -114,8 +111,14 @@ macro_rules! every {
     };
 }
 
-/// A known tape. Where tangents make every operation long, or there are many of them, only the operations
-/// are unrolled, else the orders are too.
+/// Whether a known tape's orders are unrolled too: not where tangents make every operation long, or where
+/// there are many operations.
+const fn worthwhile<S: Scalar, const D: usize, const N: usize>() -> bool {
+    let longest = if D == 3 { 2 * size_of::<S::Real>() } else { size_of::<f64>() };
+    N == HIGH + 1 && size_of::<S>() <= longest
+}
+
+/// A known tape: its operations are unrolled, and its orders where that is worthwhile.
 #[inline(always)]
 fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     work: &mut [[S; N]],
@@ -126,8 +129,7 @@ fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     sides: &Sides<S>,
 ) {
     let work = &mut work[..P::SLOTS];
-    if const { N != HIGH + 1 || size_of::<S>() > if D == 3 { 2 * size_of::<S::Real>() } else { size_of::<f64>() } }
-    {
+    if const { !worthwhile::<S, D, N>() } {
         return rolled::<P, S, D, N>(work, order, held, t, x, sides);
     }
     match order {

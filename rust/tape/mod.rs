@@ -44,7 +44,7 @@ pub struct Tape<const D: usize> {
     /// How many series there are; the first `D` are the state.
     pub(crate) slots: usize,
     known: known::Known,
-    polynomial: bool,
+    levels_off: bool,
 }
 
 impl<const D: usize> Tape<D> {
@@ -53,10 +53,11 @@ impl<const D: usize> Tape<D> {
         &self.steps
     }
 
-    /// Whether the rates are polynomials of the state, whose series converge everywhere near.
+    /// Whether the law can level off so far that the terms of its series are too small to tell how near its
+    /// poles are, as exp and tanh do.
     #[inline(always)]
-    pub fn is_polynomial(&self) -> bool {
-        self.polynomial
+    pub fn levels_off(&self) -> bool {
+        self.levels_off
     }
 
     /// Whether its series are computed by a program of their own, unrolled when this was compiled.

@@ -72,10 +72,9 @@ pub enum Node {
 }
 
 impl Node {
-    /// Whether it is a polynomial of its operands.
-    pub(super) fn is_polynomial(self) -> bool {
-        use Node::*;
-        !matches!(self, Div(..) | Over(..) | Sqrt(_) | Exp(_) | Ln(_) | Sin(_) | Cos(_) | Tanh(_) | Slope(_))
+    /// Whether it comes so near to a constant that the terms of its series vanish, while poles are near.
+    pub(super) fn levels_off(self) -> bool {
+        matches!(self, Node::Exp(_) | Node::Tanh(_))
     }
 
     /// How many slots it needs.

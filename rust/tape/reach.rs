@@ -31,15 +31,22 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         })
     }
 
-    /// A component's value at `dt`, by the operations of [`at`](Jets::at); `lift` makes coefficients as wide.
+    /// As [`at`](Jets::at), with the caller's instructions.
     #[inline(always)]
-    fn real_value<P: Real>(&self, n: usize, dt: P, lift: impl Fn(S::Real) -> P) -> P {
+    pub fn at_here(&self, dt: S::Real) -> [S; D] {
+        vector!(S, D; n => self.value(n, dt, |c| c))
+    }
+
+    /// A component's value at `dt`; `lift` makes coefficients what the value is to be.
+    #[inline(always)]
+    fn value<T: Scalar>(&self, n: usize, dt: T::Real, lift: impl Fn(S) -> T) -> T {
         let order = self.order().min(N - 1);
-        let c = |k: usize| lift(self.coefficients()[n][k].real());
+        let c = |k: usize| lift(self.coefficients()[n][k]);
         let dt2 = dt * dt;
         let dt4 = dt2 * dt2;
+        // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
         let rounds = order.div_ceil(4) - 1;
-        let mut sums = [P::zero(); 4];
+        let mut sums = [T::zero(); 4];
         unroll!(r in 0..4 => {
             let k = 4 * rounds + 1 + r;
             if k <= order {
@@ -47,39 +54,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             }
         });
         for round in (0..rounds).rev() {
-            unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused(sums[r], dt4); });
+            unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused_times(sums[r], dt4); });
         }
-        let (low, high) = (sums[0].fused(sums[1], dt), sums[2].fused(sums[3], dt));
-        c(0).fused(low.fused(high, dt2), dt)
-    }
-
-    /// As [`at`](Jets::at), with the caller's instructions.
-    #[inline(always)]
-    pub fn at_here(&self, dt: S::Real) -> [S; D] {
-        let dt2 = dt * dt;
-        let dt4 = dt2 * dt2;
-        let order = self.order().min(N - 1);
-        let mut x = [S::zero(); D];
-        unroll!(n in 0..D => {
-            let c = &self.coefficients()[n];
-            // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
-            let rounds = order.div_ceil(4) - 1;
-            let mut sums = [S::zero(); 4];
-            unroll!(r in 0..4 => {
-                let k = 4 * rounds + 1 + r;
-                if k <= order {
-                    sums[r] = c[k];
-                }
-            });
-            for round in (0..rounds).rev() {
-                let four = &c[4 * round + 1..4 * round + 5];
-                unroll!(r in 0..4 => { sums[r] = four[r].fused_times(sums[r], dt4); });
-            }
-            // The state itself is added last, which rounds once.
-            let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
-            x[n] = c[0].fused_times(low.fused_times(high, dt2), dt);
-        });
-        x
+        // The state itself is added last, which rounds once.
+        let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
+        c(0).fused_times(low.fused_times(high, dt2), dt)
     }
 
     /// How far the solution may be followed: the last two terms are then as small as allowed. Not a number
@@ -124,7 +103,7 @@ impl<S: Scalar, const D: usize, const N: usize> Work for RealValue<'_, S, D, N> 
     #[inline(always)]
     fn run<V: Instructions>(self) -> [S::Real; D] {
         let Self(jets, dt) = self;
-        vector!(S::Real, D; n => jets.real_value(n, dt, |c| c))
+        vector!(S::Real, D; n => jets.value(n, dt, S::real))
     }
 }
 
@@ -145,14 +124,14 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Parts<'
             // One trajectory: the places side by side, as vector instructions want it.
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * parts[i]);
             unroll!(n in 0..D => {
-                let found = jets.real_value(n, places, |c| Packet::new([c.lane(0); P]));
+                let found = jets.value(n, places, |c| Packet::<P, V>::new([c.real().lane(0); P]));
                 for (i, state) in states.iter_mut().enumerate() {
                     state[n] = S::Real::constant(found.lane(i));
                 }
             });
         } else {
             for (state, &part) in states.iter_mut().zip(parts) {
-                *state = vector!(S::Real, D; n => jets.real_value(n, dt.scale(part), |c| c));
+                *state = vector!(S::Real, D; n => jets.value(n, dt.scale(part), S::real));
             }
         }
         states

@@ -73,14 +73,14 @@ impl<'a> Lowering<'a> {
     fn tape<const D: usize>(mut self, rates: [Symbol; D]) -> Tape<D> {
         let rates = rates.map(|s| self.slot(s));
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
-        let polynomial = self.steps.iter().all(|step| step.node.is_polynomial());
+        let levels_off = self.steps.iter().any(|step| step.node.levels_off());
         let mut tape = Tape {
             held: self.held,
             steps: self.steps,
             rates,
             slots: self.slots,
             known: Known::Not,
-            polynomial,
+            levels_off,
         };
         tape.known = Known::of(&tape);
         tape
