@@ -59,7 +59,7 @@ def test_final_states_are_those_of_simulate_to_the_last_bit() -> None:
         if Z > 0.08:  # the radius
             assert (outcome, float(here["t_end"]), float(here["final_Z"])) == ("ejected", 0.0, Z)
         else:
-            run = udd.simulate(model, [0.0, 2.0], [0.0, 1e-3, Z, 0.0])
+            run = udd.simulate(model, [0.0, 2.0], [0.0, 1e-3, Z, 0.0], method="auto")
             assert run.outcome == outcome
             assert [float(here[f"final_{name}"]) for name in model.state_names] == run.state[-1].tolist()
             assert here["t_end"] == run.t[-1]
@@ -84,6 +84,26 @@ def test_a_solution_that_blows_up_is_an_outcome() -> None:
     found = udd.sweep(udd.SweepSpec("outcome", model, over, [1.0, 1.0], {"t": 1.0}))
     assert [named(found)[k] for k in found["outcome"].values] == ["finished", "failed"]
     assert np.isnan(found["t_end"].values).tolist() == [False, True]
+
+
+def test_a_disk_that_is_nowhere_on_the_wheels_is_not_run() -> None:
+    spec = udd.SweepSpec("final_state", DISK, {"Z": [0.08, 0.09, -0.1]}, [0.0, 0.01, 0.0, 0.0], {"t": 1.0})
+    found = udd.sweep(spec)
+    assert [named(found)[k] for k in found["outcome"].values] == ["ejected"] * 3
+    assert found["t_end"].values.tolist() == [0.0] * 3
+    assert found["final_Z"].values.tolist() == [0.08, 0.09, -0.1]
+    assert found["final_Y"].values.tolist() == [0.01] * 3
+
+
+def test_runs_keep_their_friction() -> None:
+    """Modes are left to Dormand-Prince, which knows them."""
+    rod = udd.Pendulum(0.5, k0=0.01).with_effects(udd.effects.coulomb(c=0.3, treatment="set-valued"))
+    found = udd.sweep(udd.SweepSpec("final_state", rod, {"theta": [0.2, 1.0, 2.0]}, [0.0, 1.0], {"t": 9.0}))
+    for k, theta in enumerate(found["theta"].values.tolist()):
+        run = udd.simulate(rod, [0.0, 9.0], [0.0, theta], method="dopri5")
+        ends = [float(found[f"final_{name}"].values[k]) for name in rod.state_names]
+        assert ends == run.state[-1].tolist()
+    assert (found["final_Omega"].values == 0.0).any()  # held
 
 
 def test_exponents_over_two_parameters_and_a_state() -> None:

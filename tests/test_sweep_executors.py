@@ -131,10 +131,19 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("kind", ["here", "threads", "spawn"])
-def test_ctrl_c_keeps_what_is_finished_and_cancels_the_rest(kind: str, tmp_path: Path) -> None:
-    # 60 chunks of a few hundredths of a second each.
-    spec = exponents_spec(n=60, t=1000.0, chunk=1)
+# 60 chunks of a few hundredths of a second each.
+_EXPONENTS = exponents_spec(n=60, t=1000.0, chunk=1)
+_RUNS = udd.SweepSpec("outcome", udd.DLE(1.0), {"w": np.linspace(0.5, 5, 60)}, options={"t": 3e4}, chunk=1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "spec"),
+    [("here", _EXPONENTS), ("here", _RUNS), ("threads", _EXPONENTS), ("spawn", _EXPONENTS)],
+    ids=["here", "here, runs", "threads", "spawn"],
+)
+def test_ctrl_c_keeps_what_is_finished_and_cancels_the_rest(
+    kind: str, spec: udd.SweepSpec, tmp_path: Path
+) -> None:
     script, store = tmp_path / "stopped.py", tmp_path / "a.zarr"
     script.write_text(STOPPED.replace("{{", "{").replace("}}", "}"))
     call = [sys.executable, str(script), kind, spec.to_json(), str(store)]

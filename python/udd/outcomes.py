@@ -7,3 +7,5 @@ OUTCOMES = ("finished", "ejected", "time ran out", "failed", "interrupted", "esc
 
 FINISHED = OUTCOMES.index("finished")
 EJECTED = OUTCOMES.index("ejected")
+FAILED = OUTCOMES.index("failed")
+INTERRUPTED = OUTCOMES.index("interrupted")

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._validate import number
-from udd.errors import IntegrationError, ModelError
+from udd.errors import ModelError
 from udd.exponents import span
 from udd.models import DLE, Model
-from udd.outcomes import EJECTED, FINISHED, OUTCOMES
-from udd.trajectory import simulate, tolerances
+from udd.orbits import off_wheels
+from udd.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED
+from udd.trajectory import method_for, tolerances
 
 NOT_RUN = -1
 """In the array ``outcome`` before the work is done; the other values are those of `udd.outcomes`."""
@@ -134,25 +135,24 @@ def _state_variables(model: Model) -> tuple[Variable, ...]:
 
 
 def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
-    n = len(states)
-    names = ("t_end", *(f"final_{name}" for name in model.state_names))
-    found: Found = {name: np.full(n, np.nan) for name in names}
-    found["outcome"] = np.full(n, OUTCOMES.index("failed"), dtype=np.int8)
-    for k, (row, state) in enumerate(zip(rows, states, strict=True)):
-        one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
-        try:
-            run = simulate(one, [0.0, options["t"]], state, rtol=options["rtol"], atol=options["atol"])
-        except IntegrationError:
-            continue
-        except ModelError:
-            # All else was checked when the spec was made: this start is not on the disk.
-            end, outcome = (0.0, *state), EJECTED
-        else:
-            end, outcome = (run.t[-1], *run.state[-1]), OUTCOMES.index(run.outcome)
-        found["outcome"][k] = outcome
-        for name, value in zip(names, end, strict=True):
-            found[name][k] = value
-    return found
+    off = off_wheels(model, rows, states)
+    # What starts off the wheels has left them already.
+    t_end = np.where(off, 0.0, np.nan)
+    ends = np.where(off[:, None], states, np.nan)
+    outcome = np.full(len(states), EJECTED, dtype=np.int8)
+    if not off.all():
+        accuracy = options["rtol"], options["atol"]
+        method = method_for(model, "auto", options["rtol"])
+        times = np.array([0.0, options["t"]])
+        found = _core.ensemble(model, rows[~off], states[~off], times, *accuracy, method, threads)
+        if (found["outcome"] == INTERRUPTED).any():
+            raise KeyboardInterrupt
+        failed = found["outcome"] == FAILED
+        t_end[~off] = np.where(failed, np.nan, found["t_end"])
+        ends[~off] = np.where(failed[:, None], np.nan, found["end"])
+        outcome[~off] = found["outcome"]
+    columns = {f"final_{name}": ends[:, k] for k, name in enumerate(model.state_names)}
+    return {"t_end": t_end, **columns, "outcome": outcome}
 
 
 def _outcomes(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:

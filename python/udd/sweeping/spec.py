@@ -23,7 +23,7 @@ from udd.trajectory import initial_state
 from .models_json import model_from_dict, model_to_dict
 from .quantities import QUANTITIES
 
-RESULT_FORMAT = 1
+RESULT_FORMAT = 2
 """To be raised with every change that gives other numbers or other arrays for the same spec."""
 
 _KEYS = ("quantity", "model", "over", "state0", "options", "chunk")
@@ -48,7 +48,8 @@ class SweepSpec:
         The initial state, for the components that are not varied; by default that of :func:`udd.lyapunov`.
     options : mapping of str to float, optional
         "lyapunov" and "spectrum": `t`, `tol`, `transient`, `rtol` and `atol` as in :func:`udd.lyapunov`.
-        "final_state" and "outcome": the length `t` of the runs, `rtol` and `atol`.
+        "final_state" and "outcome": the length `t` of the runs, `rtol` and `atol`; they are those of
+        :func:`udd.ensemble`.
     chunk : int
         How many trajectories are computed and written at once, at most.
 
