@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._validate import number
-from udd.errors import ModelError
+from udd.errors import IntegrationError, ModelError
 from udd.exponents import span
 from udd.models import DLE, Model
 from udd.orbits import off_wheels
-from udd.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED
-from udd.trajectory import method_for, tolerances
+from udd.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED, OUTCOMES
+from udd.trajectory import method_for, simulate, tolerances
 
 NOT_RUN = -1
 """In the array ``outcome`` before the work is done; the other values are those of `udd.outcomes`."""
@@ -141,18 +141,40 @@ def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads:
     ends = np.where(off[:, None], states, np.nan)
     outcome = np.full(len(states), EJECTED, dtype=np.int8)
     if not off.all():
-        accuracy = options["rtol"], options["atol"]
-        method = method_for(model, "auto", options["rtol"])
-        times = np.array([0.0, options["t"]])
-        found = _core.ensemble(model, rows[~off], states[~off], times, *accuracy, method, threads)
-        if (found["outcome"] == INTERRUPTED).any():
-            raise KeyboardInterrupt
+        found = _ended(model, rows[~off], states[~off], options, threads)
         failed = found["outcome"] == FAILED
         t_end[~off] = np.where(failed, np.nan, found["t_end"])
         ends[~off] = np.where(failed[:, None], np.nan, found["end"])
         outcome[~off] = found["outcome"]
     columns = {f"final_{name}": ends[:, k] for k, name in enumerate(model.state_names)}
     return {"t_end": t_end, **columns, "outcome": outcome}
+
+
+def _ended(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    times, rtol, atol = np.array([0.0, options["t"]]), options["rtol"], options["atol"]
+    if "bristle" in model.state_names:
+        return _ended_one_by_one(model, rows, states, times, rtol, atol)
+    method = method_for(model, "auto", rtol)
+    found = _core.ensemble(model, rows, states, times, rtol, atol, method, threads)
+    if (found["outcome"] == INTERRUPTED).any():
+        raise KeyboardInterrupt
+    return {name: found[name] for name in ("t_end", "end", "outcome")}
+
+
+def _ended_one_by_one(
+    model: Model, rows: Floats, states: Floats, times: Floats, rtol: float, atol: float
+) -> Found:
+    """For friction by bristles, which ensembles do not have."""
+    t_end, ends = np.full(len(states), np.nan), np.full(states.shape, np.nan)
+    outcome = np.full(len(states), FAILED, dtype=np.int8)
+    for k, (row, state) in enumerate(zip(rows, states, strict=True)):
+        one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
+        try:
+            run = simulate(one, times, state, rtol=rtol, atol=atol)
+        except IntegrationError:
+            continue
+        t_end[k], ends[k], outcome[k] = run.t[-1], run.state[-1], OUTCOMES.index(run.outcome)
+    return {"t_end": t_end, "end": ends, "outcome": outcome}
 
 
 def _outcomes(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
