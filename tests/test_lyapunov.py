@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,6 +88,19 @@ def test_arrays_keep_their_shape_and_equal_their_elements() -> None:
     assert udd.lyapunov([], tol=1e-2).shape == (0,)
 
 
+def test_parameters_vary() -> None:
+    B, w = np.array([[0.0], [0.2]]), np.array([1.0, 2.0, 3.0])
+    options: dict[str, Any] = {"t": 1000.0, "tol": 0.5}
+    table, errors = udd.lyapunov(w, parameters={"B": B}, with_error=True, **options)
+    assert table.shape == errors.shape == (2, 3)
+    assert (udd.lyapunov(udd.DLE(1.0), parameters={"B": B, "w": w}, **options) == table).all()
+    for i, j in np.ndindex(table.shape):
+        model = udd.DLE(w[j], B[i, 0])
+        assert (table[i, j], errors[i, j]) == udd.lyapunov(model, with_error=True, **options)
+    assert isinstance(udd.lyapunov(1.0, parameters={"B": 0.2}, **options), float)
+    assert udd.lyapunov([], parameters={"B": 0.2}).shape == (0,)
+
+
 def test_the_same_bits_for_any_number_of_threads() -> None:
     code = "import udd, numpy as np; print(udd.lyapunov(np.linspace(0.5, 4, 9), tol=2e-2).tobytes().hex())"
     runs = [
@@ -119,9 +133,12 @@ def test_an_early_transient_is_left_out() -> None:
 @pytest.mark.parametrize(
     ("call", "named"),
     [
-        (lambda: udd.lyapunov(-1.0), "w must not be negative"),
+        (lambda: udd.lyapunov(-1.0), "w must not be below 0, not -1"),
         (lambda: udd.lyapunov([1.0, math.nan]), "w must be finite"),
         (lambda: udd.lyapunov("one"), "w must be numbers"),
+        (lambda: udd.lyapunov([1.0, 2.0], parameters={"w": 1.0}), "w is given twice"),
+        (lambda: udd.lyapunov([1.0, 2.0], parameters={"k0": 1.0}), "DLE has no parameter 'k0'"),
+        (lambda: udd.lyapunov([1.0, 2.0], parameters={"B": [0, 0.1, 0.2]}), "do not fit together"),
         (lambda: udd.lyapunov(1.0, t=0.0), "t must be above 0"),
         (lambda: udd.lyapunov(1.0, tol=-1.0), "tol must be above 0"),
         (lambda: udd.lyapunov(1.0, t=10.0, transient=20.0), "transient must be below"),

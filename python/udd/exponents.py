@@ -3,89 +3,73 @@
 from __future__ import annotations
 
 import warnings
-from typing import Literal, overload
+from collections.abc import Mapping
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._validate import array, number
+from udd._validate import number
 from udd.crew import bar, thread_count
 from udd.errors import ConvergenceWarning, IntegrationError, ModelError
-from udd.models import DLE, Disk, Model
+from udd.models import DLE, Model
+from udd.orbits import default_start, varied
 from udd.outcomes import FINISHED, OUTCOMES
 from udd.trajectory import initial_state, tolerances
 
 __all__ = ["ConvergenceWarning", "lyapunov"]
 
 
+class _Options(TypedDict, total=False):
+    t: float | None
+    tol: float | None
+    transient: float | None
+    state0: ArrayLike | None
+    rtol: float
+    atol: float
+    threads: int | None
+    progress: bool | None
+
+
 @overload
 def lyapunov(
-    w: float | Model,
-    *,
-    t: float | None = None,
-    tol: float | None = None,
-    transient: float | None = None,
-    state0: ArrayLike | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-    threads: int | None = None,
-    progress: bool | None = None,
-    with_error: Literal[False] = False,
+    w: float | Model, *, with_error: Literal[False] = False, **options: Unpack[_Options]
 ) -> float: ...
 
 
 @overload
 def lyapunov(
-    w: ArrayLike,
-    *,
-    t: float | None = None,
-    tol: float | None = None,
-    transient: float | None = None,
-    state0: ArrayLike | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-    threads: int | None = None,
-    progress: bool | None = None,
-    with_error: Literal[False] = False,
+    w: ArrayLike, *, with_error: Literal[False] = False, **options: Unpack[_Options]
 ) -> NDArray[np.float64]: ...
 
 
 @overload
 def lyapunov(
-    w: float | Model,
-    *,
-    t: float | None = None,
-    tol: float | None = None,
-    transient: float | None = None,
-    state0: ArrayLike | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-    threads: int | None = None,
-    progress: bool | None = None,
-    with_error: Literal[True],
+    w: float | Model, *, with_error: Literal[True], **options: Unpack[_Options]
 ) -> tuple[float, float]: ...
 
 
 @overload
 def lyapunov(
-    w: ArrayLike,
-    *,
-    t: float | None = None,
-    tol: float | None = None,
-    transient: float | None = None,
-    state0: ArrayLike | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-    threads: int | None = None,
-    progress: bool | None = None,
-    with_error: Literal[True],
+    w: ArrayLike, *, with_error: Literal[True], **options: Unpack[_Options]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+
+@overload
+def lyapunov(
+    w: ArrayLike | Model,
+    *,
+    parameters: Mapping[str, ArrayLike] | None,
+    with_error: bool = False,
+    **options: Unpack[_Options],
+) -> Any: ...
 
 
 def lyapunov(
     w: ArrayLike | Model,
     *,
+    parameters: Mapping[str, ArrayLike] | None = None,
     t: float | None = None,
     tol: float | None = None,
     transient: float | None = None,
@@ -95,7 +79,7 @@ def lyapunov(
     threads: int | None = None,
     progress: bool | None = None,
     with_error: bool = False,
-) -> float | NDArray[np.float64] | tuple[float, float] | tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> Any:
     """The largest Lyapunov exponent: the mean rate at which neighbouring orbits part.
 
     Parameters
@@ -103,6 +87,9 @@ def lyapunov(
     w : float, array_like or Model
         Drive of the undamped diffusionless Lorenz equations, or any model. Arrays of any shape are spread
         over all cores.
+    parameters : mapping of str to array_like, optional
+        Other values of some of the model's parameters, of shapes that broadcast with one another and with
+        `w`; the result has their shape.
     t : float, optional
         Time to run at most; by default 1e5, or 25000 s for a model with units.
     tol : float, optional
@@ -123,7 +110,7 @@ def lyapunov(
 
     Returns
     -------
-    exponent : float, or ndarray of the shape of `w`
+    exponent : float, or ndarray of the shape of `w` and the `parameters`
         Per unit of time (1/s for a model with units).
     standard_error : float or ndarray
         Where `with_error` is set: from the scatter of the means over blocks of the run. Blocks of a short run
@@ -160,15 +147,22 @@ def lyapunov(
     >>> value, error = udd.lyapunov(1.0, tol=5e-3, with_error=True)
     >>> abs(value - 0.21016) < 4 * error
     True
+
+    With damping, and of a model with units:
+
+    >>> udd.lyapunov([1.0, 2.0, 3.0], parameters={"B": 0.2}, tol=0.02).shape
+    (3,)
+    >>> disk = udd.Disk(0.05, edge="ignore")
+    >>> udd.lyapunov(disk, parameters={"W": [0.055, 0.06], "k0": [[0.012], [0.013]]}, tol=0.2).shape
+    (2, 2)
     """
-    if isinstance(w, Model):
-        model, values = w, np.array([next(iter(w.parameters.values()))])
-        shape: tuple[int, ...] = ()
-    else:
-        drives = array("w", w)
-        if (drives < 0).any():
-            raise ModelError(f"w must not be negative, not {drives[drives < 0].flat[0]:g}")
-        model, values, shape = DLE(1.0), drives.ravel(), drives.shape
+    model, own = (w, {}) if isinstance(w, Model) else (DLE(1.0), {"w": w})
+    for name in own.keys() & (parameters or {}).keys():
+        raise ModelError(f"{name} is given twice, also among the parameters")
+    orbits = varied(model, {**own, **(parameters or {})})
+    n, shape = len(orbits), orbits.shape
+    for drives in (orbits.values[name] for name in own if n):
+        DLE(float(drives.min()))  # refuses what is negative
     slow = 1.0 if isinstance(model, DLE) else 0.25  # the disk's unit of time is 0.27 s
     time, skipped = span(t, transient, longest=1e5 * slow, skip=400.0 * slow)
     goal = number("tol", 2e-3 / slow if tol is None else tol, above=0.0)
@@ -176,15 +170,13 @@ def lyapunov(
     start = initial_state(model, default_start(model) if state0 is None else state0)
     crew = thread_count(threads)
 
-    n = values.size
     exponents, errors = np.empty(n), np.empty(n if with_error else 0)
     missed, worst = 0, 0.0
     outcomes: list[int] = []
     with bar(n, "exponents", progress) as show:
         for first in range(0, n, PORTION):
             part = slice(first, min(first + PORTION, n))
-            rows = np.tile(list(model.parameters.values()), (part.stop - first, 1))
-            rows[:, 0] = values[part]
+            rows = orbits.rows(part)
             found = _core.lyapunov(
                 model, rows, start[None, :], False, time, skipped, goal, rtol, atol, crew, show(first)
             )
@@ -248,13 +240,3 @@ def span(t: float | None, transient: float | None, *, longest: float, skip: floa
     if skipped >= time:
         raise ModelError(f"transient must be below t = {time:g}, not {skipped:g}")
     return time, skipped
-
-
-def default_start(model: Model) -> list[float]:
-    """An initial state from which orbits reach the main attractor."""
-    if isinstance(model, DLE):
-        return [1.0, 1.0, 0.01]
-    if isinstance(model, Disk):
-        # The same state in the disk's units, for the paper's constants.
-        return [3.75, 0.0046, 5e-5, 0.0]
-    return [0.0, 1.0]

@@ -3,16 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._validate import array
 from udd.errors import ModelError
-from udd.exponents import default_start
-from udd.models import Model
+from udd.models import DLE, Disk, Model
 
 Floats = NDArray[np.float64]
+
+
+def default_start(model: Model) -> list[float]:
+    """An initial state from which orbits reach the main attractor."""
+    if isinstance(model, DLE):
+        start = [1.0, 1.0, 0.01]
+    elif isinstance(model, Disk):
+        # The same state in the disk's units, for the paper's constants.
+        start = [3.75, 0.0046, 5e-5, 0.0]
+    else:
+        start = [0.0, 1.0]
+    return start + [0.0] * (len(model.state_names) - len(start))  # bristles are at rest
+
+
+@dataclass(frozen=True, eq=False)
+class Varied:
+    """A model with other values of some parameters in each of many orbits.
+
+    Attributes
+    ----------
+    model : Model
+    values : dict of str to ndarray
+        Their values, of shapes that broadcast to `shape`.
+    shape : tuple of int
+        That of the orbits.
+    """
+
+    model: Model
+    values: dict[str, Floats]
+    shape: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    def rows(self, part: slice = slice(None)) -> Floats:
+        """All parameters of some of the orbits, shape (orbits, parameters)."""
+        first, last, _ = part.indices(len(self))
+        names = list(self.model.parameters)
+        rows = np.tile(np.array(list(self.model.parameters.values())), (last - first, 1))
+        for name, value in self.values.items():
+            rows[:, names.index(name)] = np.broadcast_to(value, self.shape).flat[first:last]
+        return rows
+
+
+def varied(model: Model, parameters: Mapping[str, ArrayLike], states: tuple[int, ...] = ()) -> Varied:
+    """The checked parameters of orbits; `states` are the leading axes of their initial states."""
+    values = {name: array(name, value) for name, value in parameters.items()}
+    try:
+        shape = np.broadcast_shapes(states, *(value.shape for value in values.values()))
+    except ValueError:
+        shapes = ", ".join(str(own) for own in (states, *(value.shape for value in values.values())))
+        raise ModelError(f"state0 and parameters of the shapes {shapes} do not fit together") from None
+    for name, value in values.items():
+        for extreme in (value.min(), value.max()) if value.size else ():
+            model.with_parameters({name: float(extreme)})
+    return Varied(model, values, shape)
 
 
 def orbits_of(
@@ -21,32 +77,16 @@ def orbits_of(
     """The leading axes, the parameters of each orbit (or of all), and its start (or that of all)."""
     states = array("state0", default_start(model) if state0 is None else state0)
     names = model.state_names
-    if state0 is None and states.shape != (len(names),):
-        states = np.append(states, np.zeros(len(names) - len(states)))
     if states.ndim == 0 or states.shape[-1] != len(names):
         raise ModelError(
             f"state0 must have the {len(names)} components {', '.join(names)} along its last axis, "
             f"not shape {states.shape}"
         )
-    values = {name: array(name, value) for name, value in parameters.items()}
-    try:
-        shape = np.broadcast_shapes(states.shape[:-1], *(value.shape for value in values.values()))
-    except ValueError:
-        shapes = ", ".join(str(a.shape) for a in (states, *values.values()))
-        raise ModelError(f"state0 and parameters of the shapes {shapes} do not fit together") from None
+    orbits = varied(model, parameters, states.shape[:-1])
+    shape = orbits.shape
     if 0 in shape:
         raise ModelError(f"there is no orbit to follow: the shape is {shape}")
-    jobs = int(np.prod(shape, dtype=np.int64))
-    base = np.array(list(model.parameters.values()))
-    if values:
-        for name, value in values.items():
-            for extreme in (value.min(), value.max()):
-                model.with_parameters({name: float(extreme)})
-        rows = np.tile(base, (jobs, 1))
-        for name, value in values.items():
-            rows[:, list(model.parameters).index(name)] = np.broadcast_to(value, shape).ravel()
-    else:
-        rows = base[None]
+    rows = orbits.rows() if orbits.values else orbits.rows(slice(1))
     starts = states.reshape(1, -1) if states.ndim == 1 else np.broadcast_to(states, (*shape, len(names)))
     starts = np.ascontiguousarray(starts).reshape(-1, len(names))
     off = off_wheels(model, rows, starts)

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import number
 from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError, ModelError
-from udd.exponents import default_start, reason, span
+from udd.exponents import reason, span
 from udd.models import DLE, Disk, Model
+from udd.orbits import default_start
 from udd.outcomes import FINISHED, OUTCOMES
 from udd.trajectory import initial_state, tolerances
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from udd._validate import array, number
 from udd.crew import thread_count
 from udd.errors import ModelError
-from udd.exponents import default_start
 from udd.models import Model
+from udd.orbits import default_start
 from udd.sections import CLOCKS, clock_of, surfaces_of
 from udd.trajectory import initial_state, tolerances
 
@@ -55,10 +55,7 @@ def start_states(model: Model, starts: ArrayLike | None) -> Floats:
     if not isinstance(model, Model):
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
     if starts is None:
-        start = np.zeros(len(model.state_names))  # bristles are at rest
-        own = default_start(model)
-        start[: len(own)] = own
-        return start[None]
+        return np.array([default_start(model)])
     given = np.atleast_2d(array("starts", starts))
     if given.ndim != 2 or not len(given):
         raise ModelError("starts must be a list of initial states")

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd._validate import array, number
 from udd.errors import ModelError, UddError
-from udd.exponents import default_start
 from udd.models import Model
+from udd.orbits import default_start
 from udd.trajectory import initial_state
 
 from .models_json import model_from_dict, model_to_dict
