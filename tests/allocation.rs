@@ -1,50 +1,13 @@
-//! Nothing is allocated inside the step loop.
+//! Nothing is allocated inside the step loop. For whole runs see `fleet.rs`.
 
-use std::alloc::{GlobalAlloc, Layout, System as Heap};
-use std::cell::Cell;
+mod counting;
 
+use counting::allocations;
 use udd::integrate::{Dopri5, Driver, Ending, Method, Taylor, Tolerance};
 use udd::model::effects::{Effect, Kind, Treatment};
 use udd::model::{DiskFamily, DleFamily, Family, System};
 use udd::scalar::Isa;
 use udd::tape::Tape;
-
-/// Counts what each thread asks the heap for.
-struct Counting;
-
-thread_local!(static COUNT: Cell<usize> = const { Cell::new(0) });
-
-fn count() {
-    COUNT.set(COUNT.get() + 1);
-}
-
-// SAFETY: everything is handed on to the system's own allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        unsafe { Heap.alloc(layout) }
-    }
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count();
-        unsafe { Heap.alloc_zeroed(layout) }
-    }
-    unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        unsafe { Heap.realloc(old, layout, size) }
-    }
-    unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
-        unsafe { Heap.dealloc(old, layout) }
-    }
-}
-
-#[global_allocator]
-static HEAP: Counting = Counting;
-
-fn allocations<T>(work: impl FnOnce() -> T) -> usize {
-    let before = COUNT.get();
-    std::hint::black_box(work());
-    COUNT.get() - before
-}
 
 const START: [f64; 3] = [1.0, 1.0, 0.01];
 const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-11 };

@@ -1,7 +1,10 @@
-//! Many runs: the same bits however they are spread, and the right numbers.
+//! Many runs: the same bits however they are spread, the right numbers, and no allocation as they go on.
+
+mod counting;
 
 use std::sync::atomic::AtomicUsize;
 
+use counting::allocations;
 use udd::integrate::Tolerance;
 use udd::model::effects::Kind;
 use udd::model::{DiskFamily, DleFamily, Effect, Family};
@@ -130,5 +133,49 @@ fn reference_states() {
                 assert!((value - exact).abs() < 2e-11, "{stepper:?} {:?}", run.states[2]);
             }
         }
+    }
+}
+
+/// Runs of ten times the length allocate as often, with all instructions that the machine has.
+fn same_for_longer_runs(name: &str, work: impl Fn(Crew<'_>, f64)) {
+    // The machine is asked once what it has.
+    Isa::best();
+    for isa in Isa::available() {
+        let (done, stop) = (AtomicUsize::new(0), Stop::new());
+        // On the thread that counts.
+        let crew = Crew { threads: 1, isa, done: &done, stop: &stop };
+        let [short, long] = [1.0, 10.0].map(|times| allocations(|| work(crew, times)));
+        assert!(short > 0, "nothing is counted");
+        assert_eq!(short, long, "{name}, {isa:?}");
+    }
+}
+
+/// One orbit, and more than two packets' worth.
+#[test]
+fn nothing_is_allocated_as_runs_go_on() {
+    for n in [1, 19] {
+        let values: Vec<Vec<f64>> = (0..n).map(|i| vec![1.0 + 0.3 * f64::from(i), 0.0]).collect();
+        let (family, starts, tolerance) = (&DleFamily, &[[1.0, 1.0, 0.01]], TOLERANCE);
+        for stepper in [Stepper::Taylor, Stepper::Dopri5] {
+            same_for_longer_runs(&format!("{n} by {stepper:?}"), |crew, times| {
+                let times = &[0.0, 1.0, 20.0 * times];
+                let all = Ensemble { family, values: &values, starts, times, tolerance, stepper };
+                assert!(all.run(crew).iter().flatten().all(|run| run.states.len() == 3));
+            });
+        }
+        let orbits = |times: f64| Lyapunov {
+            family,
+            values: &values,
+            starts,
+            options: LyapunovOptions { time: 60.0 * times, transient: 10.0, goal: 0.0, tolerance },
+        };
+        same_for_longer_runs(&format!("{n} largest exponents"), |crew, times| {
+            let found = orbits(times).run::<1>(crew);
+            assert!(found.iter().flatten().all(|orbit| orbit.t == 60.0 * times));
+        });
+        same_for_longer_runs(&format!("{n} spectra"), |crew, times| {
+            let found = orbits(times).run::<3>(crew);
+            assert!(found.iter().flatten().all(|orbit| orbit.t == 60.0 * times));
+        });
     }
 }

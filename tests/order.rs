@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use udd::integrate::tableau::DormandPrince;
-use udd::integrate::{Dopri5, Method, Point, Tolerance, step};
+use udd::integrate::{Dop853, Dopri5, Method, Point, Tolerance, step};
 use udd::model::{DiskFamily, Dle, Family, System, sides_of};
 use udd::scalar::{Dual, Scalar};
 
@@ -98,5 +98,46 @@ fn dense_output_is_of_order_4() {
             (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))
         });
         assert!((slope(&points) - 5.0).abs() < WITHIN, "slope {} at {theta}", slope(&points));
+    }
+}
+
+/// `n` equal steps of any method over `[0, end]`.
+fn stepped<K: Method<f64, 3> + Default>(dle: &Dle<f64>, x0: [f64; 3], end: f64, n: usize) -> [f64; 3] {
+    let (mut method, h) = (K::default(), end / n as f64);
+    let mut at = Point { t: 0.0, x: x0, sides: sides_of(dle, 0.0, &x0) };
+    for _ in 0..n {
+        method.begin(dle, &at, true);
+        at.x = method.attempt(dle, &at, h, &Tolerance::default()).x;
+        at.t += h;
+    }
+    at.x
+}
+
+#[test]
+fn dop853_is_of_order_8() {
+    let dle = Dle { w: 1.0, b: 0.2 };
+    let x0 = [1.0, 1.0, 0.01];
+    let exact = fixed(&dle, x0, 4.0, REFERENCE);
+    let points = [6, 7, 8, 10, 12]
+        .map(|n| (1.0 / n as f64, distance(stepped::<Dop853<f64, 3>>(&dle, x0, 4.0, n), exact)));
+    // Terms of order 9 still show at the longest step.
+    assert!((slope(&points) - 8.0).abs() < 3.0 * WITHIN, "slope {} of {points:?}", slope(&points));
+}
+
+/// Over one step the polynomial's error is `h^8` (order 7).
+#[test]
+fn the_extension_of_dop853_is_of_order_7() {
+    let dle = Dle { w: 1.0, b: 0.2 };
+    let x0 = [1.0, 1.0, 0.01];
+    let start = Point { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
+    for theta in [0.3, 0.62] {
+        let points = [0.8, 0.65, 0.52, 0.42, 0.34].map(|h| {
+            let mut method = Dop853::default();
+            method.begin(&dle, &start, true);
+            method.attempt(&dle, &start, h, &Tolerance::default());
+            method.extend(&dle, &start);
+            (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))
+        });
+        assert!((slope(&points) - 8.0).abs() < 3.0 * WITHIN, "slope {} at {theta}", slope(&points));
     }
 }

@@ -1,7 +1,10 @@
 //! Sections: crossings of surfaces along trajectories, and the formulas that surfaces are given by.
 
+mod counting;
+
 use std::sync::atomic::AtomicUsize;
 
+use counting::allocations;
 use udd::integrate::{Dopri5, Driver, Taylor, Tolerance};
 use udd::model::{DiskFamily, DleFamily, Family};
 use udd::run::{Crew, Crossings, Ended, Output, Section, Sections, Stop, trajectory};
@@ -350,5 +353,23 @@ fn mistakes_are_named() {
     assert!(mistake(&"z+".repeat(600)).contains("longer than 1000 characters"));
     for open in ["(", "-", "sin(", "2^"] {
         assert!(mistake(&format!("{}z", open.repeat(200))).contains("nested deeper than 50"), "{open}");
+    }
+}
+
+/// Crossings take room; those left out take none, for one trajectory and in packets.
+#[test]
+fn nothing_is_allocated_for_crossings_left_out() {
+    let (list, tolerance) = ([("z", 1), ("omega - y", 0)], Tolerance::default());
+    Isa::best();
+    for n in [1, 19] {
+        let rows: Vec<Vec<f64>> = (0..n).map(|i| vec![1.0 + 0.3 * f64::from(i), 0.0]).collect();
+        for isa in Isa::available() {
+            let [short, long] = [20, 200].map(|skip| {
+                let how = How { skip, tolerance, isa, ..How::many(5) };
+                allocations(|| collect(&DleFamily, &rows, &[START], &list, how))
+            });
+            assert!(short > 0, "nothing is counted");
+            assert_eq!(short, long, "{n}, {isa:?}");
+        }
     }
 }

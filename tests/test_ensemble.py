@@ -10,7 +10,7 @@ import udd
 STARTS = np.random.default_rng(3).normal(size=(4, 5, 3))
 
 
-@pytest.mark.parametrize("method", ["taylor", "dopri5"])
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "dop853"])
 def test_its_runs_are_those_of_simulate(method):
     times = np.array([0.0, 2.0, 9.0])
     found = udd.ensemble(udd.DLE(1.0), times, STARTS, method=method)

@@ -153,7 +153,7 @@ class Trajectory:
         )
 
 
-METHODS = ("auto", "dopri5", "taylor")
+METHODS = ("auto", "dopri5", "dop853", "taylor")
 """How steps may be taken."""
 
 
@@ -221,11 +221,11 @@ def simulate(
     rtol, atol : float
         Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
         in the state's units.
-    method : {"dopri5", "taylor", "auto"}
-        ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4. ``"taylor"``
-        follows the solution's power series to order 12 or 18, by the tolerance; its dense output is as
-        accurate as its steps. Both land on the surfaces where the law changes. ``"auto"`` takes the faster
-        one, as measured.
+    method : {"dopri5", "dop853", "taylor", "auto"}
+        ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
+        theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
+        solution's power series to order 12 or 18, by the tolerance; its dense output is as accurate as its
+        steps. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured.
     dense : bool
         Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
 

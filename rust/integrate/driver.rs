@@ -242,12 +242,6 @@ where
         self.method.at(dt)
     }
 
-    /// The same without derivatives.
-    #[inline(always)]
-    pub fn dense_real(&self, dt: S::Real) -> [S::Real; D] {
-        self.method.real_at(dt)
-    }
-
     /// The method, whose polynomial is that of the last trial.
     pub fn method(&self) -> &K {
         &self.method
@@ -281,6 +275,7 @@ where
         }
         let asked = S::Real::select(active, h, S::Real::zero());
         let trial = self.method.attempt(&self.system, &self.at, asked, &self.norm);
+        self.method.extend(&self.system, &self.at);
         self.work.trials = tick(active, self.work.trials, 1.0);
 
         let judged = active.and(landing.not());
@@ -337,7 +332,6 @@ where
         progress: &mut Progress<S::Mask>,
     ) {
         let never = S::mask(false);
-        self.method.extend(&self.system, &self.at);
         let watch = Watch {
             system: &self.system,
             at: &self.at,

@@ -70,7 +70,7 @@ where
     /// The same at `dt` after the start of the method's last trial, on its polynomial.
     #[inline(always)]
     pub fn on<K: Method<S, D>>(&self, target: usize, method: &K, dt: S::Real) -> S::Real {
-        let x = method.real_at(dt);
+        let x = method.real_at(dt, &self.system.watched());
         self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
     }
 
@@ -84,7 +84,7 @@ where
             Found { crossing: [never; TARGETS], stale: [never; TARGETS], dt: infinite, high: infinite, zero };
         let mut earliest = infinite;
         let mut stale = never;
-        let probes = method.probes(h);
+        let probes = method.along(h, K::PROBES, &self.system.watched());
         for target in self.targets() {
             let mut values = [zero; MOST_PROBES];
             let mut any = never;

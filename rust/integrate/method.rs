@@ -5,7 +5,7 @@ use crate::model::{Sides, System};
 use crate::scalar::Scalar;
 use crate::unroll::vector;
 
-/// No method looks at more places within a step.
+/// So many places within a step are looked at side by side, at most.
 pub const MOST_PROBES: usize = 8;
 
 /// Where a run stands, lane by lane.
@@ -63,19 +63,19 @@ pub trait Method<S: Scalar, const D: usize> {
     /// The state at `dt` after the start of the last trial, on its polynomial.
     fn at(&self, dt: S::Real) -> [S; D];
 
-    /// The same without derivatives.
+    /// The same without derivatives, of at least these components.
     #[inline(always)]
-    fn real_at(&self, dt: S::Real) -> [S::Real; D] {
+    fn real_at(&self, dt: S::Real, _of: &[bool; D]) -> [S::Real; D] {
         let x = self.at(dt);
         vector!(S::Real, D; n => x[n].real())
     }
 
-    /// The states at the method's [places](Method::PROBES) in the last trial, of size `h`, without derivatives.
+    /// The same at these parts of `h`, of which there are at most [`MOST_PROBES`].
     #[inline(always)]
-    fn probes(&self, h: S::Real) -> [[S::Real; D]; MOST_PROBES] {
+    fn along(&self, h: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; MOST_PROBES] {
         let mut states = [[S::Real::zero(); D]; MOST_PROBES];
-        for (state, &theta) in states.iter_mut().zip(Self::PROBES) {
-            *state = self.real_at(h.scale(theta));
+        for (state, &part) in states.iter_mut().zip(parts) {
+            *state = self.real_at(h.scale(part), of);
         }
         states
     }

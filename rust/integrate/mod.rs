@@ -5,6 +5,7 @@
 //! stepping loop, on which every derived object is built.
 
 pub mod control;
+mod dop853;
 mod driver;
 mod landing;
 mod method;
@@ -16,11 +17,12 @@ pub mod tableau;
 mod taylor;
 mod tolerance;
 
+pub use dop853::Dop853Scheme;
 pub use driver::{Counts, Driver, Ending, Progress};
 pub use landing::{TARGETS, WALL};
 pub use method::{MOST_PROBES, Method, Point, Trial};
 pub use propagate::{propagate, propagate_from};
-pub use runge_kutta::{Dopri5, RungeKutta, step};
+pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};
 pub use saltation::pass;
 pub use taylor::{Taylor, order};
 pub use tolerance::{ErrorNorm, Failure, Tolerance, WithTangents};

@@ -2,6 +2,7 @@
 
 use std::marker::PhantomData;
 
+use super::dop853::Dop853Scheme;
 use super::method::{Method, Point, Trial};
 use super::tableau::{DormandPrince, Scheme};
 use super::tolerance::ErrorNorm;
@@ -75,6 +76,13 @@ pub struct RungeKutta<T, S: Scalar, const D: usize, const N: usize, const P: usi
 /// Dormand & Prince's pair of order 5(4).
 pub type Dopri5<S, const D: usize> = RungeKutta<DormandPrince, S, D, 7, 4>;
 
+/// Dormand & Prince's method of order 8(5, 3) as in the program DOP853.
+pub type Dop853<S, const D: usize> = RungeKutta<Dop853Scheme, S, D, 16, 7>;
+
+/// Where a step is looked at: a longer step, as of a higher order, more closely.
+const FOUR: &[f64] = &[0.25, 0.5, 0.75, 1.0];
+pub(super) const EIGHT: &[f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
+
 impl<T, S: Scalar, const D: usize, const N: usize, const P: usize> Default for RungeKutta<T, S, D, N, P> {
     fn default() -> Self {
         let zero = [S::zero(); D];
@@ -106,9 +114,9 @@ where
     S: Scalar,
 {
     const ORDER: i32 = T::TABLEAU.order;
-    const EVALUATIONS: usize = T::TABLEAU.stages - 1;
+    const EVALUATIONS: usize = N - 1;
     const SERIES: bool = false;
-    const PROBES: &'static [f64] = &[0.25, 0.5, 0.75, 1.0];
+    const PROBES: &'static [f64] = if T::TABLEAU.order > 5 { EIGHT } else { FOUR };
 
     #[inline(always)]
     fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {
@@ -125,8 +133,17 @@ where
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
         let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
-        let error = vector!(S, D; n => combine(&T::TABLEAU.e, &stages, T::TABLEAU.stages, n).times(h));
-        let error = norm.of_step(&error, &at.x, &x);
+        let estimate = |weights: &[f64; N]| {
+            let error = vector!(S, D; n => combine(weights, &stages, T::TABLEAU.stages, n).times(h));
+            norm.of_step(&error, &at.x, &x)
+        };
+        let mut error = estimate(&T::TABLEAU.e);
+        if let Some(low) = &T::TABLEAU.e_low {
+            // Hairer's combination, which behaves as h^8.
+            let (square, low) = (error * error, estimate(low));
+            let both = square + (low * low).scale(0.01);
+            error = S::Real::select(S::Real::zero().less(both), square / both.sqrt(), error);
+        }
         (self.x, self.h, self.stages) = (at.x, h, stages);
         Trial { x, size: h, error }
     }

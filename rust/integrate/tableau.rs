@@ -17,6 +17,8 @@ pub struct Tableau<const N: usize, const P: usize> {
     pub a: [[f64; N]; N],
     /// The solution's weights minus those of the embedded one: the error estimate is `h Σ e_i k_i`.
     pub e: [f64; N],
+    /// The same for a second embedded solution, of lower order, which keeps the first from being too sure.
+    pub e_low: Option<[f64; N]>,
     /// The continuous extension: `x(t + θ h) = x + h Σ_i k_i Σ_j p_ij θ^(j+1)`.
     pub p: [[f64; P]; N],
 }
@@ -54,6 +56,7 @@ impl Scheme<7, 4> for DormandPrince {
             22.0 / 525.0,
             -1.0 / 40.0,
         ],
+        e_low: None,
         p: [
             [1.0, -8048581381.0 / 2820520608.0, 8663915743.0 / 2820520608.0, -12715105075.0 / 11282082432.0],
             [0.0; 4],
@@ -78,37 +81,58 @@ impl Scheme<7, 4> for DormandPrince {
 
 #[cfg(test)]
 mod tests {
+    use super::super::dop853::Dop853Scheme;
     use super::{DormandPrince, Scheme, Tableau};
 
-    const DP: Tableau<7, 4> = DormandPrince::TABLEAU;
+    /// Quadrature by all stages: `sum of weights * c^power`.
+    fn moment<const N: usize, const P: usize>(t: &Tableau<N, P>, weights: &[f64; N], power: i32) -> f64 {
+        (0..N).map(|i| weights[i] * t.c[i].powi(power)).sum()
+    }
 
-    #[test]
-    fn rows_sum_to_the_stage_times() {
-        for i in 0..7 {
-            let sum: f64 = DP.a[i].iter().sum();
-            assert!((sum - DP.c[i]).abs() < 1e-14, "row {i}: {sum}");
+    /// Conditions that any pair's numbers meet, to the rounding of numbers of this size.
+    fn consistent<const N: usize, const P: usize>(t: &Tableau<N, P>, embedded: i32, rounding: f64) {
+        for i in 0..N {
+            let sum: f64 = t.a[i].iter().sum();
+            assert!((sum - t.c[i]).abs() < rounding, "row {i}: {sum}");
+        }
+        let step = t.stages - 1;
+        for power in 0..t.order {
+            let sum = moment(t, &t.a[step], power);
+            assert!((sum - 1.0 / f64::from(power + 1)).abs() < rounding, "power {power}: {sum}");
+            // The estimate vanishes up to the embedded solution's order only.
+            let error = moment(t, &t.e, power);
+            assert_eq!(error.abs() < 1e-3 * rounding.sqrt(), power < embedded, "power {power}: {error}");
+        }
+        for i in 0..N {
+            let value: f64 = t.p[i].iter().sum();
+            assert!((value - t.a[step][i]).abs() < 10.0 * rounding, "the extension's value, stage {i}");
+            let slope: f64 = (0..P).map(|j| (j + 1) as f64 * t.p[i][j]).sum();
+            let wanted = if i == step { 1.0 } else { 0.0 };
+            assert!((slope - wanted).abs() < 100.0 * rounding, "the extension's slope, stage {i}: {slope}");
+        }
+        for power in 0..P as i32 {
+            // The extension integrates polynomials exactly too: at half the step here.
+            let half: [f64; N] =
+                std::array::from_fn(|i| (0..P).map(|j| t.p[i][j] * 0.5f64.powi(j as i32 + 1)).sum());
+            let sum = moment(t, &half, power);
+            let wanted = 0.5f64.powi(power + 1) / f64::from(power + 1);
+            assert!((sum - wanted).abs() < 10.0 * rounding, "the extension, power {power}: {sum}");
         }
     }
 
     #[test]
-    fn quadrature_conditions_hold_to_the_order() {
-        for power in 0..DP.order {
-            let sum: f64 = (0..7).map(|i| DP.a[6][i] * DP.c[i].powi(power)).sum();
-            assert!((sum - 1.0 / f64::from(power + 1)).abs() < 1e-14, "power {power}");
-            // The embedded solution has order 4, so the estimate vanishes up to there only.
-            let error: f64 = (0..7).map(|i| DP.e[i] * DP.c[i].powi(power)).sum();
-            assert_eq!(error.abs() < 1e-15, power < 4, "power {power}");
-        }
+    fn dopri5_is_consistent() {
+        consistent(&DormandPrince::TABLEAU, 4, 1e-14);
     }
 
     #[test]
-    fn the_extension_ends_at_the_new_state_with_the_new_rate() {
-        for i in 0..7 {
-            let value: f64 = DP.p[i].iter().sum();
-            assert!((value - DP.a[6][i]).abs() < 1e-14, "value, stage {i}");
-            let slope: f64 = (0..4).map(|j| (j + 1) as f64 * DP.p[i][j]).sum();
-            let wanted = if i == 6 { 1.0 } else { 0.0 };
-            assert!((slope - wanted).abs() < 1e-13, "slope, stage {i}");
+    fn dop853_is_consistent() {
+        // Its weights go up to 100.
+        let t = Dop853Scheme::TABLEAU;
+        consistent(&t, 5, 1e-13);
+        let low = t.e_low.unwrap();
+        for power in 0..5 {
+            assert_eq!(moment(&t, &low, power).abs() < 1e-12, power < 3, "power {power}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The Taylor method.
 
 use super::method::{MOST_PROBES, Method, Point, Trial};
+use super::runge_kutta::EIGHT;
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
 use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
@@ -73,7 +74,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     const ORDER: i32 = HIGH as i32;
     const EVALUATIONS: usize = 1;
     const SERIES: bool = true;
-    const PROBES: &'static [f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
+    const PROBES: &'static [f64] = EIGHT;
 
     fn set_parameters(&mut self, values: &[S]) {
         self.parameters.copy_from_slice(values);
@@ -105,13 +106,12 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         self.jets.at(dt)
     }
 
-    fn real_at(&self, dt: S::Real) -> [S::Real; D] {
-        self.jets.real_at(dt)
+    fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
+        self.jets.real_at(dt, of)
     }
 
-    fn probes(&self, h: S::Real) -> [[S::Real; D]; MOST_PROBES] {
-        const { assert!(MOST_PROBES == Self::PROBES.len()) };
-        self.jets.real_at_parts(h, Self::PROBES)
+    fn along(&self, h: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; MOST_PROBES] {
+        self.jets.along(h, parts, of)
     }
 
     #[inline(always)]

@@ -184,6 +184,14 @@ impl<S: Scalar> System<S, 4> for Disk<S> {
         }
     }
 
+    #[inline(always)]
+    fn watched(&self) -> [bool; 4] {
+        match self.sticking {
+            Sticking::Never => [true, self.edge, self.edge, false],
+            _ => [true; 4],
+        }
+    }
+
     fn surface_name(&self, j: usize, side: bool) -> &'static str {
         match j {
             REVERSAL => "reversal",

@@ -46,6 +46,12 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         S::one()
     }
 
+    /// The components of the state that the surfaces and the wall depend on: only these are looked at within
+    /// a step.
+    fn watched(&self) -> [bool; D] {
+        [true; D]
+    }
+
     /// What it is called when the state gets to this side of surface `j`, for the record of events.
     fn surface_name(&self, _j: usize, _side: bool) -> &'static str {
         ""
@@ -86,6 +92,10 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     #[inline(always)]
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
         (**self).surface(j, t, x, sides)
+    }
+    #[inline(always)]
+    fn watched(&self) -> [bool; D] {
+        (**self).watched()
     }
     fn surface_name(&self, j: usize, side: bool) -> &'static str {
         (**self).surface_name(j, side)

@@ -7,7 +7,7 @@ use pyo3::types::PyDict;
 use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
 use super::model::{AnyModel, state, with_model};
-use crate::integrate::{Dopri5, Taylor, Tolerance, order};
+use crate::integrate::{Dop853, Dopri5, Taylor, Tolerance, order};
 use crate::model::{Family, System};
 use crate::observe::Record;
 use crate::run::{Output, Run, Stepper, Stop, rows, trajectory};
@@ -46,6 +46,7 @@ impl<const D: usize> Piecewise for Record<D> {
 pub fn stepper(method: &str) -> PyResult<Stepper> {
     match method {
         "dopri5" => Ok(Stepper::Dopri5),
+        "dop853" => Ok(Stepper::Dop853),
         "taylor" => Ok(Stepper::Taylor),
         _ => Err(ModelError::new_err(format!("no method is called {method:?}"))),
     }
@@ -62,9 +63,10 @@ fn run<F: Family<D>, const D: usize>(
     let system = family.build(values);
     let Run { t, x, events, outcome, counts, record } = match stepper {
         Stepper::Dopri5 => trajectory(&system, Dopri5::default(), output, x0, tolerance, keep, stop)?,
+        Stepper::Dop853 => trajectory(&system, Dop853::default(), output, x0, tolerance, keep, stop)?,
         Stepper::Taylor => {
             let tape = rows::tape(family, &[values.to_vec()]);
-            let message = "the model's law depends on comparisons, which no power series follows; use method=\"dopri5\"";
+            let message = "the model's law depends on comparisons, which no power series follows; use method=\"dop853\"";
             let tape = tape.ok_or_else(|| ModelError::new_err(message))?;
             let method = Taylor::new(&tape, values.to_vec(), order(tolerance), Isa::best());
             trajectory(&system, method, output, x0, tolerance, keep, stop)?

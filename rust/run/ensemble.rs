@@ -1,7 +1,7 @@
 //! The same model from many states, or with many values of its parameters.
 
 use super::fleet::{Crew, Fleet, Queue, sail};
-use super::recipe::{ByDopri5, ByTaylor, Recipe};
+use super::recipe::{ByDop853, ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
 use super::trajectory::Outcome;
@@ -13,6 +13,7 @@ use crate::scalar::{Isa, Mask, Real, Scalar};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stepper {
     Dopri5,
+    Dop853,
     /// Where a series follows the law, else as [`Dopri5`](Stepper::Dopri5).
     Taylor,
 }
@@ -48,6 +49,7 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
         let (runs, isa) = (rows::count(self.values, self.starts), crew.isa);
         let tape = match self.stepper {
             Stepper::Dopri5 => None,
+            Stepper::Dop853 => return sail(&Sampled { ensemble: self, recipe: ByDop853, isa }, runs, crew),
             Stepper::Taylor => rows::tape(self.family, self.values),
         };
         match &tape {

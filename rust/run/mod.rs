@@ -24,7 +24,7 @@ pub use fleet::{Crew, Fleet, Queue, sail};
 pub use frames::{Frames, frames};
 pub use lyapunov::{Exponents, Lyapunov, LyapunovOptions};
 pub use moments::Moments;
-pub use recipe::{ByDopri5, ByTaylor, Recipe};
+pub use recipe::{ByDop853, ByDopri5, ByTaylor, Recipe};
 pub use section::{Crossings, Ended, FAR, Section, Sections};
 pub use ship::{Ship, Start};
 pub use stop::Stop;

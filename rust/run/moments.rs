@@ -1,19 +1,33 @@
 //! Time averages of the state and of the products of its components.
 
+use std::array::from_fn;
+
 use super::ship::work;
 use crate::integrate::{Driver, ErrorNorm, Method};
 use crate::model::System;
 use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
 use crate::unroll::unroll;
 
-/// Gauss-Legendre nodes on `[0, 1]` and their weights: exact for products of polynomials of degree 5.
-const NODES: [(f64, f64); 6] = [
-    (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
-    (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
-    (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
-    (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
-    (0.830_604_693_233_132_3, 0.180_380_786_524_069_3),
-    (0.966_234_757_101_576, 0.085_662_246_189_585_17),
+/// Gauss-Legendre nodes on `[0, 1]` and their weights: exact for products of polynomials of degree 7.
+const NODES: [f64; 8] = [
+    0.019_855_071_751_231_884,
+    0.101_666_761_293_186_64,
+    0.237_233_795_041_835_5,
+    0.408_282_678_752_175_1,
+    0.591_717_321_247_825,
+    0.762_766_204_958_164_5,
+    0.898_333_238_706_813_4,
+    0.980_144_928_248_768_1,
+];
+const WEIGHTS: [f64; 8] = [
+    0.050_614_268_145_188_13,
+    0.111_190_517_226_687_24,
+    0.156_853_322_938_943_63,
+    0.181_341_891_689_181,
+    0.181_341_891_689_181,
+    0.156_853_322_938_943_63,
+    0.111_190_517_226_687_24,
+    0.050_614_268_145_188_13,
 ];
 
 /// Integrals over time, or averages once divided by it.
@@ -22,7 +36,8 @@ pub struct Moments<R, const D: usize> {
     pub time: R,
     /// Of each component.
     pub first: [R; D],
-    /// Of each product of two components.
+    /// Of each product of two components; as long as time runs only those with the second one not before
+    /// the first.
     pub second: [[R; D]; D],
 }
 
@@ -55,7 +70,8 @@ impl<R: Real, const D: usize> Moments<R, D> {
     pub fn lane(&self, lane: usize) -> Moments<f64, D> {
         let time = self.time.lane(lane);
         let mean = |sum: R| sum.lane(lane) / time;
-        Moments { time, first: self.first.map(mean), second: self.second.map(|row| row.map(mean)) }
+        let second = |n: usize, m: usize| mean(self.second[n.min(m)][n.max(m)]);
+        Moments { time, first: self.first.map(mean), second: from_fn(|n| from_fn(|m| second(n, m))) }
     }
 }
 
@@ -79,16 +95,16 @@ where
         let Self { moments, driver, moved } = self;
         let size = S::Real::select(moved, driver.size(), S::Real::zero());
         moments.time += size;
-        for (node, weight) in NODES {
-            let x = driver.dense_real(size.scale(node));
+        for (x, weight) in driver.method().along(size, &NODES, &[true; D]).iter().zip(WEIGHTS) {
             let share = size.scale(weight);
             unroll!(n in 0..D => {
                 // Lanes that did not move may hold anything.
-                let own = S::Real::select(moved, x[n], S::Real::zero());
-                moments.first[n] += own * share;
+                let own = S::Real::select(moved, x[n], S::Real::zero()) * share;
+                moments.first[n] += own;
                 unroll!(m in 0..D => {
-                    let other = S::Real::select(moved, x[m], S::Real::zero());
-                    moments.second[n][m] += own * other * share;
+                    if m >= n {
+                        moments.second[n][m] += S::Real::select(moved, x[m], S::Real::zero()) * own;
+                    }
                 });
             });
         }

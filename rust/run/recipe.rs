@@ -1,6 +1,6 @@
 //! Which method takes the steps, before it is known over which scalar.
 
-use crate::integrate::{Dopri5, Method, Taylor};
+use crate::integrate::{Dop853, Dopri5, Method, Taylor};
 use crate::scalar::{Isa, Scalar};
 use crate::tape::Tape;
 
@@ -26,6 +26,20 @@ impl<const D: usize> Recipe<D> for ByDopri5 {
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
         Dopri5::default()
+    }
+}
+
+/// The method of order 8.
+#[derive(Clone, Copy, Debug)]
+pub struct ByDop853;
+
+impl<const D: usize> Recipe<D> for ByDop853 {
+    type Method<S: Scalar> = Dop853<S, D>;
+
+    const PACKETS: bool = false;
+
+    fn make<S: Scalar>(&self, _values: Vec<S>) -> Dop853<S, D> {
+        Dop853::default()
     }
 }
 

@@ -49,8 +49,8 @@ pub struct Run<const D: usize> {
     pub record: Option<Record<D>>,
 }
 
-/// Runs the system from `x0` by this method, ending on its wall where it has one. A run that ends there, or where it
-/// chatters, is cut: that point is the last one.
+/// Runs the system from `x0` by this method, ending on its wall where it has one. A run that ends there,
+/// or where it chatters, is cut: that point is the last one.
 pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     system: &M,
     method: K,

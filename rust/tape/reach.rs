@@ -12,14 +12,14 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(self.isa(), Value(self, dt))
     }
 
-    /// The same without derivatives.
-    pub fn real_at(&self, dt: S::Real) -> [S::Real; D] {
-        S::Real::work(self.isa(), RealValue(self, dt))
+    /// The same without derivatives, of these components; the others are zero.
+    pub fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
+        S::Real::work(self.isa(), RealValue(self, dt, of))
     }
 
     /// The same at these parts of a distance.
-    pub fn real_at_parts<const P: usize>(&self, dt: S::Real, parts: &[f64]) -> [[S::Real; D]; P] {
-        S::Real::work(self.isa(), Parts::<S, D, N, P>(self, dt, parts))
+    pub fn along<const P: usize>(&self, dt: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; P] {
+        S::Real::work(self.isa(), Along::<S, D, N, P>(self, dt, parts, of))
     }
 
     /// The rates of the polynomial at a distance `dt`, without derivatives.
@@ -35,6 +35,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     #[inline(always)]
     pub fn at_here(&self, dt: S::Real) -> [S; D] {
         vector!(S, D; n => self.value(n, dt, |c| c))
+    }
+
+    #[inline(always)]
+    fn real_values(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
+        vector!(S::Real, D; n => if of[n] { self.value(n, dt, S::real) } else { S::Real::zero() })
     }
 
     /// A component's value at `dt`; `lift` makes coefficients what the value is to be.
@@ -95,43 +100,47 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
     }
 }
 
-struct RealValue<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
+struct RealValue<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real, &'a [bool; D]);
 
 impl<S: Scalar, const D: usize, const N: usize> Work for RealValue<'_, S, D, N> {
     type Output = [S::Real; D];
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> [S::Real; D] {
-        let Self(jets, dt) = self;
-        vector!(S::Real, D; n => jets.value(n, dt, S::real))
+        let Self(jets, dt, of) = self;
+        jets.real_values(dt, of)
     }
 }
 
-struct Parts<'a, S: Scalar, const D: usize, const N: usize, const P: usize>(
+struct Along<'a, S: Scalar, const D: usize, const N: usize, const P: usize>(
     &'a Jets<S, D, N>,
     S::Real,
     &'a [f64],
+    &'a [bool; D],
 );
 
-impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Parts<'_, S, D, N, P> {
+impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'_, S, D, N, P> {
     type Output = [[S::Real; D]; P];
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> [[S::Real; D]; P] {
-        let Self(jets, dt, parts) = self;
+        let Self(jets, dt, parts, of) = self;
         let mut states = [[S::Real::zero(); D]; P];
         if const { S::Real::LANES == 1 } {
             // One trajectory: the places side by side, as vector instructions want it.
-            let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * parts[i]);
+            let part = |i: usize| parts.get(i).copied().unwrap_or_default();
+            let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
-                let found = jets.value(n, places, |c| Packet::<P, V>::new([c.real().lane(0); P]));
-                for (i, state) in states.iter_mut().enumerate() {
-                    state[n] = S::Real::constant(found.lane(i));
+                if of[n] {
+                    let found = jets.value(n, places, |c| Packet::<P, V>::new([c.real().lane(0); P]));
+                    for (i, state) in states.iter_mut().enumerate() {
+                        state[n] = S::Real::constant(found.lane(i));
+                    }
                 }
             });
         } else {
             for (state, &part) in states.iter_mut().zip(parts) {
-                *state = vector!(S::Real, D; n => jets.value(n, dt.scale(part), S::real));
+                *state = jets.real_values(dt.scale(part), of);
             }
         }
         states
