@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -109,6 +110,44 @@ def test_exponents(capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_exponent_that_is_not_sure_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["lyapunov", "1", "--t", "200", "--tol", "1e-6"]) == 0
     assert "udd: warning: 1 of 1 exponents" in capsys.readouterr().err
+
+
+def test_exponents_with_damping_are_those_of_the_function(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["lyapunov", *map(str, range(1, 41)), "--B", "0.2", "--t", "500", "--tol", "1"]
+    rows = data(argv, capsys)["exponents"]
+    assert isinstance(rows, list)
+    values = udd.lyapunov(np.arange(1.0, 41.0), parameters={"B": 0.2}, t=500.0, tol=1.0)
+    assert [row["lambda_1"] for row in rows] == values.tolist()  # to the bit, in whatever portions
+
+
+def test_spectra(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["lyapunov", "1", "10", "--spectrum", "--tol", "5e-3"]
+    chaos, orbit = data(argv, capsys)["spectra"]
+    alone = udd.lyapunov_spectrum(1.0, tol=5e-3)
+    assert [chaos[f"lambda_{k}"] for k in (1, 2, 3)] == alone.exponents.tolist()
+    assert [chaos[f"standard_error_{k}"] for k in (1, 2, 3)] == alone.standard_errors.tolist()
+    assert (chaos["verdict"], chaos["dimension"], chaos["period"]) == ("chaos", alone.dimension, None)
+    assert (orbit["verdict"], orbit["dimension"]) == ("periodic orbit", 1.0)
+    assert orbit["period"] == pytest.approx(3.35832224912, rel=1e-6)  # as in test_spectrum.py
+    assert main(argv) == 0
+    table = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    assert [list(row) for row in table] == [list(chaos), list(orbit)]
+    assert [row["verdict"] for row in table] == ["chaos", "periodic orbit"]
+    assert (table[0]["period"], float(table[1]["period"])) == (
+        "nan",
+        pytest.approx(orbit["period"], rel=1e-9),
+    )
+
+
+@pytest.mark.parametrize("more", [[], ["--spectrum"]])
+def test_a_solution_that_blows_up_has_a_row(more: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lyapunov", "1e300", "1", "--t", "2000", "--tol", "0.1", *more]) == 0
+    out, err = capsys.readouterr()
+    head, first, second = (line.split(",") for line in out.splitlines())
+    assert len(head) == len(first) == len(second)
+    assert first[:3] == ["1e+300", "nan", "nan"]
+    assert float(second[1]) > 0.1
+    assert err == "udd: warning: 1 of 2 solutions blew up and have no exponent\n"
 
 
 # --- fit and discover
@@ -286,9 +325,10 @@ def test_nobody_reads_on() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to the whole console")
-def test_ctrl_c_keeps_what_is_finished() -> None:
+@pytest.mark.parametrize(("more", "columns"), [([], 3), (["--spectrum"], 10)])
+def test_ctrl_c_keeps_what_is_finished(more: list[str], columns: int) -> None:
     process = subprocess.Popen(
-        [*UDD, "lyapunov", "--from", "1", "--to", "8", "--n", "100000", "--t", "500"],
+        [*UDD, "lyapunov", "--from", "1", "--to", "8", "--n", "100000", "--t", "500", *more],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -303,7 +343,7 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
     assert "Traceback" not in err
     assert "stopped after" in err
     rows = ("".join(lines) + out).splitlines()[1:]
-    assert all(len(row.split(",")) == 3 for row in rows)
+    assert all(len(row.split(",")) == columns for row in rows)
     assert len(rows) >= 2
 
 
