@@ -122,6 +122,14 @@ def test_a_missed_tolerance_warns() -> None:
         udd.lyapunov(1.0, t=500.0, tol=1e-6)
     with pytest.warns(ConvergenceWarning, match="2 of 2 exponents"):
         udd.lyapunov([1.0, 2.0], t=500.0, tol=1e-6)
+    with pytest.warns(ConvergenceWarning, match="up to inf, above"):  # no two blocks
+        udd.lyapunov(1.0, t=1.0)
+
+
+def test_a_met_tolerance_does_not_warn() -> None:
+    """Also where the run was over before anybody looked."""
+    _, error = udd.lyapunov(np.arange(1.0, 9.0), t=500.0, tol=1.0, with_error=True)
+    assert error.max() < 1.0
 
 
 def test_an_early_transient_is_left_out() -> None:

@@ -184,10 +184,11 @@ def lyapunov(
             exponents[part] = np.where(done, found["value"][:, 0], np.nan)
             if with_error:
                 errors[part] = np.where(done, found["standard_error"][:, 0], np.nan)
-            short = done & ~found["converged"]
+            error = np.nan_to_num(found["standard_error"][:, 0], nan=np.inf)  # too short for blocks
+            short = done & (error > goal)
             if short.any():
                 missed += int(short.sum())
-                worst = max(worst, float(found["standard_error"][short, 0].max()))
+                worst = max(worst, float(error[short].max()))
             if not done.all():
                 outcomes += found["outcome"][~done].tolist()
     if outcomes:

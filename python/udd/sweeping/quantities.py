@@ -90,7 +90,7 @@ def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
     return (
         Variable("value", unit, "Lyapunov exponents", more=numbers),
         Variable("standard_error", unit, "their standard errors", more=numbers),
-        Variable("converged", "1", "whether the standard errors met tol", "bool"),
+        Variable("converged", "1", "whether the first one's standard error met tol", "bool"),
     )
 
 
@@ -109,7 +109,7 @@ def _spectrum(
     return {
         "value": np.where(done[:, None], found["value"], np.nan),
         "standard_error": np.where(done[:, None], found["standard_error"], np.nan),
-        "converged": done & found["converged"],
+        "converged": done & (found["standard_error"][:, 0] <= options["tol"]),
         "outcome": found["outcome"].astype(np.int8),
     }
 
