@@ -55,6 +55,46 @@ def test_an_equilibrium():
     assert abs(found.exponents.sum() + 2.0) < 1e-8
 
 
+def test_a_section_on_request():
+    model = udd.DLE(1.0)
+    found = udd.lyapunov_spectrum(model, tol=5e-3, section="maxima of z")
+    points = found.section
+    assert len(points.t) == 600
+    # On the surface z' = 0, from above: to rounding of rates of order one.
+    rates = model.rates(points.t, points.state)
+    assert np.abs(rates[:, 2]).max() < 1e-12
+    assert points.residual < 1e-12
+    # The continuation of the orbit.
+    next_ = udd.poincare(model, "maxima of z", 1, state0=found.end, transient=0)
+    np.testing.assert_array_equal(points.state[0], next_.state[0])
+    # What is asked for beside it changes no bit of the rest.
+    alone = udd.lyapunov_spectrum(model, tol=5e-3)
+    assert alone.section is None
+    np.testing.assert_array_equal(alone.exponents, found.exponents)
+
+
+@pytest.mark.parametrize(
+    ("w", "section", "count"),
+    [(0.25, "z", 2), (7.1, "z", 2), (10.0, "maxima of z", 2), (10.0, "omega = y", 1)],
+)
+def test_the_section_of_a_periodic_orbit_has_as_many_points_as_its_period(w, section, count):
+    found = udd.lyapunov_spectrum(w, section=section)
+    x, t = found.section.state, found.section.t
+    assert found.section.outcome == "finished"
+    # They come back after `count` points, as near as a periodic orbit is told by (1e-4), and not before.
+    assert np.abs(x[count:] - x[:-count]).max() < 1e-3
+    assert t[count] - t[0] == pytest.approx(found.period, rel=1e-4)
+    apart = np.abs(x[:count, None] - x[None, :count]).max(axis=2)
+    assert apart[~np.eye(count, dtype=bool)].min() > 0.05
+
+
+def test_a_surface_that_is_not_crossed_is_said():
+    with pytest.warns(udd.errors.IncompleteWarning, match="0 crossings instead of 600"):
+        found = udd.lyapunov_spectrum(1.0, tol=0.02, section="z = 100")
+    assert found.section.found == 0
+    assert found.verdict == "chaos"
+
+
 def test_the_disk():
     found = udd.lyapunov_spectrum(udd.Disk(0.055, edge="ignore"), tol=0.02)
     assert found.verdict == "chaos"
@@ -103,6 +143,8 @@ def test_kaplan_yorke():
     [
         (lambda: udd.lyapunov_spectrum(-1.0), "w must not be below 0"),
         (lambda: udd.lyapunov_spectrum(1.0, tol=0.0), "tol must be above 0"),
+        (lambda: udd.lyapunov_spectrum(1.0, section="speed"), "speed"),
+        (lambda: udd.lyapunov_spectrum(1.0, section=3), "section must be an expression"),
         (lambda: udd.covariant_vectors(udd.DLE(1.0), 0), "n must be a whole number"),
         (lambda: udd.covariant_vectors(1.0), "a model is needed"),
     ],
