@@ -138,3 +138,67 @@ def crossing(f: tuple[float, ...], level: float) -> float:
                 below *= 0.5
             side = -1
     return x
+
+
+@cache
+def run_of(rates: dop853.Rates, dim: int, parameters: int, controlled: int) -> Callable[..., Any]:
+    """``run(y, p, end, h, rtol, atol)``: the state at the time `end`; the first step tried is `h` long."""
+    step, begin = step_of(rates, dim, parameters, controlled), rates_of(rates, dim, parameters)
+
+    @njit(**FAST)
+    def run(y: Any, p: Any, end: float, h: float, rtol: float, atol: float) -> Any:
+        k = begin(y, p)
+        t, most = 0.0, 5.0
+        while t < end:
+            h = min(h, end - t)
+            n, kn, err2, _ = step(y, k, h, rtol, atol, p)
+            change = factor(err2)
+            if err2 < 1.0:
+                t += h
+                y, k = n, kn
+                h *= min(most, change)
+                most = 5.0
+            else:
+                h *= max(0.2, change)
+                most = 1.0
+        return y
+
+    compiled: Callable[..., Any] = run
+    return compiled
+
+
+@cache
+def crossings_of(
+    rates: dop853.Rates, dim: int, parameters: int, controlled: int, level: int
+) -> Callable[..., Any]:
+    """``cross(y, p, skipped, points, rtol, atol)`` fills `points` (n, dim).
+
+    They are where the component `level` passes zero upwards, after so many skipped.
+    """
+    step, begin = step_of(rates, dim, parameters, controlled), rates_of(rates, dim, parameters)
+    dense = dense_of(rates, dim, parameters)
+
+    @njit(**FAST)
+    def cross(y: Any, p: Any, skipped: int, points: Any, rtol: float, atol: float) -> None:
+        k = begin(y, p)
+        h, most, i = 0.05, 5.0, -skipped
+        while i < len(points):
+            n, kn, err2, stages = step(y, k, h, rtol, atol, p)
+            change = factor(err2)
+            if err2 < 1.0:
+                if y[level] < 0.0 <= n[level]:
+                    if i >= 0:
+                        f = dense(y, k, n, kn, stages, h, p)
+                        x = crossing(f[level], 0.0)
+                        for c in range(dim):
+                            points[i, c] = interpolated(f[c], x)
+                    i += 1
+                y, k = n, kn
+                h *= min(most, change)
+                most = 5.0
+            else:
+                h *= max(0.2, change)
+                most = 1.0
+
+    compiled: Callable[..., Any] = cross
+    return compiled

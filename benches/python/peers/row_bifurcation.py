@@ -52,31 +52,7 @@ def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
     from peers import dop853
     from peers import numba_scalar as own
 
-    step, rates = own.step_of(dop853.dle, 3, 1, 3), own.rates_of(dop853.dle, 3, 1)
-    dense = own.dense_of(dop853.dle, 3, 1)
-    factor, interpolated, crossing = own.factor, own.interpolated, own.crossing
-
-    @njit(**own.FAST)
-    def one(y: Any, p: Any, transient: int, points: Any, rtol: float, atol: float) -> None:
-        k = rates(y, p)
-        h, most, i = 0.05, 5.0, -transient
-        while i < len(points):
-            n, kn, err2, stages = step(y, k, h, rtol, atol, p)
-            change = factor(err2)
-            if err2 < 1.0:
-                if y[2] < 0.0 <= n[2]:
-                    if i >= 0:
-                        f = dense(y, k, n, kn, stages, h, p)
-                        x = crossing(f[2], 0.0)
-                        for c in range(3):
-                            points[i, c] = interpolated(f[c], x)
-                    i += 1
-                y, k = n, kn
-                h *= min(most, change)
-                most = 5.0
-            else:
-                h *= max(0.2, change)
-                most = 1.0
+    one = own.crossings_of(dop853.dle, 3, 1, 3, level=2)
 
     @njit(parallel=True, **own.FAST)
     def run(w: Any, starts: Any, transient: int, kept: int, rtol: float, atol: float) -> Any:

@@ -36,43 +36,17 @@ def entry(setting: str, points: Any, note: str = "") -> Entry:
 
 
 def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
-    from numba import njit
+    from peers import dop853, numba_scalar
 
-    from peers import dop853
-    from peers import numba_scalar as own
+    cross = numba_scalar.crossings_of(dop853.dle, 3, 1, 3, level=2)
 
-    step, rates = own.step_of(dop853.dle, 3, 1, 3), own.rates_of(dop853.dle, 3, 1)
-    dense = own.dense_of(dop853.dle, 3, 1)
-    factor, interpolated, crossing = own.factor, own.interpolated, own.crossing
+    def points(start: Any, n: int) -> Any:
+        found = np.empty((n, 3))
+        cross((start[0], start[1], start[2]), (1.0,), 0, found, rtol, atol)
+        return found
 
-    @njit(**own.FAST)
-    def run(y: Any, p: Any, count: int, rtol: float, atol: float) -> Any:
-        points = np.empty((count, 3))
-        k = rates(y, p)
-        h, most, i = 0.05, 5.0, 0
-        while i < count:
-            n, kn, err2, stages = step(y, k, h, rtol, atol, p)
-            change = factor(err2)
-            if err2 < 1.0:
-                if y[2] < 0.0 <= n[2]:
-                    f = dense(y, k, n, kn, stages, h, p)
-                    x = crossing(f[2], 0.0)
-                    for c in range(3):
-                        points[i, c] = interpolated(f[c], x)
-                    i += 1
-                y, k = n, kn
-                h *= min(most, change)
-                most = 5.0
-            else:
-                h *= max(0.2, change)
-                most = 1.0
-        return points
-
-    run((1.0, 1.0, 0.01), (1.0,), 2, rtol, atol)
-    return entry(
-        f"DOP853, rtol {rtol:g}, atol {atol:g}",
-        lambda start, n: run((start[0], start[1], start[2]), (1.0,), n, rtol, atol),
-    )
+    points((1.0, 1.0, 0.01), 2)
+    return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", points)
 
 
 def heyoka(tol: float = 1e-7) -> Entry:

@@ -45,32 +45,13 @@ def numba(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
     from peers import dop853
     from peers import numba_scalar as own
 
-    step, rates = own.step_of(dop853.dle, 3, 1, 3), own.rates_of(dop853.dle, 3, 1)
-    factor = own.factor
-
-    @njit(**own.FAST)
-    def one(y: Any, p: Any, end: float, rtol: float, atol: float) -> Any:
-        k = rates(y, p)
-        t, h, most = 0.0, 0.05, 5.0
-        while t < end:
-            h = min(h, end - t)
-            n, kn, err2, _ = step(y, k, h, rtol, atol, p)
-            change = factor(err2)
-            if err2 < 1.0:
-                t += h
-                y, k = n, kn
-                h *= min(most, change)
-                most = 5.0
-            else:
-                h *= max(0.2, change)
-                most = 1.0
-        return y
+    one = own.run_of(dop853.dle, 3, 1, 3)
 
     @njit(parallel=True, **own.FAST)
     def all_of(starts: Any, end: float, rtol: float, atol: float) -> Any:
         finals = np.empty_like(starts)
         for i in prange(len(starts)):
-            y = one((starts[i, 0], starts[i, 1], starts[i, 2]), (1.0,), end, rtol, atol)
+            y = one((starts[i, 0], starts[i, 1], starts[i, 2]), (1.0,), end, 0.05, rtol, atol)
             finals[i, 0], finals[i, 1], finals[i, 2] = y
         return finals
 

@@ -41,34 +41,12 @@ def scipy() -> Entry:
 
 
 def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
-    from numba import njit
+    from peers import dop853, numba_scalar
 
-    from peers import dop853
-    from peers import numba_scalar as own
-
-    step, rates = own.step_of(dop853.dle, 3, 1, 3), own.rates_of(dop853.dle, 3, 1)
-    factor = own.factor
-
-    @njit(**own.FAST)
-    def run(y: Any, p: Any, end: float, rtol: float, atol: float) -> Any:
-        k = rates(y, p)
-        t, h, most = 0.0, 0.01, 5.0
-        while t < end:
-            h = min(h, end - t)
-            n, kn, err2, _ = step(y, k, h, rtol, atol, p)
-            change = factor(err2)
-            if err2 < 1.0:
-                t += h
-                y, k = n, kn
-                h *= min(most, change)
-                most = 5.0
-            else:
-                h *= max(0.2, change)
-                most = 1.0
-        return y
+    run = numba_scalar.run_of(dop853.dle, 3, 1, 3)
 
     def final(start: Any, t: float) -> Any:
-        return np.array(run(tuple(start.tolist()), (1.0,), t, rtol, atol))
+        return np.array(run(tuple(start.tolist()), (1.0,), t, 0.01, rtol, atol))
 
     final(np.array(problems.START), 1.0)
     return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", final)
