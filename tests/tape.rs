@@ -225,7 +225,8 @@ fn run<S: Scalar, const D: usize, const N: usize>(
     while t.less(end).any() {
         let sides = sides_of(system, S::lift(t), &x);
         jets.expand(tape, p, S::lift(t), &x, &sides);
-        let h = jets.radius(&Tolerance { rtol, atol: rtol * 1e-3 }).min(end - t);
+        let norm = Tolerance { rtol, atol: rtol * 1e-3 };
+        let h = jets.radius(&norm, &norm.weights(&x)).min(end - t);
         x = jets.at(h);
         t += h;
     }
@@ -410,11 +411,14 @@ fn a_law_with_comparisons_is_refused() {
 fn a_radius_that_is_no_number() {
     let tape = Tape::record(&DleFamily, &[]).unwrap();
     let mut jets = Jets::<f64, 3, 21>::new(&tape, Isa::best());
+    let norm = Tolerance { rtol: 1e-9, atol: 1e-12 };
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
-        jets.expand(&tape, &[1.0, 0.0], 0.0, &[bad, 1.0, 1.0], &[true; MAX_SURFACES]);
-        assert!(jets.radius(&Tolerance { rtol: 1e-9, atol: 1e-12 }).is_nan(), "{bad}");
+        let x = [bad, 1.0, 1.0];
+        jets.expand(&tape, &[1.0, 0.0], 0.0, &x, &[true; MAX_SURFACES]);
+        assert!(jets.radius(&norm, &norm.weights(&x)).is_nan(), "{bad}");
     }
     // At rest every step is good.
-    jets.expand(&tape, &[1.0, 0.0], 0.0, &[1.0, 1.0, 0.0], &[true; MAX_SURFACES]);
-    assert!(jets.radius(&Tolerance { rtol: 1e-9, atol: 1e-12 }) > 1e6);
+    let x = [1.0, 1.0, 0.0];
+    jets.expand(&tape, &[1.0, 0.0], 0.0, &x, &[true; MAX_SURFACES]);
+    assert!(jets.radius(&norm, &norm.weights(&x)) > 1e6);
 }

@@ -145,14 +145,27 @@ where
     }
 
     /// Starts anew in these lanes, as [`new`](Driver::new) does.
+    #[inline(always)]
     pub fn start(&mut self, lanes: S::Mask, t: S::Real, x: [S; D], h: Option<S::Real>) {
         self.at.t = S::Real::select(lanes, t, self.at.t);
         self.at.x = vector!(S, D; n => S::select(lanes, x[n], self.at.x[n]));
+        self.from = S::Real::select(lanes, t, self.from);
+        self.size = S::Real::select(lanes, S::Real::zero(), self.size);
+        if const { M::SMOOTH && K::SERIES } {
+            // A series knows how far it reaches.
+            self.h = S::Real::constant(f64::INFINITY);
+        } else {
+            self.start_on_sides(lanes, t, h);
+        }
+        self.begin(lanes);
+    }
+
+    /// Finds the sides of the law and the size of the first step.
+    fn start_on_sides(&mut self, lanes: S::Mask, t: S::Real, h: Option<S::Real>) {
         let mut fresh = self.at;
         fresh.sides = sides_of(&self.system, S::lift(fresh.t), &fresh.x);
         let h = h.unwrap_or_else(|| {
             if K::SERIES {
-                // A series knows how far it reaches.
                 return S::Real::constant(f64::INFINITY);
             }
             self.work.beside = tick(lanes, self.work.beside, 2.0);
@@ -161,8 +174,6 @@ where
         start_sides(&self.system, &mut fresh, h);
         self.at.sides = from_fn(|j| choose(lanes, fresh.sides[j], self.at.sides[j]));
         self.h = S::Real::select(lanes, h, self.h);
-        self.from = S::Real::select(lanes, t, self.from);
-        self.size = S::Real::select(lanes, S::Real::zero(), self.size);
         self.flips = S::Real::select(lanes, S::Real::zero(), self.flips);
         self.start = S::Real::select(lanes, t, self.start);
         self.jumps.0 = S::Real::select(lanes, S::Real::zero(), self.jumps.0);
@@ -170,7 +181,6 @@ where
         self.undecided = self.undecided.and(lanes.not());
         self.landing.on = self.landing.on.map(|on| on.and(lanes.not()));
         self.controller.reset(lanes);
-        self.begin(lanes);
     }
 
     /// The work so far.
@@ -188,6 +198,7 @@ where
 
     /// Goes on with another system, to whose parameters these values belong; lanes whose parameters
     /// change are to be [started](Driver::start) anew.
+    #[inline(always)]
     pub fn set_system(&mut self, system: M, values: &[S]) {
         self.system = system;
         self.method.set_parameters(values);
@@ -290,10 +301,8 @@ where
         let mut failed = S::mask(false);
         if K::SERIES {
             last = last.and(trial.size.abs().less(asked.abs()).not());
-            failed = rejected.or(accepted.and(S::Mask::from_lanes(|i| {
-                let (t, size) = (self.at.t.lane(i), trial.size.lane(i));
-                t + size == t
-            })));
+            let (t, next) = (self.at.t, self.at.t + trial.size);
+            failed = rejected.or(accepted.and(t.less(next).or(next.less(t)).not()));
         } else {
             // A step cut short at the end says little about a long one.
             let next = asked * factor;

@@ -33,13 +33,15 @@ pub struct Taylor<'a, S, const D: usize> {
     tape: &'a Tape<D>,
     parameters: Vec<S>,
     jets: Jets<S, D, COEFFICIENTS>,
+    /// Whether what does not change along a solution is evaluated.
+    held: bool,
 }
 
 impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// For the system with this tape and these parameters, of this [`order`]; the series is computed with these
     /// instructions.
     pub fn new(tape: &'a Tape<D>, parameters: Vec<S>, order: usize, isa: Isa) -> Self {
-        Self { tape, parameters, jets: Jets::new(tape, isa).with_order(order) }
+        Self { tape, parameters, jets: Jets::new(tape, isa).with_order(order), held: false }
     }
 
     /// Halves steps at whose end the polynomial does not obey the law.
@@ -76,8 +78,10 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     const SERIES: bool = true;
     const PROBES: &'static [f64] = EIGHT;
 
+    #[inline(always)]
     fn set_parameters(&mut self, values: &[S]) {
         self.parameters.copy_from_slice(values);
+        self.held = false;
     }
 
     #[inline(always)]
@@ -90,6 +94,10 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
+        if !self.held || self.tape.switches_held() {
+            self.jets.hold(self.tape, &self.parameters, &at.sides);
+            self.held = true;
+        }
         let mut trial = S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm });
         if self.tape.levels_off() {
             self.obey(system, at, norm, &mut trial);
@@ -140,8 +148,10 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Trial<S, D> {
         let Self { method, at, h, norm } = self;
-        method.jets.expand_here(method.tape, &method.parameters, S::lift(at.t), &at.x, &at.sides);
-        let radius = method.jets.radius(norm);
+        // Divisions: beside the series they cost little.
+        let weights = norm.weights(&at.x);
+        method.jets.expand_here(method.tape, S::lift(at.t), &at.x, &at.sides);
+        let radius = method.jets.radius(norm, &weights);
         let short = radius.less(h.abs());
         let size = S::Real::select(short, radius.zip(h, f64::copysign), h);
         let known = S::Real::zero().less(radius);

@@ -2,7 +2,6 @@
 
 use thiserror::Error;
 
-use crate::scalar::elementary::log2_rough;
 use crate::scalar::{Dual, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
@@ -11,9 +10,12 @@ pub trait ErrorNorm<S: Scalar, const D: usize> {
     /// The norm of the error of a step from one state to another: 1 where it is just allowed.
     fn of_step(&self, error: &[S; D], before: &[S; D], after: &[S; D]) -> S::Real;
 
-    /// Roughly the binary logarithm of the square of the norm of a term in a series that starts with
-    /// `start`.
-    fn log2_of_term(&self, term: &[S; D], start: &[S; D]) -> S::Real;
+    /// What the terms of a series that starts with `start` are weighed by.
+    type Weights;
+    fn weights(&self, start: &[S; D]) -> Self::Weights;
+
+    /// The square of a term's norm.
+    fn of_term(&self, term: &[S; D], weights: &Self::Weights) -> S::Real;
 
     /// What is allowed for the state alone.
     fn state(&self) -> &Tolerance;
@@ -59,14 +61,22 @@ impl<S: Scalar, const D: usize> ErrorNorm<S, D> for Tolerance {
         self.norm(real(error), real(before), real(after))
     }
 
+    /// The inverse of what is allowed in each component.
+    type Weights = [S::Real; D];
+
     #[inline(always)]
-    fn log2_of_term(&self, term: &[S; D], start: &[S; D]) -> S::Real {
-        let mut sum = S::Real::zero();
-        unroll!(n in 0..D => {
+    fn weights(&self, start: &[S; D]) -> [S::Real; D] {
+        vector!(S::Real, D; n => {
             let allowed = start[n].real().abs().scale(self.rtol) + S::Real::constant(self.atol);
-            sum += (term[n].real() * (S::Real::one() / allowed)).square();
-        });
-        log2_rough(sum.scale(1.0 / D as f64))
+            S::Real::one() / allowed
+        })
+    }
+
+    #[inline(always)]
+    fn of_term(&self, term: &[S; D], weights: &[S::Real; D]) -> S::Real {
+        let mut sum = S::Real::zero();
+        unroll!(n in 0..D => { sum += (term[n].real() * weights[n]).square(); });
+        sum.scale(1.0 / D as f64)
     }
 
     fn state(&self) -> &Tolerance {
@@ -94,13 +104,24 @@ impl<R: Real, const D: usize, const N: usize> ErrorNorm<Dual<R, N>, D> for WithT
         worst
     }
 
+    /// The state's, and the inverse square of what is allowed for each tangent; zero for one of no length.
+    type Weights = ([R; D], [R; N]);
+
     #[inline(always)]
-    fn log2_of_term(&self, term: &[Dual<R, N>; D], start: &[Dual<R, N>; D]) -> R {
-        let mut worst = self.0.log2_of_term(term, start);
-        unroll!(i in 0..N => {
+    fn weights(&self, start: &[Dual<R, N>; D]) -> ([R; D], [R; N]) {
+        let tangents = vector!(R, N; i => {
             let allowed = square(start, i).scale(self.0.rtol * self.0.rtol);
-            let own = log2_rough(square(term, i)) - log2_rough(allowed);
-            worst = R::select(R::zero().less(allowed).and(own.less(worst).not()), own, worst);
+            R::select(R::zero().less(allowed), R::one() / allowed, R::zero())
+        });
+        (self.0.weights(start), tangents)
+    }
+
+    #[inline(always)]
+    fn of_term(&self, term: &[Dual<R, N>; D], weights: &([R; D], [R; N])) -> R {
+        let mut worst = self.0.of_term(term, &weights.0);
+        unroll!(i in 0..N => {
+            let own = square(term, i) * weights.1[i];
+            worst = R::select(own.less(worst), worst, own);
         });
         worst
     }

@@ -22,7 +22,7 @@ struct Flat {
     event_t: Vec<f64>,
     event_x: Vec<f64>,
     outcome: &'static str,
-    counts: (u64, u64, u64),
+    counts: (u64, u64, u64, u64),
     record: Option<Box<dyn Piecewise>>,
 }
 
@@ -80,7 +80,7 @@ fn run<F: Family<D>, const D: usize>(
         event_t: events.iter().map(|event| event.t).collect(),
         event_x: events.iter().flat_map(|event| event.x).collect(),
         outcome: outcome.name(),
-        counts: (counts.accepted, counts.rejected, counts.evaluations),
+        counts: (counts.accepted, counts.rejected, counts.evaluations, counts.grazes),
         record: record.map(|record| Box::new(record) as Box<dyn Piecewise>),
     })
 }

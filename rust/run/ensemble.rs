@@ -8,6 +8,7 @@ use super::trajectory::Outcome;
 use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
 use crate::scalar::{Isa, Mask, Real, Scalar};
+use crate::unroll::vector;
 
 /// How steps are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,10 +115,15 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                 if !due.any() {
                     break;
                 }
-                let inside = ship.driver.dense(wanted - ship.driver.from());
+                let inside = due.and(wanted.less(ship.driver.t()));
+                let x = match inside.any() {
+                    true => {
+                        let dense = ship.driver.dense(wanted - ship.driver.from());
+                        vector!(R, D; n => R::select(inside, dense[n], ship.driver.x()[n]))
+                    }
+                    false => *ship.driver.x(),
+                };
                 for lane in (0..R::LANES).filter(|&lane| due.lane(lane)) {
-                    let at_end = wanted.lane(lane) == ship.driver.t().lane(lane);
-                    let x = if at_end { ship.driver.x() } else { &inside };
                     states[lane].push(x.map(|x| x.lane(lane)));
                     wanted.set_lane(lane, after(states[lane].len()));
                 }

@@ -77,7 +77,14 @@ fn replace<R: Real, const D: usize, const N: usize>(x: &mut [Dual<R, N>; D], i: 
     }
 }
 
-/// How much tangents have grown: `ln(product) + sum`, so that a step costs a multiplication.
+/// The logarithm of a tangent's length.
+fn log_length<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: usize, lane: usize) -> f64 {
+    let square: f64 = x.iter().map(|x| x.d[i].lane(lane).powi(2)).sum();
+    0.5 * square.ln()
+}
+
+/// How much tangents had grown when they were last made orthonormal: `ln(product) + sum`, so that a step
+/// costs a multiplication.
 #[derive(Clone, Copy, Debug)]
 pub struct Growth<R, const N: usize> {
     product: [R; N],
@@ -89,36 +96,23 @@ impl<R: Real, const N: usize> Growth<R, N> {
         Self { product: [R::one(); N], sum: [R::zero(); N] }
     }
 
-    /// Forgets a lane's.
-    pub fn clear(&mut self, lane: usize) {
-        for n in 0..N {
-            self.product[n].set_lane(lane, 1.0);
-            self.sum[n].set_lane(lane, 0.0);
+    /// Counts a lane's from now on, where its state is `x`.
+    pub fn restart<const D: usize>(&mut self, x: &[Dual<R, N>; D], lane: usize) {
+        for i in 0..N {
+            self.product[i].set_lane(lane, 1.0);
+            self.sum[i].set_lane(lane, -log_length(x, i, lane));
         }
     }
 
-    /// The logarithms of a lane's.
-    pub fn lane(&self, lane: usize) -> [f64; N] {
-        std::array::from_fn(|n| self.sum[n].lane(lane) + self.product[n].lane(lane).ln())
+    /// The logarithms of a lane's, where its state is `x`.
+    pub fn lane<const D: usize>(&self, x: &[Dual<R, N>; D], lane: usize) -> [f64; N] {
+        let before = |i: usize| self.sum[i].lane(lane) + self.product[i].lane(lane).ln();
+        std::array::from_fn(|i| before(i) + log_length(x, i, lane))
     }
 
-    /// Makes the tangents in these lanes orthonormal again, and adds what they had grown.
-    #[inline(always)]
-    pub fn renew<M, const D: usize, E, K>(
-        &mut self,
-        isa: Isa,
-        driver: &mut Driver<M, Dual<R, N>, D, E, K>,
-        lanes: R::Mask,
-    ) where
-        M: System<Dual<R, N>, D>,
-        E: ErrorNorm<Dual<R, N>, D> + Copy,
-        K: Method<Dual<R, N>, D>,
-    {
-        work::<R, _>(isa, Renewal { growth: self, driver, lanes });
-    }
-
-    /// The same where it has to be: several tangents lean towards each other with every step, a single one
-    /// only must not leave the range of numbers.
+    /// Makes the tangents in the lanes that moved orthonormal again, where that has to be, and adds what they
+    /// had grown: several tangents lean towards each other with every step, a single one only must not leave
+    /// the range of numbers.
     #[inline(always)]
     pub fn keep<M, const D: usize, E, K>(
         &mut self,
@@ -138,7 +132,7 @@ impl<R: Real, const N: usize> Growth<R, N> {
             lanes = moved.and(near.not());
         }
         if lanes.any() {
-            self.renew(isa, driver, lanes);
+            work::<R, _>(isa, Renewal { growth: self, driver, lanes });
         }
     }
 

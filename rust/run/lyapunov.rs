@@ -13,7 +13,7 @@ use crate::model::Family;
 use crate::scalar::{Dual, Isa, Mask, Real};
 
 /// A block is no shorter than this many steps.
-const LEAST_STEPS: f64 = 16.0;
+const LEAST_STEPS: f64 = 32.0;
 
 /// How exponents are estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,14 +134,13 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             if !full.or(over).any() {
                 continue;
             }
-            growth.renew(self.isa, &mut ship.driver, full.or(over));
             for lane in (0..R::LANES).filter(|&lane| full.or(over).lane(lane)) {
                 let Some(orbit) = ship.job(lane) else { continue };
                 let now = t.lane(lane);
                 let own = &mut blocks[lane];
                 let mut converged = false;
                 if counting.lane(lane) && now > since.lane(lane) {
-                    let look = own.push(growth.lane(lane), now - since.lane(lane));
+                    let look = own.push(growth.lane(ship.driver.x(), lane), now - since.lane(lane));
                     if look && !own.drop_transient() {
                         converged = own.average().standard_error[0] <= goal;
                     }
@@ -157,7 +156,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                     moments.clear(lane);
                 }
                 if full.lane(lane) || settled {
-                    growth.clear(lane);
+                    growth.restart(ship.driver.x(), lane);
                     since.set_lane(lane, now);
                     steps.set_lane(lane, 0.0);
                     full_at.set_lane(lane, now + own.span);
@@ -181,7 +180,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                 if let Some(orbit) = queue.take() {
                     ship.load(lane, orbit, start(orbit));
                     blocks[lane].clear(span);
-                    growth.clear(lane);
+                    growth.restart(ship.driver.x(), lane);
                     since.set_lane(lane, 0.0);
                     steps.set_lane(lane, 0.0);
                     full_at.set_lane(lane, if transient > 0.0 { f64::INFINITY } else { span });

@@ -54,6 +54,7 @@ where
     }
 
     /// Starts a job in a lane.
+    #[inline(always)]
     pub fn load(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
         for (own, &value) in self.values.iter_mut().zip(start.values) {
             let mut lanes = own.real();
@@ -69,6 +70,7 @@ where
     }
 
     /// Ends the job in a lane, which from now on stays where it is.
+    #[inline(always)]
     pub fn unload(&mut self, lane: usize) -> Option<usize> {
         self.end.set_lane(lane, self.driver.t().lane(lane));
         let job = self.jobs[lane].take();

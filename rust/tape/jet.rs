@@ -35,7 +35,13 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// # Panics
     /// Where the room was made for another tape, or parameters are missing.
     pub fn expand(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
-        S::Real::work(self.isa, Expansion { jets: self, tape, parameters, t, x, sides });
+        self.hold(tape, parameters, sides);
+        S::Real::work(self.isa, Expansion { jets: self, tape, t, x, sides });
+    }
+
+    /// Evaluates what does not change along a solution.
+    pub fn hold(&mut self, tape: &Tape<D>, parameters: &[S], sides: &Sides<S>) {
+        hold(&tape.held, parameters, sides, &mut self.held);
     }
 
     /// Goes up to this order only, at least 4.
@@ -56,12 +62,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         self.isa
     }
 
-    /// As [`expand`](Jets::expand), with the caller's instructions.
+    /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
-    pub fn expand_here(&mut self, tape: &Tape<D>, parameters: &[S], t: S, x: &[S; D], sides: &Sides<S>) {
+    pub fn expand_here(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
         let Self { work, held, order, .. } = self;
         let order = *order;
-        hold(&tape.held, parameters, sides, held);
         // The number of equations is asked so that no other program is compiled.
         if const { D == 3 } && tape.known == Known::Dle {
             return known::<Dle, S, D, N>(work, order, held, t, x, sides);
@@ -83,7 +88,6 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
 struct Expansion<'a, S: Scalar, const D: usize, const N: usize> {
     jets: &'a mut Jets<S, D, N>,
     tape: &'a Tape<D>,
-    parameters: &'a [S],
     t: S,
     x: &'a [S; D],
     sides: &'a Sides<S>,
@@ -94,7 +98,7 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
 
     #[inline(always)]
     fn run<V: Instructions>(self) {
-        self.jets.expand_here(self.tape, self.parameters, self.t, self.x, self.sides);
+        self.jets.expand_here(self.tape, self.t, self.x, self.sides);
     }
 }
 

@@ -45,6 +45,7 @@ pub struct Tape<const D: usize> {
     pub(crate) slots: usize,
     known: known::Known,
     levels_off: bool,
+    switches_held: bool,
 }
 
 impl<const D: usize> Tape<D> {
@@ -58,6 +59,12 @@ impl<const D: usize> Tape<D> {
     #[inline(always)]
     pub fn levels_off(&self) -> bool {
         self.levels_off
+    }
+
+    /// Whether [held](Tape::held) values depend on the sides of surfaces.
+    #[inline(always)]
+    pub fn switches_held(&self) -> bool {
+        self.switches_held
     }
 
     /// Whether its series are computed by a program of their own, unrolled when this was compiled.

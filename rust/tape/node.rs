@@ -95,7 +95,7 @@ pub struct Step {
     pub to: u16,
 }
 
-/// Evaluates the held values one after the other. Once per step: not worth a copy for each instruction set.
+/// Evaluates the held values one after the other: not worth a copy for each instruction set.
 #[inline(never)]
 pub(super) fn hold<S: Scalar>(list: &[Held], parameters: &[S], sides: &Sides<S>, values: &mut [S]) {
     macro_rules! of {

@@ -2,7 +2,7 @@
 
 use super::Jets;
 use crate::integrate::ErrorNorm;
-use crate::scalar::elementary::exp2_rough;
+use crate::scalar::elementary::{exp2_rough, log2_rough};
 use crate::scalar::{Instructions, Packet, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
@@ -72,20 +72,21 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99, section 3.2.
     #[inline(always)]
     #[allow(clippy::eq_op, reason = "infinite or no number minus itself is no number")]
-    pub fn radius(&self, norm: &impl ErrorNorm<S, D>) -> S::Real {
+    pub fn radius<E: ErrorNorm<S, D>>(&self, norm: &E, weights: &E::Weights) -> S::Real {
         let (series, order) = (self.coefficients(), self.order().clamp(4, N - 1));
         let mut sum = S::Real::zero();
         unroll!(n in 0..D => { sum += series[n][order].real() + series[n][order - 1].real(); });
         // Zero, or not a number.
-        exp2_rough(self.reach(order, norm).min(self.reach(order - 1, norm))) + (sum - sum)
+        let reach = self.reach(order, norm, weights).min(self.reach(order - 1, norm, weights));
+        exp2_rough(reach) + (sum - sum)
     }
 
     /// Binary logarithm of the distance at which term `k` is as small as allowed.
     #[inline(always)]
-    fn reach(&self, k: usize, norm: &impl ErrorNorm<S, D>) -> S::Real {
+    fn reach<E: ErrorNorm<S, D>>(&self, k: usize, norm: &E, weights: &E::Weights) -> S::Real {
         let series = self.coefficients();
-        let (term, start) = (vector!(S, D; n => series[n][k]), vector!(S, D; n => series[n][0]));
-        norm.log2_of_term(&term, &start).scale(-0.5 / k as f64)
+        let term = vector!(S, D; n => series[n][k]);
+        log2_rough(norm.of_term(&term, weights)).scale(-0.5 / k as f64)
     }
 }
 
