@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use proptest::prelude::*;
-use udd::integrate::Tolerance;
+use udd::integrate::{ErrorNorm, Tolerance};
 use udd::model::effects::{Kind, Role, Treatment};
 use udd::model::{
     DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, Parameter, PendulumFamily, Sides, System, sides_of,

@@ -133,14 +133,13 @@ where
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
         let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
-        let estimate = |weights: &[f64; N]| {
-            let error = vector!(S, D; n => combine(weights, &stages, T::TABLEAU.stages, n).times(h));
-            norm.of_step(&error, &at.x, &x)
-        };
-        let mut error = estimate(&T::TABLEAU.e);
+        let count = T::TABLEAU.stages;
+        let error = vector!(S, D; n => combine(&T::TABLEAU.e, &stages, count, n).times(h));
+        let mut error = norm.of_step(&error, &at.x, &x);
         if let Some(low) = &T::TABLEAU.e_low {
             // Hairer's combination, which behaves as h^8.
-            let (square, low) = (error * error, estimate(low));
+            let low = vector!(S, D; n => combine(low, &stages, count, n).times(h));
+            let (square, low) = (error * error, norm.of_step(&low, &at.x, &x));
             let both = square + (low * low).scale(0.01);
             error = S::Real::select(S::Real::zero().less(both), square / both.sqrt(), error);
         }

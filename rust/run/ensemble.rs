@@ -1,6 +1,6 @@
 //! The same model from many states, or with many values of its parameters.
 
-use super::fleet::{Crew, Fleet, Queue, sail};
+use super::fleet::{Crew, Fleet, Queue, Yields, sail};
 use super::recipe::{ByDop853, ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
@@ -85,7 +85,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
     const PACKETS: bool = F::PACKETS;
 
     #[inline(always)]
-    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Passage<D>)>) {
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
         let Ensemble { family, times, tolerance, .. } = self.ensemble;
         let Some(first) = queue.take() else { return };
         let start = |run| self.ensemble.start::<R>(run);
@@ -144,8 +144,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                 wanted.set_lane(lane, f64::INFINITY);
                 let own = std::mem::take(&mut states[lane]);
                 let (t, x) = (ship.driver.t().lane(lane), ship.driver.x().map(|x| x.lane(lane)));
-                yields.push((run, Passage { states: own, t, x, outcome }));
-                queue.finish();
+                yields.push(run, Passage { states: own, t, x, outcome });
                 if let Some(run) = queue.take() {
                     wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));
                 }

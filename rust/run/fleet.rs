@@ -1,6 +1,7 @@
 //! Many trajectories: a queue that packets on all cores take from.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::ThreadPoolBuilder;
 
@@ -12,8 +13,6 @@ use crate::scalar::{Instructions, Isa, LANES, Packet, Real, Work};
 pub struct Queue<'a> {
     next: AtomicUsize,
     jobs: usize,
-    /// How many are done, for whoever watches.
-    done: &'a AtomicUsize,
     stop: &'a Stop,
 }
 
@@ -24,14 +23,38 @@ impl Queue<'_> {
         (job < self.jobs).then_some(job)
     }
 
-    /// Counts a job as done.
-    pub fn finish(&self) {
-        self.done.fetch_add(1, Ordering::Relaxed);
-    }
-
     /// Whether the work is to end, finished or not.
     pub fn stopped(&self) -> bool {
         self.stop.check().is_err()
+    }
+}
+
+/// What one thread's jobs yield. They are put in their places in batches: memory is touched once.
+#[derive(Debug)]
+pub struct Yields<'a, Y> {
+    batch: Vec<(usize, Y)>,
+    all: &'a Mutex<Vec<Option<Y>>>,
+    done: &'a AtomicUsize,
+}
+
+impl<Y> Yields<'_, Y> {
+    const BATCH: usize = 256;
+
+    /// A job is done.
+    pub fn push(&mut self, job: usize, yielded: Y) {
+        self.batch.push((job, yielded));
+        self.done.fetch_add(1, Ordering::Relaxed);
+        if self.batch.len() == Self::BATCH {
+            self.place();
+        }
+    }
+
+    fn place(&mut self) {
+        // Where another thread panicked, so does the whole.
+        let Ok(mut all) = self.all.lock() else { return };
+        for (job, yielded) in self.batch.drain(..) {
+            all[job] = Some(yielded);
+        }
     }
 }
 
@@ -46,7 +69,7 @@ pub trait Fleet: Sync {
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
     /// To be `#[inline(always)]`.
-    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Self::Yield)>);
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Self::Yield>);
 }
 
 /// How the work is spread; none of it changes a bit of the results.
@@ -72,13 +95,13 @@ pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Y
 }
 
 /// The whole of the work, compiled for each instruction set.
-struct InPackets<'a, 'b, T: Fleet> {
+struct InPackets<'a, 'b, 'c, T: Fleet> {
     fleet: &'a T,
     queue: &'a Queue<'b>,
-    yields: &'a mut Vec<(usize, T::Yield)>,
+    yields: &'a mut Yields<'c, T::Yield>,
 }
 
-impl<T: Fleet> Work for InPackets<'_, '_, T> {
+impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -92,30 +115,29 @@ impl<T: Fleet> Work for InPackets<'_, '_, T> {
 fn spread<Y: Send>(
     jobs: usize,
     crew: Crew<'_>,
-    work: impl Fn(&Queue<'_>, &mut Vec<(usize, Y)>) + Sync,
+    work: impl Fn(&Queue<'_>, &mut Yields<'_, Y>) + Sync,
 ) -> Vec<Option<Y>> {
-    let queue = Queue { next: AtomicUsize::new(0), jobs, done: crew.done, stop: crew.stop };
+    let queue = Queue { next: AtomicUsize::new(0), jobs, stop: crew.stop };
     let mut all: Vec<Option<Y>> = Vec::new();
     all.resize_with(jobs, || None);
-    let watch = |queue: &Queue<'_>| {
-        let mut yields = Vec::new();
-        work(queue, &mut yields);
-        yields
+    let all = Mutex::new(all);
+    let watch = || {
+        let batch = Vec::with_capacity(Yields::<Y>::BATCH.min(jobs));
+        let mut yields = Yields { batch, all: &all, done: crew.done };
+        work(&queue, &mut yields);
+        yields.place();
     };
     let threads = if crew.threads == 0 { rayon::current_num_threads() } else { crew.threads };
     // One packet's worth of jobs is the least that a thread is worth.
     let threads = threads.min(jobs.div_ceil(LANES)).max(1);
-    let parts = if threads == 1 {
-        vec![watch(&queue)]
+    if threads == 1 {
+        watch();
     } else {
         match ThreadPoolBuilder::new().num_threads(threads).build() {
-            Ok(pool) => pool.broadcast(|_| watch(&queue)),
+            Ok(pool) => drop(pool.broadcast(|_| watch())),
             // No threads to be had: the caller's own will do.
-            Err(_) => vec![watch(&queue)],
+            Err(_) => watch(),
         }
-    };
-    for (job, result) in parts.into_iter().flatten() {
-        all[job] = Some(result);
     }
-    all
+    all.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

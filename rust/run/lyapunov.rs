@@ -1,7 +1,7 @@
 //! Lyapunov exponents.
 
 use super::blocks::{Average, Blocks};
-use super::fleet::{Crew, Fleet, Queue, sail};
+use super::fleet::{Crew, Fleet, Queue, Yields, sail};
 use super::frame::{Growth, tangents};
 use super::moments::Moments;
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
@@ -96,7 +96,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
     const PACKETS: bool = F::PACKETS && T::PACKETS;
 
     #[inline(always)]
-    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Exponents<D, N>)>) {
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Exponents<D, N>>) {
         let LyapunovOptions { time, transient, goal, tolerance } = self.orbits.options;
         let Some(first) = queue.take() else { return };
         let span = (time - transient) / (8 * Blocks::<N>::MOST) as f64;
@@ -173,8 +173,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                 let x = ship.driver.x().map(|x| x.re.lane(lane));
                 let means = moments.lane(lane);
                 moments.clear(lane);
-                yields.push((orbit, Exponents { exponents, converged, moments: means, t: now, x, outcome }));
-                queue.finish();
+                yields.push(orbit, Exponents { exponents, converged, moments: means, t: now, x, outcome });
                 ship.unload(lane);
                 full_at.set_lane(lane, f64::INFINITY);
                 if let Some(orbit) = queue.take() {

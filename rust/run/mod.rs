@@ -20,7 +20,7 @@ mod trajectory;
 pub use blocks::{Average, Blocks};
 pub use crossing::Crossed;
 pub use ensemble::{Ensemble, Passage, Stepper};
-pub use fleet::{Crew, Fleet, Queue, sail};
+pub use fleet::{Crew, Fleet, Queue, Yields, sail};
 pub use frames::{Frames, frames};
 pub use lyapunov::{Exponents, Lyapunov, LyapunovOptions};
 pub use moments::Moments;

@@ -1,7 +1,7 @@
 //! Poincaré sections: where trajectories cross a surface.
 
 use super::crossing::{Crossed, Scan};
-use super::fleet::{Crew, Fleet, Queue, sail};
+use super::fleet::{Crew, Fleet, Queue, Yields, sail};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
@@ -123,7 +123,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
 
     #[inline(always)]
-    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Vec<(usize, Crossings<D>)>) {
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Crossings<D>>) {
         let Sections { family, sections, skip, count, bounded, tolerance, .. } = *self.sections;
         let Some(first) = queue.take() else { return };
         let start = |job| self.sections.start::<R>(job);
@@ -179,8 +179,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                     Ended::Finished => (found.t[count - 1], found.x[count - 1]),
                     _ => (ship.driver.t().lane(lane), ship.driver.x().map(|x| x.lane(lane))),
                 };
-                yields.push((job, found));
-                queue.finish();
+                yields.push(job, found);
                 let next = if stopped { None } else { queue.take() };
                 if let Some(job) = next {
                     ship.load(lane, job, start(job));
