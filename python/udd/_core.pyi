@@ -36,7 +36,7 @@ class _Run(TypedDict):
     event_t: _Floats
     event_state: _Floats
     outcome: str
-    counts: tuple[int, int, int]
+    counts: tuple[int, int, int, int]
     dense: Dense | None
 
 class _Orbits(TypedDict):

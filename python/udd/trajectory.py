@@ -72,11 +72,22 @@ class Events:
 
 
 class Stats(NamedTuple):
-    """What the work was: accepted and rejected steps, evaluations of the rates."""
+    """What the work was.
+
+    Attributes
+    ----------
+    accepted, rejected : int
+        Steps.
+    evaluations : int
+        Of the rates.
+    grazes : int
+        Jumps of the law that the run only just reached: beyond them its derivatives are in doubt.
+    """
 
     accepted: int
     rejected: int
     evaluations: int
+    grazes: int
 
 
 @dataclass(frozen=True, eq=False)
