@@ -97,12 +97,12 @@ def test_a_disk_that_is_nowhere_on_the_wheels_is_not_run() -> None:
 
 @pytest.mark.parametrize("treatment", ["set-valued", "karnopp", "lugre"])
 def test_runs_keep_their_friction(treatment: str) -> None:
-    """Modes and bristles are left to Dormand-Prince, which knows them."""
+    """Modes and bristles are left to Runge-Kutta methods, which know them."""
     rod = udd.Pendulum(0.5, k0=0.01).with_effects(udd.effects.coulomb(c=0.3, treatment=treatment))
     found = udd.sweep(udd.SweepSpec("final_state", rod, {"theta": [0.2, 1.0, 2.0]}, options={"t": 9.0}))
     for k, theta in enumerate(found["theta"].values.tolist()):
         start = [0.0, theta, 0.0][: len(rod.state_names)]
-        run = udd.simulate(rod, [0.0, 9.0], start, method="dopri5")
+        run = udd.simulate(rod, [0.0, 9.0], start, method="auto")
         ends = [float(found[f"final_{name}"].values[k]) for name in rod.state_names]
         assert ends == run.state[-1].tolist()
     # Held, or as good as with bristles.

@@ -171,21 +171,17 @@ METHODS = ("auto", "dopri5", "dop853", "taylor")
 def method_for(model: Model, method: str, rtol: float) -> str:
     """The method that is meant: for ``"auto"`` the faster one at equal error, as measured.
 
-    The choice follows the table that `benches/python/methods.py` prints: the series wins for the DLE at any
-    tolerance and for a plain disk from rtol = 1e-5 on. With effects each operation of the law costs a series
-    of its own, and it wins from 1e-8 on. Friction with modes is left to Dormand-Prince, which knows all its
-    treatments.
+    The choice follows the table that `benches/python/methods.py` prints: the series wins for every law that
+    has one. Friction with modes is left to Runge-Kutta methods, which know all its treatments.
     """
     if method not in METHODS:
         raise ModelError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
     if method != "auto":
         return method
-    if model.kind == "dle":
-        return "taylor"
     effects = getattr(model, "effects", ())
     if any(getattr(effect, "treatment", "smoothed") not in (None, "smoothed") for effect in effects):
-        return "dopri5"
-    return "taylor" if rtol <= (1e-8 if effects else 1e-5) else "dopri5"
+        return "dop853" if rtol <= 1e-8 else "dopri5"
+    return "taylor"
 
 
 def tolerances(rtol: float, atol: float) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from udd.trajectory import initial_state
 from .models_json import model_from_dict, model_to_dict
 from .quantities import QUANTITIES
 
-RESULT_FORMAT = 2
+RESULT_FORMAT = 3
 """To be raised with every change that gives other numbers or other arrays for the same spec."""
 
 _KEYS = ("quantity", "model", "over", "state0", "options", "chunk")
