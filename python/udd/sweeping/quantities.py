@@ -170,7 +170,7 @@ def _ended_one_by_one(
     for k, (row, state) in enumerate(zip(rows, states, strict=True)):
         one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
         try:
-            run = simulate(one, times, state, rtol=rtol, atol=atol)
+            run = simulate(one, times, state, rtol=rtol, atol=atol, method="auto")
         except IntegrationError:
             continue
         t_end[k], ends[k], outcome[k] = run.t[-1], run.state[-1], OUTCOMES.index(run.outcome)
