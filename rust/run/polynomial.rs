@@ -3,7 +3,7 @@
 use super::signs::{Side, Stretch, judge};
 use crate::integrate::{MOST_PROBES, Method};
 use crate::model::choose;
-use crate::scalar::{Instructions, Isa, Mask, Packet, Real, Work};
+use crate::scalar::{Instructions, Isa, Mask, Packet, Real, Scalar, Work};
 
 /// The polynomials of a step, one for each component of the state, in their own unit of time.
 pub struct Polynomials<'a, R: Real, const D: usize> {
@@ -128,6 +128,16 @@ impl<R: Real> Work for Signs<'_, R> {
             // One trajectory: the places side by side, all of them, as vector instructions want it.
             let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
             let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
+            let level = Packet::constant(less);
+            let all_below = side.below.any() && !found.less(level).not().any() && end.less(R::zero()).any();
+            let all_above = side.above.any() && !level.less(found).not().any() && R::zero().less(end).any();
+            if all_below || all_above {
+                // As in most steps, no crossing.
+                if let [.., last] = self.stretches {
+                    *last = Stretch { s: size, value: end, crossing: R::mask(false) };
+                }
+                return side;
+            }
             for (i, value) in values.iter_mut().enumerate() {
                 *value = R::constant(found.lane(i)) - R::constant(less);
             }
