@@ -84,19 +84,25 @@ fn tangents_of_the_disk_are_of_order_5_on_a_smooth_piece() {
     assert!((slope(&points) - 5.0).abs() < WITHIN, "slope {} of {points:?}", slope(&points));
 }
 
-/// Over one step the polynomial's error is `h^5` (order 4).
-#[test]
-fn dense_output_is_of_order_4() {
+/// The error of the polynomial of one step, at this part of it, for steps of these sizes.
+fn inside_a_step<K: Method<f64, 3> + Default>(theta: f64, sizes: [f64; 5]) -> [(f64, f64); 5] {
     let dle = Dle { w: 1.0, b: 0.2 };
     let x0 = [1.0, 1.0, 0.01];
     let start = Point { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
+    sizes.map(|h| {
+        let mut method = K::default();
+        method.begin(&dle, &start, true);
+        method.attempt(&dle, &start, h, &Tolerance::default());
+        method.extend(&dle, &start);
+        (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))
+    })
+}
+
+/// Over one step the polynomial's error is `h^5` (order 4).
+#[test]
+fn dense_output_is_of_order_4() {
     for theta in [0.3, 0.62] {
-        let points = [0.08, 0.06, 0.04, 0.03, 0.02].map(|h| {
-            let mut method = Dopri5::default();
-            method.begin(&dle, &start, true);
-            method.attempt(&dle, &start, h, &Tolerance::default());
-            (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))
-        });
+        let points = inside_a_step::<Dopri5<f64, 3>>(theta, [0.08, 0.06, 0.04, 0.03, 0.02]);
         assert!((slope(&points) - 5.0).abs() < WITHIN, "slope {} at {theta}", slope(&points));
     }
 }
@@ -127,17 +133,8 @@ fn dop853_is_of_order_8() {
 /// Over one step the polynomial's error is `h^8` (order 7).
 #[test]
 fn the_extension_of_dop853_is_of_order_7() {
-    let dle = Dle { w: 1.0, b: 0.2 };
-    let x0 = [1.0, 1.0, 0.01];
-    let start = Point { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
     for theta in [0.3, 0.62] {
-        let points = [0.8, 0.65, 0.52, 0.42, 0.34].map(|h| {
-            let mut method = Dop853::default();
-            method.begin(&dle, &start, true);
-            method.attempt(&dle, &start, h, &Tolerance::default());
-            method.extend(&dle, &start);
-            (h, distance(method.at(theta * h), fixed(&dle, x0, theta * h, 64)))
-        });
+        let points = inside_a_step::<Dop853<f64, 3>>(theta, [0.8, 0.65, 0.52, 0.42, 0.34]);
         assert!((slope(&points) - 8.0).abs() < 3.0 * WITHIN, "slope {} at {theta}", slope(&points));
     }
 }

@@ -153,7 +153,8 @@ where
         self.size = S::Real::select(lanes, S::Real::zero(), self.size);
         if const { M::SMOOTH && K::SERIES } {
             // A series knows how far it reaches.
-            self.h = S::Real::constant(f64::INFINITY);
+            let h = h.unwrap_or(S::Real::constant(f64::INFINITY));
+            self.h = S::Real::select(lanes, h, self.h);
         } else {
             self.start_on_sides(lanes, t, h);
         }

@@ -8,6 +8,10 @@ use crate::unroll::vector;
 /// So many places within a step are looked at side by side, at most.
 pub const MOST_PROBES: usize = 8;
 
+/// Where a step is looked at: a long one, as of a high order, more closely.
+pub(super) const QUARTERS: &[f64] = &[0.25, 0.5, 0.75, 1.0];
+pub(super) const EIGHTHS: &[f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
+
 /// Where a run stands, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<S: Scalar, const D: usize> {

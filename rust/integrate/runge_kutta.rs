@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::dop853::Dop853Scheme;
-use super::method::{Method, Point, Trial};
+use super::method::{EIGHTHS, Method, Point, QUARTERS, Trial};
 use super::tableau::{DormandPrince, Scheme};
 use super::tolerance::ErrorNorm;
 use crate::model::{Sides, System};
@@ -79,10 +79,6 @@ pub type Dopri5<S, const D: usize> = RungeKutta<DormandPrince, S, D, 7, 4>;
 /// Dormand & Prince's method of order 8(5, 3) as in the program DOP853.
 pub type Dop853<S, const D: usize> = RungeKutta<Dop853Scheme, S, D, 16, 7>;
 
-/// Where a step is looked at: a longer step, as of a higher order, more closely.
-const FOUR: &[f64] = &[0.25, 0.5, 0.75, 1.0];
-pub(super) const EIGHT: &[f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
-
 impl<T, S: Scalar, const D: usize, const N: usize, const P: usize> Default for RungeKutta<T, S, D, N, P> {
     fn default() -> Self {
         let zero = [S::zero(); D];
@@ -116,7 +112,7 @@ where
     const ORDER: i32 = T::TABLEAU.order;
     const EVALUATIONS: usize = N - 1;
     const SERIES: bool = false;
-    const PROBES: &'static [f64] = if T::TABLEAU.order > 5 { EIGHT } else { FOUR };
+    const PROBES: &'static [f64] = if T::TABLEAU.order > 5 { EIGHTHS } else { QUARTERS };
 
     #[inline(always)]
     fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {

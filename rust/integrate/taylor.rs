@@ -1,7 +1,6 @@
 //! The Taylor method.
 
-use super::method::{MOST_PROBES, Method, Point, Trial};
-use super::runge_kutta::EIGHT;
+use super::method::{EIGHTHS, MOST_PROBES, Method, Point, Trial};
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
 use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
@@ -76,7 +75,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     const ORDER: i32 = HIGH as i32;
     const EVALUATIONS: usize = 1;
     const SERIES: bool = true;
-    const PROBES: &'static [f64] = EIGHT;
+    const PROBES: &'static [f64] = EIGHTHS;
 
     #[inline(always)]
     fn set_parameters(&mut self, values: &[S]) {
