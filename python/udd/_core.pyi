@@ -43,7 +43,6 @@ class _Orbits(TypedDict):
     value: _Floats
     standard_error: _Floats
     time: _Floats
-    converged: NDArray[np.bool_]
     mean: _Floats
     product: _Floats
     end: _Floats

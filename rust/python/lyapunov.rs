@@ -18,7 +18,6 @@ struct Table {
     value: Vec<f64>,
     standard_error: Vec<f64>,
     time: Vec<f64>,
-    converged: Vec<bool>,
     mean: Vec<f64>,
     product: Vec<f64>,
     end: Vec<f64>,
@@ -31,7 +30,6 @@ impl Table {
             self.value.extend([f64::NAN; N]);
             self.standard_error.extend([f64::NAN; N]);
             self.time.push(f64::NAN);
-            self.converged.push(false);
             self.mean.extend([f64::NAN; D]);
             self.product.extend([[f64::NAN; D]; D].as_flattened());
             self.end.extend([f64::NAN; D]);
@@ -41,7 +39,6 @@ impl Table {
         self.value.extend(orbit.exponents.value);
         self.standard_error.extend(orbit.exponents.standard_error);
         self.time.push(orbit.exponents.time);
-        self.converged.push(orbit.converged);
         self.mean.extend(orbit.moments.first);
         self.product.extend(orbit.moments.second.as_flattened());
         self.end.extend(orbit.x);
@@ -98,7 +95,6 @@ fn lyapunov<'py>(
     dict.set_item("value", wide(table.value, width)?)?;
     dict.set_item("standard_error", wide(table.standard_error, width)?)?;
     dict.set_item("time", PyArray1::from_vec(py, table.time))?;
-    dict.set_item("converged", PyArray1::from_vec(py, table.converged))?;
     dict.set_item("mean", wide(table.mean, dimension)?)?;
     dict.set_item("product", PyArray1::from_vec(py, table.product).reshape([count, dimension, dimension])?)?;
     dict.set_item("end", wide(table.end, dimension)?)?;

@@ -43,8 +43,6 @@ pub struct Lyapunov<'a, F, const D: usize> {
 #[derive(Clone, Copy, Debug)]
 pub struct Exponents<const D: usize, const N: usize> {
     pub exponents: Average<N>,
-    /// Whether the standard error met the goal.
-    pub converged: bool,
     /// Time averages of the state and of the products of its components, where all exponents are asked for.
     pub moments: Moments<f64, D>,
     /// When and where the run ended, and how.
@@ -173,7 +171,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                 let x = ship.driver.x().map(|x| x.re.lane(lane));
                 let means = moments.lane(lane);
                 moments.clear(lane);
-                yields.push(orbit, Exponents { exponents, converged, moments: means, t: now, x, outcome });
+                yields.push(orbit, Exponents { exponents, moments: means, t: now, x, outcome });
                 ship.unload(lane);
                 full_at.set_lane(lane, f64::INFINITY);
                 if let Some(orbit) = queue.take() {
