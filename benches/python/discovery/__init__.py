@@ -1,0 +1,1 @@
+"""How well undeclared effects are found in simulated records; see __main__."""

@@ -1,0 +1,159 @@
+"""The cases: which law at which multiple of its detection limit, before which camera; all of it drawn."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from camera import ALONE, FPS, Camera, drawn, film
+from information import information
+from laws import FOREIGN, LIBRARY, Kind, Law
+from motion import Device, Run, World, staying
+from units import TRAIN, assumed, threshold
+
+import udd
+
+DRIVES = (0.016, 0.083)  # m/s
+_ROUNDS = 4  # of bringing a law to its multiple of the limit
+_CLOSE = 0.1
+_DRAWS = 12
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is to be drawn: the kinds of the laws, and their multiples of the detection limit."""
+
+    batch: str
+    names: tuple[str, ...]
+    number: int
+    multiples: tuple[float, float] = (1.0, 1.0)
+    defect: str = "all"
+
+    @property
+    def title(self) -> str:
+        """How it is called in a table."""
+        return " + ".join(self.names) or f"null ({self.defect})"
+
+
+@dataclass(frozen=True)
+class Record:
+    """What was drawn: the truth, and what the camera saw of it."""
+
+    world: World
+    motion: Run
+    camera: Camera
+    multiples: tuple[float, ...]
+    known: udd.Disk
+    measurement: udd.Measurement
+
+
+BATCHES = ("three", "library", "foreign", "pairs", "nulls")
+
+
+def cases(batch: str, records: int) -> Iterator[Case]:
+    """The cases of a batch, `records` of each kind."""
+    names = list(LIBRARY)
+    for number in range(records):
+        if batch == "three":
+            yield from (Case(batch, (name,), number, (3.0, 3.0)) for name in names)
+        elif batch == "library":
+            yield from (Case(batch, (name,), number, (1.0, 10.0)) for name in names)
+        elif batch == "foreign":
+            yield from (Case(batch, (name,), number, (3.0, 10.0)) for name in FOREIGN)
+        elif batch == "pairs":
+            rng = np.random.default_rng([zlib.crc32(b"pairs"), number])
+            for _ in range(6):
+                yield Case(batch, tuple(rng.choice(names, 2, replace=False).tolist()), number, (3.0, 10.0))
+        elif batch == "nulls":
+            yield from (Case(batch, (), number, defect=defect) for defect in ("all", *ALONE))
+
+
+def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
+    """The record of a case; the same for the same seed."""
+    rng = np.random.default_rng([seed, zlib.crc32(f"{case.batch} {case.title}".encode()), case.number])
+    t = np.arange(0, TRAIN * duration, 1 / FPS)
+    kinds = [(LIBRARY | FOREIGN)[name] for name in case.names]
+    for _ in range(_DRAWS):
+        drive = rng.uniform(*DRIVES)
+        known = udd.Disk(drive)
+        spread = 1 + rng.normal(0, [0.02, 0.1, 0.1, 0.1])
+        plain = known.parameters
+        device = Device(*(f * plain[name] for f, name in zip(spread, ("W", "k0", "k1", "k2"), strict=True)))
+        camera = _camera(case, rng, precise)
+        wanted = np.exp(rng.uniform(*np.log(case.multiples), len(kinds)))
+        made = _at_multiples(World(device), kinds, wanted, camera, known, t, duration, rng)
+        if made is None:
+            continue
+        world, motion, multiples = made
+        stated, seen = film(camera, motion, duration, rng)
+        sigma = np.tile([camera.noise, camera.noise, camera.angle_noise], (len(stated), 1))
+        return Record(world, motion, camera, multiples, known, udd.Measurement(stated, seen, sigma=sigma))
+    raise RuntimeError(f"{case.title}: the disk leaves the wheels in every draw")
+
+
+def _camera(case: Case, rng: np.random.Generator, precise: bool) -> Camera:
+    if case.defect == "all":
+        return drawn(rng, precise, hard=not case.names)
+    plain = Camera(noise=5e-5, angle_noise=1e-3) if precise else Camera()
+    return replace(plain, **ALONE[case.defect])
+
+
+def _at_multiples(
+    world: World,
+    kinds: list[Kind],
+    wanted: np.ndarray,
+    camera: Camera,
+    known: udd.Disk,
+    t: np.ndarray,
+    duration: float,
+    rng: np.random.Generator,
+) -> tuple[World, Run, tuple[float, ...]] | None:
+    """The laws at the wanted multiples of their limits, and a motion that stays between the wheels.
+
+    A law changes the motion and with it its own limit: both are brought together in a few rounds.
+    """
+    motion = staying(world, duration, rng)
+    if motion is None or not kinds:
+        return motion and (world, motion, ())
+    laws = tuple(_unit(kind, motion, t, rng) for kind in kinds)
+    for done in range(_ROUNDS):
+        sizes = [_multiple(world, law, motion, camera, known, t) for law in laws]
+        if done and all(abs(s / w - 1) < _CLOSE for s, w in zip(sizes, wanted, strict=True)):
+            break
+        laws = tuple(law.scaled(w / s) for law, s, w in zip(laws, sizes, wanted, strict=True))
+        world = World(world.device, laws)
+        motion = staying(world, duration, rng)
+        if motion is None:
+            return None
+    return world, motion, tuple(_multiple(world, law, motion, camera, known, t) for law in laws)
+
+
+def _multiple(world: World, law: Law, motion: Run, camera: Camera, known: udd.Disk, t: np.ndarray) -> float:
+    """The law's size in units of its detection limit, on this motion."""
+    found = information(world, law, motion, camera, assumed(known), t)
+    a = np.array(law.amplitudes)
+    return float(np.sqrt(a @ found @ a / threshold(known, t, len(a))))
+
+
+def _unit(kind: Kind, motion: Run, t: np.ndarray, rng: np.random.Generator) -> Law:
+    """The law with drawn shape, direction and sign, its size still arbitrary."""
+    shape = {name: _shape(range_, rng) for name, range_ in kind.shapes.items()}
+    momentum = str(rng.choice(kind.momenta)) if kind.momenta else None
+    angle = rng.uniform(0, 2 * np.pi)
+    sign = 1.0 if kind.positive else float(rng.choice([-1.0, 1.0]))
+    if kind.name == "cable_torque":
+        beta = motion(t)[:, 3]
+        amplitudes = (1.0, float(rng.uniform(beta.min(), beta.max())))  # at rest at some angle of the record
+    elif len(kind.amplitudes) == 2:
+        amplitudes = (np.cos(angle), np.sin(angle))
+    else:
+        amplitudes = (sign,)
+    return Law(kind, tuple(1e-4 * a for a in amplitudes), shape, momentum)
+
+
+def _shape(given: tuple[float, float] | list[float], rng: np.random.Generator) -> float:
+    if isinstance(given, list):
+        return float(rng.choice(given))
+    return float(np.exp(rng.uniform(*np.log(given))))

@@ -1,0 +1,116 @@
+"""One record from its draw to its score."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from cases import Case, Record, draw
+from oracle import oracle
+
+import udd
+
+_EQUATIONS = {"lateral": "dY", "vertical": "dZ", "torque": "dOmega", "friction": "dOmega"}
+_DEVICE = ("k0", "k1", "k2", "W")
+
+
+@dataclass
+class Score:
+    """What came of a record."""
+
+    batch: str
+    title: str
+    number: int
+    W: float = 0.0
+    multiples: list[float] = field(default_factory=list)
+    truth: list[dict[str, Any]] = field(default_factory=list)
+    verdict: str = ""
+    found: list[str] = field(default_factory=list)
+    alternatives: list[str] = field(default_factory=list)
+    equations: list[bool] = field(default_factory=list)
+    forms: list[bool] = field(default_factory=list)
+    false: int = 0  # effects reported that are none of the truth's, nor may stand for one
+    z: dict[str, float] = field(default_factory=dict)
+    z_device: dict[str, float] = field(default_factory=dict)
+    horizons: list[float] = field(default_factory=list)
+    before: list[float] = field(default_factory=list)
+    after: list[float] = field(default_factory=list)
+    oracle_error: list[float] = field(default_factory=list)
+    floor: list[float] = field(default_factory=list)
+    scatter: float = 0.0
+    level: int = -1
+    best: str = ""
+    seconds: float = 0.0
+    error: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return asdict(self)
+
+
+def score(case: Case, seed: int, duration: float, precise: bool) -> Score:
+    """Draw the record, look for what its model lacks, compare with the truth."""
+    result = Score(case.batch, case.title, case.number)
+    try:
+        drawn = draw(case, seed, duration, precise=precise)
+        result.W, result.multiples = float(drawn.known.W), list(drawn.multiples)
+        for law in drawn.world.laws:
+            values = dict(zip(law.kind.amplitudes, law.amplitudes, strict=True))
+            result.truth.append({"name": law.kind.name, "momentum": law.momentum, **values, **law.shape})
+        begin = time.perf_counter()
+        found = udd.discover(drawn.measurement, drawn.known)
+        result.seconds = time.perf_counter() - begin
+        _judge(result, drawn, found)
+    except Exception:  # one record's failure is a result too, and must not end the others
+        result.error = traceback.format_exc(limit=3)
+    return result
+
+
+def _judge(result: Score, drawn: Record, found: udd.Discovery) -> None:
+    result.verdict = found.verdict
+    result.found = [f.effect.name for f in found.effects]
+    result.alternatives = [a.effect.name for a in found.alternatives]
+    result.scatter, result.level = float(found.fit.scatter), int(found.fit.level)
+    first = found.scans[0][:1] if found.scans else []
+    result.best = ", ".join(f"{s.candidate.title} chi2 {s.chi2:.0f}" for s in first)
+    named = [f.effect for f in found.effects] + [a.effect for a in found.alternatives]
+    entered = {_EQUATIONS[slot] for effect in named for slot in effect.slots}
+    laws = drawn.world.laws
+    result.equations = [bool(set(law.kind.equations) & entered) for law in laws]
+    result.forms = [law.kind.name in {e.name for e in named} for law in laws]
+    result.false = len(_unexplained(found, {law.kind.name for law in laws}))
+    _measure(result, drawn, found)
+    after, before = found.error_after, found.error_before
+    result.horizons = list(after.horizons)
+    result.before, result.after = before.median.tolist(), after.median.tolist()
+    result.floor = after.floor.tolist()
+    best = oracle(drawn)
+    result.oracle_error = [best[h] for h in after.horizons]
+
+
+def _unexplained(found: udd.Discovery, true: set[str]) -> list[str]:
+    """Effects that are not the truth's and for which none of the truth's is named as an alternative."""
+    left = []
+    for one in found.effects:
+        others = {a.effect.name for a in found.alternatives if a.instead_of == one.effect.name}
+        if not true & {one.effect.name, *others}:
+            left.append(one.effect.name)
+    return left
+
+
+def _measure(result: Score, drawn: Record, found: udd.Discovery) -> None:
+    """Coefficients and constants over their standard errors."""
+    for law in drawn.world.laws:
+        for one in found.effects:
+            same = one.effect.name == law.kind.name and one.effect.momentum == law.momentum
+            if not same or any(abs(one.parameters[n] - v) > 0.02 * v for n, v in law.shape.items()):
+                continue
+            for name, value in zip(law.kind.amplitudes, law.amplitudes, strict=True):
+                error = one.errors.get(name, np.nan)
+                result.z[f"{law.kind.name}.{name}"] = float((one.parameters[name] - value) / error)
+    for name in _DEVICE:
+        off = found.fit.parameters[name] - getattr(drawn.world.device, name)
+        result.z_device[name] = float(off / found.fit.errors[name])

@@ -1,0 +1,29 @@
+"""What the benchmark takes from udd: what its fit assumes, how many candidates it looks at, its threshold."""
+
+from __future__ import annotations
+
+import numpy as np
+from information import DEVICE, Assumed
+from scipy.stats import chi2
+
+import udd
+from udd.discovery.candidates import library, ripples
+from udd.discovery.discover import TRAIN
+from udd.discovery.search import ALPHA
+from udd.fitting.parameters import CAMERA, CLOCK
+from udd.fitting.parameters import DISK as SPREAD
+from udd.fitting.problem import levels
+
+__all__ = ["TRAIN", "assumed", "threshold"]
+
+
+def assumed(model: udd.Disk) -> Assumed:
+    """What a fit of the model assumes at its tightest."""
+    device = {name: SPREAD[name] * model.parameters[name] for name in DEVICE}
+    return Assumed(levels("disk")[-1], {**device, "clock": CLOCK}, dict(CAMERA["disk"]))
+
+
+def threshold(model: udd.Disk, t: np.ndarray, amplitudes: int) -> float:
+    """The fall of chi2 from which an effect is accepted."""
+    looks = len(library(model)) + len(ripples(model, t))
+    return float(chi2.isf(ALPHA / looks, amplitudes))
