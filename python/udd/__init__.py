@@ -19,6 +19,7 @@ _PUBLIC = {
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
     "Fit": "udd.fitting",
+    "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
     "Pendulum": "udd.models",
@@ -35,6 +36,7 @@ _PUBLIC = {
     "ensemble": "udd.ensembles",
     "errors": "udd.errors",
     "fit": "udd.fitting",
+    "forecast": "udd.forecasting",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
     "plot": "udd.plot",
@@ -65,6 +67,8 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.film import render as render
     from udd.fitting import Fit as Fit
     from udd.fitting.fit import fit as fit
+    from udd.forecasting import Forecast as Forecast
+    from udd.forecasting import forecast as forecast
     from udd.measurement import Measurement as Measurement
     from udd.measurement import read_measurement as read_measurement
     from udd.models import DLE as DLE

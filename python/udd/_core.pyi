@@ -161,6 +161,19 @@ def score(
 def score_ripples(
     model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], frequencies: list[float]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
+def responses(
+    model: Model, data: _Data, start: _Start, nodes: int
+) -> tuple[_Floats, _Floats, _Floats]: ...
+def score_columns(
+    model: Model,
+    data: _Data,
+    start: _Start,
+    free: _Free,
+    diffusion: list[float],
+    at_end: _Floats,
+    in_sight: _Floats,
+    groups: list[int],
+) -> tuple[_Floats, _Floats, _Floats]: ...
 def filter(
     model: Model, data: _Data, start: _Start, diffusion: list[float], windows: list[tuple[int, int]]
 ) -> tuple[_Floats, _Floats, _Floats]: ...

@@ -13,7 +13,7 @@ use crate::scalar::{Dual, Scalar};
 
 /// How many directions one pass differentiates in.
 const WIDTH: usize = 12;
-type Wide = Dual<f64, WIDTH>;
+pub(super) type Wide = Dual<f64, WIDTH>;
 
 /// Residuals and derivatives, frame by frame and link by link:
 /// `misfit = seen - h` with `dh = h dx + g dtheta`, `defect = x_{i+1} - Phi` with

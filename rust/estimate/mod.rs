@@ -12,6 +12,7 @@
 //! column per candidate, give the [`score`](Estimator::score) of every effect the model may lack.
 
 mod bordered;
+mod forcing;
 mod forecast;
 mod gauss_newton;
 mod linearise;
@@ -21,6 +22,7 @@ mod sensor;
 mod waves;
 
 pub use bordered::{Bordered, Eliminated};
+pub use forcing::{Columns, Place};
 pub use forecast::Filtered;
 pub use gauss_newton::{Cost, Options, Solution};
 pub use linearise::Linear;

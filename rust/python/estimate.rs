@@ -1,6 +1,6 @@
 //! The estimator's door to Python: arrays in, arrays out.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Const, Dyn, OMatrix, SMatrix, SVector};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -10,7 +10,8 @@ use super::errors::FitError;
 use super::interrupt;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, DiskCamera, EstimateError, Estimator, Free, Options, Point, Probe, Record, Role, Sensor,
+    AngleSensor, Columns, DiskCamera, EstimateError, Estimator, Free, Options, Point, Probe, Record, Role,
+    Sensor,
 };
 use crate::integrate::Tolerance;
 use crate::model::effects::Kind;
@@ -287,6 +288,92 @@ fn score_ripples<'py>(
     ))
 }
 
+/// Times (n, q), states (n, q, d) and responses (n, q, d, d) at `nodes` places of each of n links: what a unit
+/// forcing of each equation there adds to the state at the link's end.
+#[pyfunction]
+fn responses<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    nodes: usize,
+) -> PyResult<Three<'py>> {
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        model: (F, Vec<f64>, C),
+        py: Python<'py>,
+        (data, start): (&Data<'py>, &Start<'py>),
+        nodes: usize,
+    ) -> PyResult<Three<'py>> {
+        let (estimator, point) = problem(model, data, start, &[], &[1.0; D])?;
+        let most = Estimator::<F, C, D, M>::MOST_PLACES;
+        if !(1..=most).contains(&nodes) {
+            return Err(PyValueError::new_err(format!("between 1 and {most} nodes are known, not {nodes}")));
+        }
+        let places = interrupt::run(py, |_| estimator.responses(&point, nodes))?;
+        let n = places.len() / nodes;
+        let response: Vec<_> = places.iter().map(|p| p.response).collect();
+        Ok((
+            array(py, [n, nodes], places.iter().map(|p| p.t))?,
+            array(py, [n, nodes, D], places.iter().flat_map(|p| p.state))?,
+            array(py, [n, nodes, D, D], numbers(&response))?,
+        ))
+    }
+    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), nodes))
+}
+
+/// Gradient of each group of columns, its information, and the information were the free parameters known: the
+/// groups one after the other, the information flat. A column is what its amplitude adds to the state at
+/// every link's end (n - 1, d, c), and to what is seen in every frame (n, m, c).
+#[pyfunction]
+#[pyo3(signature = (model, data, start, free, diffusion, at_end, in_sight, groups))]
+#[allow(clippy::too_many_arguments)]
+fn score_columns<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    free: Vec<FreeTuple>,
+    diffusion: Vec<f64>,
+    at_end: PyReadonlyArray3<'py, f64>,
+    in_sight: PyReadonlyArray3<'py, f64>,
+    groups: Vec<usize>,
+) -> PyResult<Three<'py>> {
+    type Arrays<'a, 'py> = (&'a PyReadonlyArray3<'py, f64>, &'a PyReadonlyArray3<'py, f64>);
+    fn blocks<const K: usize>(array: &PyReadonlyArray3<'_, f64>) -> Vec<OMatrix<f64, Const<K>, Dyn>> {
+        let array = array.as_array();
+        let own = |a: numpy::ndarray::ArrayView2<'_, f64>| {
+            OMatrix::<f64, Const<K>, Dyn>::from_fn(a.ncols(), |i, j| a[[i, j]])
+        };
+        array.outer_iter().map(own).collect()
+    }
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        model: (F, Vec<f64>, C),
+        py: Python<'py>,
+        (data, start): (&Data<'py>, &Start<'py>),
+        free: &[FreeTuple],
+        diffusion: &[f64],
+        (at_end, in_sight): Arrays<'_, 'py>,
+        groups: &[usize],
+    ) -> PyResult<Three<'py>> {
+        let (estimator, point) = problem(model, data, start, free, diffusion)?;
+        let (n, c) = (estimator.record.t.len(), groups.iter().sum::<usize>());
+        if at_end.as_array().shape() != [n - 1, D, c] || in_sight.as_array().shape() != [n, M, c] {
+            let message = format!("columns must have the shapes ({}, {D}, {c}) and ({n}, {M}, {c})", n - 1);
+            return Err(PyValueError::new_err(message));
+        }
+        let columns = Columns { b: blocks(at_end), g: blocks(in_sight) };
+        let scores = interrupt::run(py, |_| estimator.score_groups(&point, &columns, groups))?;
+        let squares = groups.iter().map(|size| size * size).sum();
+        Ok((
+            array(py, [c], scores.iter().flat_map(|s| s.gradient.iter().copied()))?,
+            array(py, [squares], scores.iter().flat_map(|s| s.information.iter().copied()))?,
+            array(py, [c], scores.iter().flat_map(|s| s.alone.iter().copied()))?,
+        ))
+    }
+    let call = (&data, &start);
+    each_family!(AnyModel::to_fit(model)?, run(py, call, &free, &diffusion, (&at_end, &in_sight), &groups))
+}
+
 /// From each window of frames alone: the state at its first frame, at its last, and the covariance there.
 #[pyfunction]
 fn filter<'py>(
@@ -378,6 +465,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(solve, module)?)?;
     module.add_function(wrap_pyfunction!(score, module)?)?;
     module.add_function(wrap_pyfunction!(score_ripples, module)?)?;
+    module.add_function(wrap_pyfunction!(responses, module)?)?;
+    module.add_function(wrap_pyfunction!(score_columns, module)?)?;
     module.add_function(wrap_pyfunction!(filter, module)?)?;
     module.add_function(wrap_pyfunction!(predict, module)?)?;
     module.add_function(wrap_pyfunction!(camera_parameters, module)?)

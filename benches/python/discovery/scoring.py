@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from cases import Case, Record, draw
+from laws import Law
 from oracle import oracle
 
 import udd
@@ -32,6 +33,7 @@ class Score:
     alternatives: list[str] = field(default_factory=list)
     equations: list[bool] = field(default_factory=list)
     forms: list[bool] = field(default_factory=list)
+    named: list[bool] = field(default_factory=list)  # the truth was chosen, not only named beside the choice
     false: int = 0  # effects reported that are none of the truth's, nor may stand for one
     z: dict[str, float] = field(default_factory=dict)
     z_device: dict[str, float] = field(default_factory=dict)
@@ -81,6 +83,7 @@ def _judge(result: Score, drawn: Record, found: udd.Discovery) -> None:
     laws = drawn.world.laws
     result.equations = [bool(set(law.kind.equations) & entered) for law in laws]
     result.forms = [law.kind.name in {e.name for e in named} for law in laws]
+    result.named = [law.kind.name in result.found for law in laws]
     result.false = len(_unexplained(found, {law.kind.name for law in laws}))
     _measure(result, drawn, found)
     after, before = found.error_after, found.error_before
@@ -102,15 +105,23 @@ def _unexplained(found: udd.Discovery, true: set[str]) -> list[str]:
 
 
 def _measure(result: Score, drawn: Record, found: udd.Discovery) -> None:
-    """Coefficients and constants over their standard errors."""
+    """Coefficients over their standard errors, and the device's constants where the form is the truth's."""
+    missed = False
     for law in drawn.world.laws:
-        for one in found.effects:
-            same = one.effect.name == law.kind.name and one.effect.momentum == law.momentum
-            if not same or any(abs(one.parameters[n] - v) > 0.02 * v for n, v in law.shape.items()):
-                continue
+        matching = [one for one in found.effects if _same(one.effect, law)]
+        missed = missed or not matching
+        for one in matching:
             for name, value in zip(law.kind.amplitudes, law.amplitudes, strict=True):
                 error = one.errors.get(name, np.nan)
                 result.z[f"{law.kind.name}.{name}"] = float((one.parameters[name] - value) / error)
+    if missed or len(found.effects) != len(drawn.world.laws):
+        return
     for name in _DEVICE:
         off = found.fit.parameters[name] - getattr(drawn.world.device, name)
         result.z_device[name] = float(off / found.fit.errors[name])
+
+
+def _same(effect: udd.effects.Effect, law: Law) -> bool:
+    """Whether udd's effect is the law, but for the amplitudes; a scanned frequency is nearly the law's."""
+    shapes = all(abs(effect.parameters.get(n, np.inf) - v) < 0.02 * v for n, v in law.shape.items())
+    return effect.name == law.kind.name and effect.momentum == law.momentum and shapes

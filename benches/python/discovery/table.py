@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 from scipy.stats import binomtest
@@ -41,24 +41,42 @@ def report(scores: Iterable[Score]) -> str:
 
 def _effects(rows: Sequence[Score]) -> str:
     lines = [
-        f"  {'':34s} {'n':>4s} {'equation':>26s} {'form or class':>26s} {'false':>6s} "
-        f"{'after/oracle':>16s} {'before/oracle':>14s}"
+        f"  {'':20s} {'n':>4s} {'equation':>22s} {'form or class':>22s} {'named':>9s} {'false':>6s} "
+        f"{'after/oracle':>13s} {'before/oracle':>14s}"
     ]
     title = lambda one: one.title  # noqa: E731
     groups = [(name, list(group)) for name, group in groupby(sorted(rows, key=title), title)]
     if rows[0].batch == "pairs":
         groups = []
-    for name, group in [*groups, ("all", list(rows))]:
-        equations = [e for one in group for e in one.equations]
-        forms = [f for one in group for f in one.forms]
+    for name, group in [*groups, *_by_multiple(rows), ("all", list(rows))]:
+        equations, forms, named = ([h for one in group for h in hits(one)] for hits in _HITS)
         after, before = _quantiles(_ratio, group), _quantiles(_ratio_before, group)
         false = sum(one.false > 0 for one in group)
         lines.append(
-            f"  {name:34s} {len(group):4d} {_share(equations):>26s} {_share(forms):>26s} {false:6d} "
-            f"{after:>16s} {before:>14s}"
+            f"  {name:20s} {len(group):4d} {_share(equations):>22s} {_share(forms):>22s} "
+            f"{sum(named):5d}/{len(named):<3d} {false:6d} {after:>13s} {before:>14s}"
         )
     lines.append(f"  after/oracle: held-out error at 1 s, median and worst decile; {_z(rows)}")
     return "\n".join(lines)
+
+
+_HITS: tuple[Callable[[Score], list[bool]], ...] = (
+    lambda one: one.equations,
+    lambda one: one.forms,
+    lambda one: one.named,
+)
+
+
+def _by_multiple(rows: Sequence[Score]) -> list[tuple[str, list[Score]]]:
+    """Records by the weakest effect's multiple of its detection limit."""
+    edges = (0.0, 1.5, 2.0, 3.0, 5.0, np.inf)
+    if rows[0].batch == "three":
+        return []
+    bins = [
+        (f"{low:g} to {high:g} limits", [one for one in rows if low <= min(one.multiples) < high])
+        for low, high in pairwise(edges)
+    ]
+    return [(name, group) for name, group in bins if group]
 
 
 def _nulls(rows: Sequence[Score]) -> str:
@@ -111,7 +129,7 @@ def _z(rows: Sequence[Score]) -> str:
     """Root mean square of errors over standard errors."""
     effects = [z for one in rows for z in one.z.values()]
     parts = [f"coefficients {_rms(effects)} ({len(effects)})"] if effects else []
-    for name in rows[0].z_device:
+    for name in dict.fromkeys(name for one in rows for name in one.z_device):
         parts.append(f"{name} {_rms([one.z_device[name] for one in rows if one.z_device])}")
     return "errors over standard errors, r.m.s.: " + ", ".join(parts)
 

@@ -7,9 +7,35 @@ import re
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from . import basins, bifurcation, demo, discover, film, fit, lyapunov, poincare, simulate, sweep, track
+from . import (
+    basins,
+    bifurcation,
+    demo,
+    discover,
+    film,
+    fit,
+    forecast,
+    lyapunov,
+    poincare,
+    simulate,
+    sweep,
+    track,
+)
 
-_COMMANDS = (demo, simulate, lyapunov, poincare, bifurcation, basins, sweep, film, track, fit, discover)
+_COMMANDS = (
+    demo,
+    simulate,
+    lyapunov,
+    poincare,
+    bifurcation,
+    basins,
+    sweep,
+    film,
+    track,
+    fit,
+    forecast,
+    discover,
+)
 
 
 class Parser(argparse.ArgumentParser):

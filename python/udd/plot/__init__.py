@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from .crossings import poincare, return_map
 from .evidence import errors, evidence
+from .fan import forecast
 from .fits import misfit, residuals
 from .friction import friction
 from .maps import basins, bifurcation
@@ -19,6 +20,7 @@ __all__ = [
     "bifurcation",
     "errors",
     "evidence",
+    "forecast",
     "friction",
     "misfit",
     "orbit",
