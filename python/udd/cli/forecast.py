@@ -1,0 +1,147 @@
+"""`udd forecast`: what comes next, and how long that can be believed."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import UddError
+
+from .answer import Answer, telling
+from .fit import options
+from .inputs import add_input, check_early, measurement_of, model_of
+from .options import new
+
+if TYPE_CHECKING:
+    from udd.forecasting import Forecast
+
+_ENDINGS = (".csv", ".png", ".svg", ".pdf")
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Fit the model, filter the last second, and run free: a forecast with the fan of an ensemble."
+    parser = new(commands, "forecast", run, summary)
+    add_input(parser)
+    parser.add_argument("--t", type=float, help="how far to look ahead [s] (default 10; a pendulum 60)")
+    parser.add_argument(
+        "--start",
+        type=float,
+        help="time from which the model runs free [s]; later frames are only compared (default: the end)",
+    )
+    parser.add_argument(
+        "--window",
+        type=float,
+        help="time before it from which the state is filtered [s] (default 1; a pendulum 4)",
+    )
+    parser.add_argument("--members", type=int, default=200, help="size of the ensemble (default 200)")
+    parser.add_argument("--level", type=float, default=0.95, help="share within the band (default 0.95)")
+    parser.add_argument(
+        "--error", type=float, help="until which it is valid [m, or rad] (default 0.005; a pendulum 0.05)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="another seed, another ensemble (default 0)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help=f"file to write, by its ending: {', '.join(_ENDINGS)}; repeatable",
+    )
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    from udd.fitting import fit
+    from udd.forecasting import forecast
+
+    check_early(args)
+    for path in args.out:
+        if path.suffix not in _ENDINGS:
+            raise UddError(f"{path}: the name must end in {', '.join(_ENDINGS)}")
+        if not path.parent.is_dir():
+            raise UddError(f"{path}: there is no folder {path.parent}")
+    measurement, _film = measurement_of(args)
+    model = model_of(args, measurement)
+    known = measurement if args.start is None else measurement.rows(measurement.t <= args.start)
+    with telling() as tell:
+        tell("fitting")
+        fitted = fit(known, model, **options(args))
+        tell("running the ensemble")
+        found = forecast(
+            measurement,
+            fitted,
+            args.t,
+            start=args.start,
+            window=args.window,
+            members=args.members,
+            level=args.level,
+            error=args.error,
+            seed=args.seed,
+        )
+    for path in args.out:
+        _write(path, found)
+    text = "\n".join([describe(found), *(f"written: {path}" for path in args.out)])
+    return Answer(text, {"file": args.file, **found.to_dict(), "files": args.out})
+
+
+def describe(found: Forecast) -> str:
+    """A forecast in a few lines."""
+    factor, unit = (1e3, "mm") if "Z" in found.names else (1e3, "mrad")
+    within = f"{factor * found.error:.3g} {unit}"
+    reach = found.t[-1] - found.start
+    lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]
+    if math.isfinite(found.valid_time):
+        latest = f"{found.valid_high:.3g}" if math.isfinite(found.valid_high) else f"over {reach:.3g}"
+        lines.append(
+            f"  valid to {within} for {found.valid_time:.3g} s "
+            f"({100 * found.level:g} % of the members: {found.valid_low:.3g} to {latest} s)"
+        )
+    else:
+        lines.append(f"  valid to {within} to its end")
+    if math.isfinite(found.lyapunov_time):
+        times = f"; valid for {found.lyapunov_times:.2g} of them" if math.isfinite(found.valid_time) else ""
+        lines.append(f"  Lyapunov time of the fitted model: {found.lyapunov_time:.3g} s{times}")
+    elif math.isinf(found.lyapunov_time):
+        lines.append("  errors of the fitted model do not grow in the long run")
+    if math.isfinite(found.measured_valid_time):
+        lines.append(f"  the measurement parted from the median after {found.measured_valid_time:.3g} s")
+    return "\n".join(lines)
+
+
+def _write(path: Path, found: Forecast) -> None:
+    from udd.files import write_whole
+
+    if path.suffix == ".csv":
+        write_whole(path, _csv(found).encode())
+        return
+    from matplotlib.figure import Figure
+
+    from udd.plot import forecast as draw
+
+    figure = Figure(figsize=(9.0, 2.6 * len(found.names) + 0.4), layout="constrained")
+    axes = figure.subplots(len(found.names), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, name in zip(axes, found.names, strict=True):
+        draw(found, ax, coordinate=name)
+        if ax is not axes[0]:
+            ax.get_legend().remove()
+        if ax is not axes[-1]:
+            ax.set_xlabel("")
+    picture = BytesIO()
+    figure.savefig(picture, format=path.suffix[1:], dpi=150)
+    write_whole(path, picture.getvalue())
+
+
+def _csv(found: Forecast) -> str:
+    """The curves: t, then median, low and high of each channel."""
+    head = ["t", *(f"{name}{end}" for name in found.names for end in ("", "_low", "_high"))]
+    rows = [",".join(head)]
+    for k, t in enumerate(found.t.tolist()):
+        cells = [t]
+        for m in range(len(found.names)):
+            cells += [float(found.median[k, m]), float(found.low[k, m]), float(found.high[k, m])]
+        rows.append(",".join(map(repr, cells)))
+    return "\n".join(rows) + "\n"

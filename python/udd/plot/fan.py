@@ -1,0 +1,73 @@
+"""A forecast: the fan of its members, and what was measured."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd.errors import UddError
+
+from .style import AFTER, FAINT, MEASURED, label, new_axes, scale, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_BEFORE = 1.0  # s of data shown before the start
+_MEMBERS = 12  # drawn one by one
+
+
+def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = None) -> Axes:
+    """The median and the band of a forecast, a few of its members, and the measurement where there is one.
+
+    Parameters
+    ----------
+    result : Forecast
+    ax : Axes, optional
+    coordinate : str, optional
+        One of the forecast's channels; by default Z of a disk.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        No such channel, or not a forecast.
+    """
+    if not hasattr(result, "members") or not hasattr(result, "valid_time"):
+        raise UddError(f"a forecast has a fan, not {type(result).__name__}")
+    names = result.names
+    coordinate = coordinate or ("Z" if "Z" in names else names[0])
+    if coordinate not in names:
+        raise UddError(f"the forecast has {', '.join(names)}, not {coordinate}")
+    k, factor = names.index(coordinate), scale(coordinate)
+    ax = new_axes(ax)
+    t = result.t
+    for number, member in enumerate(result.members[:_MEMBERS, :, k]):
+        ax.plot(t, factor * member, color=FAINT, linewidth=0.6, label=None if number else "some members")
+    band = f"{100 * result.level:g} % of the members"
+    ax.fill_between(
+        t,
+        factor * result.low[:, k],
+        factor * result.high[:, k],
+        color=AFTER,
+        alpha=0.25,
+        linewidth=0,
+        label=band,
+    )
+    ax.plot(t, factor * result.median[:, k], color=AFTER, linewidth=1.6, label="median")
+    m = result.measurement
+    shown = m.seen & (m.t >= t[0] - _BEFORE) & (m.t <= t[-1])
+    ax.plot(
+        m.t[shown], factor * m.values[shown, k], ".", color=MEASURED, markersize=4, label="measured", zorder=3
+    )
+    ax.axvline(t[0], color="black", linewidth=0.8)
+    if np.isfinite(result.valid_time):
+        ax.axvline(t[0] + result.valid_time, color="black", linestyle="--", linewidth=1, label="valid until")
+    ax.set_xlabel(label("t"))
+    ax.set_ylabel(label(coordinate))
+    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=5)
+    tidy(ax)
+    return ax
