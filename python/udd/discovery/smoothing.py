@@ -1,0 +1,160 @@
+"""A curve from the score of its coefficients: smoothness by evidence, a test that chance is known for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
+
+from .forcing import Score
+
+Array = NDArray[np.float64]
+
+#: Numbers of smooth directions, beside the straight line or the constant, that the test looks at.
+ORDERS = (0, 2, 4, 7, 12, 20, 36)
+_SMALL = 1e-7  # of the information's size: the roughness that decides where the data say nothing
+_NOTHING = 1e-10  # a direction of less than this size is none
+_SEEN = 0.5  # share of a direction that must be the data's, for the test
+_STRETCH = 18.0  # the logarithms of the prior's precision that are tried, each way
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Combinations of the coefficients that data and prior both treat as independent, the smooth ones first.
+
+    Attributes
+    ----------
+    vectors : ndarray (k, r)
+        Their coefficients.
+    gradient : ndarray (r,)
+    information, roughness : ndarray (r,)
+        The diagonals that remain of the two matrices.
+    straight : int
+        How many have no roughness: the constant, and the straight line where there is no period.
+    """
+
+    vectors: Array
+    gradient: Array
+    information: Array
+    roughness: Array
+    straight: int
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A curve's coefficients under the smoothness prior that the evidence asks for.
+
+    Attributes
+    ----------
+    coefficients : ndarray (k,)
+    covariance : ndarray (k, k)
+    precision : float
+        Of the prior on second differences.
+    df : float
+        Effective degrees of freedom.
+    evidence : float
+        Logarithm of the evidence over that for no curve.
+    """
+
+    coefficients: Array
+    covariance: Array
+    precision: float
+    df: float
+    evidence: float
+
+
+def directions(score: Score, roughness: Array) -> Directions:
+    """Diagonalise information and roughness together (Demmler and Reinsch)."""
+    information = score.information
+    size = float(np.trace(information)) or 1.0
+    unit = roughness * (size / np.trace(roughness))
+    both, turn = eigh(information + _SMALL * unit)
+    keep = both > _NOTHING * both[-1]
+    whiten = turn[:, keep] / np.sqrt(both[keep])
+    rough, turn = eigh(whiten.T @ unit @ whiten)
+    rough = np.maximum(rough, 0.0)
+    vectors = whiten @ turn
+    nothing = 1e-6 * float(np.median(rough))
+    straight = int((rough <= nothing).sum())
+    rough[:straight] = 0.0
+    own = np.maximum(np.einsum("ka,kl,la->a", vectors, information, vectors), 0.0)
+    return Directions(
+        vectors, vectors.T @ score.gradient, own, rough * (np.trace(roughness) / size), straight
+    )
+
+
+def smooth(score: Score, roughness: Array, observations: int, at: Array | None = None) -> Smooth:
+    """The curve under the prior of the highest evidence.
+
+    Second differences are normal with a common variance, which the evidence chooses; a constant and a slope
+    are each charged as a parameter is by the Bayesian information criterion.
+
+    Parameters
+    ----------
+    score : Score
+    roughness : ndarray (k, k)
+    observations : int
+        Numbers in the record.
+    at : ndarray (k,), optional
+        Coefficients of the curve that the model of the score already holds; by default none.
+    """
+    d = directions(score, roughness)
+    # As if from no curve at all: the quadratic form is moved there.
+    g = d.gradient if at is None else d.vectors.T @ (score.gradient + score.information @ at)
+    f, bent = d.information, d.roughness > 0
+
+    def prior(log_precision: float) -> Array:
+        return np.where(bent, np.exp(log_precision) * d.roughness, f / observations)
+
+    def evidence(log_precision: float) -> float:
+        own = prior(log_precision)
+        use = f > 0
+        gain = g[use] ** 2 / (f + own)[use] - np.log1p(f[use] / own[use])
+        return float(gain.sum() / 2)
+
+    middle = float(np.log(np.median(f[bent] + 1e-300) / np.median(d.roughness[bent])))
+    grid = middle + np.arange(-_STRETCH, _STRETCH + 1, 1.0)
+    best = grid[int(np.argmax([evidence(v) for v in grid]))]
+    found = minimize_scalar(lambda v: -evidence(v), bounds=(best - 1, best + 1), method="bounded")
+    precision = float(found.x)
+    own = prior(precision)
+    total = np.maximum(f + own, 1e-300)
+    return Smooth(
+        coefficients=d.vectors @ (g / total),
+        covariance=(d.vectors / total) @ d.vectors.T,
+        precision=float(np.exp(precision)),
+        df=float((f / total).sum()),
+        evidence=evidence(precision),
+    )
+
+
+def chance(score: Score, roughness: Array) -> tuple[float, float, int]:
+    """Probability that a curve looks as good as this one where there is none.
+
+    The gradient's smoothest directions are independent and normal there, so that the fall of chi2 that the
+    first few bring is chi2-distributed, exactly; of a few numbers of directions the least likely counts,
+    times how many were looked at.
+
+    Returns
+    -------
+    p : float
+    fall : float
+        Of chi2, by those directions.
+    number : int
+        Of directions.
+    """
+    d = directions(score, roughness)
+    seen = d.information > _SEEN
+    z = np.where(seen, d.gradient**2 / np.maximum(d.information, 1e-300), 0.0)[seen]
+    straight = int(seen[: d.straight].sum())
+    falls = np.cumsum(z)
+    numbers = sorted({min(straight + more, len(z)) for more in ORDERS} - {0})
+    if not numbers:
+        return 1.0, 0.0, 0
+    by_chance = [float(chi2.sf(falls[n - 1], n)) for n in numbers]
+    k = int(np.argmin(by_chance))
+    return min(by_chance[k] * len(numbers), 1.0), float(falls[numbers[k] - 1]), numbers[k]
