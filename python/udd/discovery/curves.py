@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from udd.fitting import Fit
 from udd.models import Model
@@ -24,8 +23,8 @@ Array = NDArray[np.float64]
 INTERVALS, INTERVALS_OF_TWO = 14, 3
 #: The same along an angle that goes round: five waves per turn are seen.
 ROUND, ROUND_OF_TWO = 24, 6
+_FINER = 2  # times as many knots for the curve that is kept
 _FEW = 6  # of the best curves, tried with the momentum that goes with them too
-_ABSORBED = 0.05  # a direction of which the free parameters take more than the rest of this is theirs
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +199,14 @@ def score_groups(
     return score_forcings(found.fit, list(columns), known)
 
 
+def refined(curve: Curve, fit: Fit) -> Curve:
+    """The curve on finer knots, so that the smoothness prior alone says how much it may bend."""
+    found = responses(fit)
+    finer = tuple(replace(s, intervals=_FINER * s.intervals) for s in curve.splines)
+    (score,) = score_groups(found, [(curve.slot, curve.coordinates)], [finer])
+    return _curve(found, curve.slot, curve.coordinates, finer, score)
+
+
 def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     """The curve from the score around another fit, whose model holds the curve with coefficients `at`."""
     found = responses(fit)
@@ -215,29 +222,6 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
         evidence=smoothed.evidence,
         score=moved,
     )
-
-
-def own_part(curve: Curve, fit: Fit) -> Array:
-    """The matrix that takes from coefficients what the fit's free parameters do as well.
-
-    A constant that moves the wheels is the drive's speed, a torque proportional to Omega is friction: the
-    curve's part of these cannot be known, and a picture or a comparison leaves it out.
-    """
-    found = responses(fit)
-    (known,) = score_groups(found, [(curve.slot, curve.coordinates)], [curve.splines], known=True)
-    full = known.information + 1e-9 * np.trace(known.information) / len(known.information) * np.eye(
-        len(known.information)
-    )
-    share, vectors = eigh(curve.score.information, full)
-    vectors = vectors[:, share > _ABSORBED]
-    result: Array = vectors @ vectors.T @ full
-    return result
-
-
-def without_absorbed(curve: Curve, fit: Fit) -> Curve:
-    """The curve less what the fit's free parameters do as well; see :func:`own_part`."""
-    own = own_part(curve, fit)
-    return replace(curve, coefficients=own @ curve.coefficients, covariance=own @ curve.covariance @ own.T)
 
 
 def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:

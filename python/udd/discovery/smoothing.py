@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
 from .forcing import Score
@@ -117,18 +116,21 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
         return float(gain.sum() / 2)
 
     middle = float(np.log(np.median(f[bent] + 1e-300) / np.median(d.roughness[bent])))
-    grid = middle + np.arange(-_STRETCH, _STRETCH + 1, 1.0)
-    best = grid[int(np.argmax([evidence(v) for v in grid]))]
-    found = minimize_scalar(lambda v: -evidence(v), bounds=(best - 1, best + 1), method="bounded")
-    precision = float(found.x)
-    own = prior(precision)
-    total = np.maximum(f + own, 1e-300)
+    grid = middle + np.arange(-_STRETCH, _STRETCH + 0.25, 0.5)
+    likely = np.array([evidence(v) for v in grid])
+    # How smooth the curve is, is not known for sure: the evidence says how much each precision counts.
+    weight = np.exp(likely - likely.max())
+    weight /= weight.sum()
+    total = np.maximum(f + np.array([prior(v) for v in grid]), 1e-300)
+    mean = weight @ (g / total)
+    off = np.sqrt(weight)[:, None] * (g / total - mean)
+    covariance = np.diag(weight @ (1.0 / total)) + off.T @ off
     return Smooth(
-        coefficients=d.vectors @ (g / total),
-        covariance=(d.vectors / total) @ d.vectors.T,
-        precision=float(np.exp(precision)),
-        df=float((f / total).sum()),
-        evidence=evidence(precision),
+        coefficients=d.vectors @ mean,
+        covariance=d.vectors @ covariance @ d.vectors.T,
+        precision=float(np.exp(grid[int(np.argmax(likely))])),
+        df=float(weight @ (f / total).sum(axis=1)),
+        evidence=float(np.log(np.mean(np.exp(likely - likely.max()))) + likely.max()),
     )
 
 

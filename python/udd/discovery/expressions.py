@@ -1,0 +1,251 @@
+"""Short formulas in one variable: read, evaluated, simplified, written in the text grammar of effects.
+
+A formula is a nested tuple: ``("x",)``, a literal ``("n", value)``, a constant to be fitted
+``("c", number)``, a function ``("tanh", argument)`` or an operation ``("+", a, b)``. Text that comes from
+elsewhere is read by a whitelist; nothing is ever run.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Node = tuple[Any, ...]
+
+_BINARY: dict[str, Callable[[Any, Any], Any]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "^": np.power,
+}
+_UNARY: dict[str, Callable[[Any], Any]] = {
+    "sin": np.sin,
+    "cos": np.cos,
+    "tanh": np.tanh,
+    "exp": np.exp,
+    "ln": np.log,
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+}
+_SIGNS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^"}
+_RANK = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4}
+
+X: Node = ("x",)
+
+
+def read(text: str, names: dict[str, Node]) -> tuple[Node, list[float]]:
+    """A formula from its text; its numbers become constants to be fitted, with these values.
+
+    Whole exponents stay as they are.
+
+    Raises
+    ------
+    ValueError
+        Something in it is not of the grammar.
+    """
+    values: list[float] = []
+
+    def number(value: float) -> Node:
+        values.append(value)
+        return ("c", len(values) - 1)
+
+    def walk(node: ast.AST, exponent: bool = False) -> Node:
+        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+            value = float(node.value)
+            return ("n", value) if exponent and value.is_integer() else number(value)
+        if isinstance(node, ast.Name) and node.id in names:
+            return names[node.id]
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            inside = node.operand
+            if isinstance(inside, ast.Constant) and isinstance(inside.value, (int, float)):
+                return number(-float(inside.value))
+            return ("*", ("n", -1.0), walk(inside))
+        if isinstance(node, ast.BinOp) and type(node.op) in _SIGNS:
+            sign = _SIGNS[type(node.op)]
+            return (sign, walk(node.left), walk(node.right, exponent=sign == "^"))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
+            name = {"log": "ln"}.get(node.func.id, node.func.id)
+            if name in _UNARY:
+                return (name, walk(node.args[0]))
+        raise ValueError(f"the formula has {ast.dump(node)[:60]}, which is not of the grammar")
+
+    try:
+        tree = ast.parse(text.replace("^", "**"), mode="eval")
+    except SyntaxError as error:
+        raise ValueError(f"{text!r} is no formula") from error
+    return walk(tree.body), values
+
+
+def evaluate(node: Node, x: Array, values: Sequence[float]) -> Array:
+    """The formula's values; not finite where it is not defined."""
+    kind = node[0]
+    if kind == "x":
+        return x
+    if kind == "n":
+        return np.full(x.shape, node[1])
+    if kind == "c":
+        return np.full(x.shape, values[node[1]])
+    with np.errstate(all="ignore"):
+        inner = [evaluate(part, x, values) for part in node[1:]]
+        result: Array = _UNARY[kind](*inner) if kind in _UNARY else _BINARY[kind](*inner)
+    return result
+
+
+def constants(node: Node) -> list[int]:
+    """The numbers of its constants, in order of appearance."""
+    return list(dict.fromkeys(part[1] for part in parts(node) if part[0] == "c"))
+
+
+def parts(node: Node) -> Iterator[Node]:
+    """The formula and all that it is made of."""
+    yield node
+    if node[0] not in ("x", "n", "c"):
+        for part in node[1:]:
+            yield from parts(part)
+
+
+def exponents(node: Node) -> set[int]:
+    """The numbers of the constants that are exponents."""
+    return {part[2][1] for part in parts(node) if part[0] == "^" and part[2][0] == "c"}
+
+
+def scaled(node: Node, scale: float, values: list[float]) -> Node:
+    """The formula of ``x / scale``, every scale a constant; new ones are appended to `values`."""
+    if node[0] == "x":
+        values.append(1.0 / scale)
+        return ("*", ("c", len(values) - 1), X)
+    if node[0] in ("n", "c"):
+        return node
+    return (node[0], *(scaled(part, scale, values) for part in node[1:]))
+
+
+def sensible(node: Node, angle: bool = False) -> bool:
+    """Whether a reader would take it for a law.
+
+    No function within another, no variable in an exponent, and none that has a unit alone in a function.
+    """
+    curved = ("sin", "cos", "tanh", "exp", "ln")
+    for part in parts(node):
+        if part[0] == "^" and any(inner[0] == "x" for inner in parts(part[2])):
+            return False
+        if part[0] in curved and any(inner[0] in curved for inner in parts(part[1])):
+            return False
+        if part[0] in curved and part[1] == X and not angle:
+            return False
+    return True
+
+
+def without_sign(node: Node) -> Node:
+    """The formula for a variable that is never negative."""
+    if node == ("abs", X):
+        return X
+    if node[0] in ("x", "n", "c"):
+        return node
+    return (node[0], *(without_sign(part) for part in node[1:]))
+
+
+def put(node: Node, number: int, value: float) -> Node:
+    """The formula with a literal instead of a constant."""
+    if node[0] == "c":
+        return ("n", value) if node[1] == number else node
+    if node[0] in ("x", "n"):
+        return node
+    return (node[0], *(put(part, number, value) for part in node[1:]))
+
+
+def simplify(node: Node, values: list[float]) -> Node:
+    """Without what changes nothing; constants that only appear together become one.
+
+    New constants are appended to `values`.
+    """
+    if node[0] in ("x", "n", "c"):
+        return node
+    inner = [simplify(part, values) for part in node[1:]]
+    if all(part[0] in ("n", "c") for part in inner):
+        value = float(evaluate((node[0], *inner), np.zeros(1), values)[0])
+        if all(part[0] == "n" for part in inner):
+            return ("n", value)
+        values.append(value)
+        return ("c", len(values) - 1)
+    if node[0] in _UNARY:
+        return inner[0] if node[0] == "abs" and inner[0][0] == "abs" else (node[0], *inner)
+    return _shorter(node[0], inner[0], inner[1], values)
+
+
+def _is(node: Node, value: float) -> bool:
+    return node[0] == "n" and bool(node[1] == value)
+
+
+def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
+    """An operation of simple parts, written more simply where that is possible."""
+    if kind in "+-" and _is(b, 0.0):
+        return a
+    if kind == "+" and _is(a, 0.0):
+        return b
+    if kind == "*" and (_is(a, 0.0) or _is(b, 0.0)):
+        return ("n", 0.0)
+    if kind == "*" and _is(a, 1.0):
+        return b
+    if kind in "*/^" and _is(b, 1.0):
+        return a
+    if kind == "^" and _is(b, 0.0):
+        return ("n", 1.0)
+    if kind == "/" and _is(a, 0.0):
+        return ("n", 0.0)
+    number = ("n", "c")
+    if kind in "+*" and b[0] in number:
+        a, b = b, a  # numbers stand first
+    if kind in "+*" and a[0] in number and b[0] == kind and b[1][0] in number:
+        return _shorter(kind, simplify((kind, a, b[1]), values), b[2], values)
+    if kind == "-" and b[0] in number:
+        return _shorter("+", simplify(("*", ("n", -1.0), b), values), a, values)
+    if kind == "/" and b[0] in number:
+        return _shorter("*", simplify(("/", ("n", 1.0), b), values), a, values)
+    return (kind, a, b)
+
+
+def price(node: Node) -> float:
+    """How many nats it takes to write the formula down, its constants' values not counted.
+
+    Each of its k operations, functions and variables is one of the n different ones in it: k ln n.
+    """
+    kinds = ["*" if part[0] == "/" else "+" if part[0] == "-" else part[0] for part in parts(node)]
+    own = [kind for kind in kinds if kind not in ("n", "c")]
+    return len(own) * math.log(max(len(set(own)), 2))
+
+
+def shape(node: Node) -> str:
+    """The formula without its constants' values, to tell equal ones by."""
+    return write(node, "x", dict.fromkeys(constants(node), "c"))
+
+
+def write(node: Node, variable: str, names: dict[int, str]) -> str:
+    """The formula in the text grammar, its constants by these names."""
+    return _text(node, variable, names)[0]
+
+
+def _text(node: Node, variable: str, names: dict[int, str]) -> tuple[str, int]:
+    """Text and how strongly it binds."""
+    kind = node[0]
+    if kind == "x":
+        return variable, 5
+    if kind == "n":
+        return f"{node[1]:.10g}", 5 if node[1] >= 0 else 0
+    if kind == "c":
+        return names[node[1]], 5
+    if kind in _UNARY:
+        return f"{kind}({_text(node[1], variable, names)[0]})", 5
+    rank = _RANK[kind]
+    left, right = (_text(part, variable, names) for part in node[1:])
+    # Operators of equal rank bind to the left, but powers are bracketed on both sides.
+    a = left[0] if left[1] >= rank + (kind == "^") else f"({left[0]})"
+    b = right[0] if right[1] > rank - (kind in "+*") else f"({right[0]})"
+    gap = "" if kind == "^" else " "
+    return f"{a}{gap}{kind}{gap}{b}", rank
