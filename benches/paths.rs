@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicUsize;
 use criterion::{Criterion, Throughput};
 use nalgebra::{SMatrix, SVector};
 use rayon::ThreadPoolBuilder;
-use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role};
+use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, Set};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
 use udd::model::{DiskFamily, DleFamily, Family};
@@ -123,11 +123,13 @@ fn fit(name: &'static str, frames: usize) -> Path {
         seen: states.iter().map(|x| SVector::from([x[1], x[2], x[3]])).collect(),
         information: vec![SMatrix::from_diagonal(&SVector::from([4e6, 4e6, 1e4])); frames],
         linked: vec![true; frames - 1],
+        film: vec![0; frames],
+        memory: [0.0; 3],
     };
     let mut model = DISK.to_vec();
     let free = [0, 3, 4].map(|j| {
         model[j] *= 1.05;
-        Free { role: Role::Model(j), mean: DISK[j], sd: f64::INFINITY }
+        Free { role: Role::Model(j), film: None, mean: DISK[j], sd: f64::INFINITY }
     });
     let estimator = Estimator {
         family,
@@ -138,7 +140,8 @@ fn fit(name: &'static str, frames: usize) -> Path {
         tolerance: tolerance(1e-8),
     };
     let work = move |_| {
-        let start = Point { states: states.clone(), model: model.clone(), camera: vec![0.0; 8], clock: 0.0 };
+        let set = Set { model: model.clone(), camera: vec![0.0; 8], clock: 0.0 };
+        let start = Point { states: states.clone(), sets: vec![set] };
         black_box(estimator.solve(start, &Options::default(), &Stop::new()).unwrap());
     };
     Path { name, units: frames as u64, work: Box::new(work) }

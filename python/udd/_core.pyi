@@ -85,9 +85,10 @@ class _Solution(TypedDict):
 
 # Times, what was seen, its information, and whether the next frame is linked; the states, the camera's
 # parameters and the clock's error; role, index, prior mean and standard deviation of each free parameter.
-_Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_]]
-_Start: TypeAlias = tuple[_Floats, _Floats, float]
-_Free: TypeAlias = list[tuple[str, int, float, float]]
+_Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_], NDArray[np.int64], list[float]]
+_Values: TypeAlias = tuple[list[float], list[float], float]
+_Start: TypeAlias = tuple[_Floats, list[_Values]]
+_Free: TypeAlias = list[tuple[str, int, int | None, float, float]]
 
 @final
 class Dense:
@@ -162,7 +163,7 @@ def score_ripples(
     model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], frequencies: list[float]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
 def responses(
-    model: Model, data: _Data, start: _Start, nodes: int
+    model: Model, data: _Data, start: _Start
 ) -> tuple[_Floats, _Floats, _Floats]: ...
 def score_columns(
     model: Model,
@@ -178,6 +179,6 @@ def filter(
     model: Model, data: _Data, start: _Start, diffusion: list[float], windows: list[tuple[int, int]]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
 def predict(
-    model: Model, camera: _Floats, clock: float, t0: _Floats, states: _Floats, times: _Floats
+    model: Model, sets: list[_Values], film: list[int], t0: _Floats, states: _Floats, times: _Floats
 ) -> _Floats: ...
 def camera_parameters(kind: str) -> list[tuple[str, str]]: ...

@@ -17,7 +17,7 @@ from udd._validate import array, number
 from udd.crew import thread_count
 from udd.errors import FitError, IntegrationError, ModelError
 from udd.exponents import lyapunov
-from udd.fitting import Fit, Record, information_for, record_of
+from udd.fitting import Fit, Record, data_of, predicted, record_of
 from udd.fitting.fit import fit
 from udd.measurement import Measurement
 from udd.models import Disk, Model
@@ -223,10 +223,11 @@ def forecast(
     scale = max(fitted.scatter, 1.0) ** 0.5
     models, cameras, states = _starts(fitted, part, asked, scale, rng)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
-    pace = 1.0 + fitted.point.clock
+    clock_error = fitted.point.sets[0][2]
+    pace = 1.0 + clock_error
     t_model = part.t[-1] + times
     runs = _runs(models, states, pace * t_model, kicks, rng)
-    seen = _observed(models, cameras, fitted.point.clock, t_model, runs)
+    seen = _observed(models, cameras, clock_error, t_model, runs)
 
     low, median, high = _quantiles(seen, asked[1])
     valid = [_parted(times, member - median, kind, large) for member in seen]
@@ -294,15 +295,14 @@ def _window(fitted: Fit, record: Record, length: float) -> tuple[Record, float]:
 
 def _starts(
     fitted: Fit, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
-) -> tuple[list[Model], list[Array], Array]:
+) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
-    information = information_for(fitted, part)
-    data = (part.t, part.seen, information, part.linked)
-    clock, diffusion = fitted.point.clock, list(fitted.problem.diffusion)
+    data = data_of(part, replace(fitted.noise, weight=np.ones(len(part.t))), part.states[:, 0])
+    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[0], list(fitted.problem.diffusion)
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []
     for draw in _draws(fitted, asked[0], scale, rng):
-        camera = fitted.point.camera.copy()
+        camera = list(camera_of_fit)
         values: dict[str, float] = {}
         for free in fitted.problem.free:
             if free.role == "model":
@@ -311,7 +311,8 @@ def _starts(
                 camera[free.index] = draw[free.name]
         model = fitted.model.with_parameters(values)
         try:
-            _first, last, spread = _core.filter(model, data, (part.states, camera, clock), diffusion, window)
+            sets = [(list(model.parameters.values()), camera, clock)]
+            _first, last, spread = _core.filter(model, data, (part.states, sets), diffusion, window)
         except ValueError as error:
             raise FitError(f"the state cannot be filtered from the window: {error}") from error
         models.append(model)
@@ -384,12 +385,14 @@ def _between_wheels(model: Model, states: Array) -> NDArray[np.bool_]:
     return result
 
 
-def _observed(models: list[Model], cameras: list[Array], clock: float, t: Array, runs: Array) -> Array:
+def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: Array, runs: Array) -> Array:
     """What each member's camera sees of its states, (n, k, m)."""
     seen = []
     for model, camera, run in zip(models, cameras, runs, strict=True):
         there = np.isfinite(run).all(axis=1)
-        shown = _core.predict(model, camera, clock, t[there], run[there], t[there, None])[:, 0]
+        sets = [(list(model.parameters.values()), camera, clock)]
+        film = np.zeros(int(there.sum()), dtype=np.int64)
+        shown = predicted([model], sets, film, t[there], run[there], t[there, None])[:, 0]
         full = np.full((len(t), shown.shape[1]), np.nan)
         full[there] = shown
         seen.append(full)

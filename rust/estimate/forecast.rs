@@ -3,7 +3,7 @@
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 
-use super::{EstimateError, Estimator, Options, Point, Record, Sensor};
+use super::{EstimateError, Estimator, Options, Point, Sensor, Set};
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 use crate::run::Stop;
@@ -51,39 +51,28 @@ where
         windows.par_iter().map(one).collect()
     }
 
-    /// What would be seen at increasing times after each start `(time, state)`, by the model alone.
+    /// What would be seen at increasing times after each start `(film, time, state)`, by the model alone.
     pub fn predict(
         &self,
-        point: &Point<D>,
-        starts: &[(f64, [f64; D])],
+        sets: &[Set],
+        starts: &[(usize, f64, [f64; D])],
         times: &[Vec<f64>],
     ) -> Result<Vec<Vec<[f64; M]>>, EstimateError> {
-        let system = self.family.build(&point.model);
-        let pace = 1.0 + point.clock;
-        let one = |(&(t, x), times): (&(f64, [f64; D]), &Vec<f64>)| {
-            let (mut t, mut x) = (t * pace, x);
+        let systems: Vec<F::Built<f64>> = sets.iter().map(|set| self.family.build(&set.model)).collect();
+        let one = |(&(film, t, x), times): (&(usize, f64, [f64; D]), &Vec<f64>)| {
+            let (system, set) = (&systems[film], &sets[film]);
+            let (mut t, mut x) = (t * set.pace(), x);
             let mut seen = Vec::with_capacity(times.len());
             for &next in times {
-                x = propagate(&system, t, next * pace, x, &self.tolerance)
+                let next = next * set.pace();
+                x = propagate(system, t, next, x, &self.tolerance)
                     .map_err(|source| EstimateError::Integration { t, source })?;
-                t = next * pace;
-                let rate = system.rates(t, &x, &sides_of(&system, t, &x));
-                seen.push(self.sensor.observe(&point.camera, &x, &rate));
+                t = next;
+                let rate = system.rates(t, &x, &sides_of(system, t, &x));
+                seen.push(self.sensor.observe(&set.camera, &x, &rate));
             }
             Ok(seen)
         };
         starts.par_iter().zip(times).map(one).collect()
-    }
-}
-
-impl<const M: usize> Record<M> {
-    /// The frames from `first` to `last`, both included.
-    fn part(&self, first: usize, last: usize) -> Self {
-        Self {
-            t: self.t[first..=last].to_vec(),
-            seen: self.seen[first..=last].to_vec(),
-            information: self.information[first..=last].to_vec(),
-            linked: self.linked[first..last].to_vec(),
-        }
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::linearise::invert;
-use super::{Bordered, EstimateError, Estimator, Point, Role, Sensor};
+use super::{Bordered, EstimateError, Estimator, Free, Linear, Point, Sensor};
 use crate::model::Family;
 use crate::run::Stop;
 
@@ -46,6 +46,10 @@ pub struct Solution<const D: usize, const M: usize> {
     pub cost: Cost,
     pub converged: bool,
     pub iterations: usize,
+    /// Logarithm of the likelihood of the record, states and free parameters integrated out around this
+    /// point; a constant that depends on neither noise nor model is left out. Parameters without a prior count
+    /// as with one of a standard deviation of 1.
+    pub evidence: f64,
     /// Covariance of the free parameters.
     pub covariance: DMatrix<f64>,
     /// Covariance of each frame's state.
@@ -63,11 +67,6 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The parts that the free parameters play, in the order of the borders.
-    pub fn roles(&self) -> Vec<Role> {
-        self.free.iter().map(|free| free.role).collect()
-    }
-
     /// The inverse variance of the model's error over each link.
     pub fn precision(&self) -> Vec<SVector<f64, D>> {
         let steps = self.record.t.windows(2).map(|pair| pair[1] - pair[0]);
@@ -76,28 +75,28 @@ where
 
     /// The cost of residuals at a point.
     fn cost(&self, point: &Point<D>, misfit: &[SVector<f64, M>], defect: &[SVector<f64, D>]) -> Cost {
-        let mut cost = Cost::default();
-        for (e, information) in misfit.iter().zip(&self.record.information) {
-            cost.misfit += e.dot(&(information * e));
-        }
+        let mut cost = Cost { misfit: self.misfit_cost(misfit), ..Cost::default() };
         for ((r, q), &linked) in defect.iter().zip(&self.precision()).zip(&self.record.linked) {
             if linked {
                 cost.defect += r.component_mul(r).dot(q);
             }
         }
         for free in &self.free {
-            cost.prior += ((point.get(free.role) - free.mean) / free.sd).powi(2);
+            cost.prior += ((point.get(free) - free.mean) / free.sd).powi(2);
         }
         cost
     }
 
-    /// The normal equations at a linearised point, priors included, from the first `free.len()`
-    /// columns on.
-    pub(super) fn equations(&self, point: &Point<D>, linear: &super::Linear<D, M>) -> Bordered<D> {
-        let mut system = Bordered::new(linear, &self.record, &self.precision());
+    /// Adds the free parameters' priors to normal equations at a point.
+    pub(super) fn add_priors(&self, point: &Point<D>, system: &mut Bordered<D>) {
         for (j, free) in self.free.iter().enumerate() {
-            system.prior(j, point.get(free.role), free.mean, free.sd);
+            system.prior(j, point.get(free), free.mean, free.sd);
         }
+    }
+
+    fn equations(&self, point: &Point<D>, linear: &Linear<D, M>) -> Bordered<D> {
+        let mut system = Bordered::new(linear, &self.record, &self.precision());
+        self.add_priors(point, &mut system);
         system
     }
 
@@ -108,7 +107,6 @@ where
         options: &Options,
         stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
-        let roles = self.roles();
         let mut point = start;
         let (misfit, defect) = self.residuals(&point)?;
         let mut cost = self.cost(&point, &misfit, &defect);
@@ -116,7 +114,7 @@ where
         let mut iterations = 0;
         loop {
             stop.check().map_err(|_| EstimateError::Cancelled)?;
-            let linear = self.linearise(&point, &roles)?;
+            let linear = self.linearise(&point)?;
             let system = self.equations(&point, &linear);
             let mut converged = false;
             let mut improved = false;
@@ -126,17 +124,19 @@ where
                 let mut damped = system.clone();
                 damped.damp(lambda);
                 let reduced = damped.eliminate(&self.record.t)?;
-                let step = invert(&reduced.schur).ok_or_else(undetermined)? * &reduced.gradient;
+                let inverse = invert(&reduced.schur);
+                let step =
+                    inverse.ok_or_else(|| undetermined(&self.free, &reduced.schur))? * &reduced.gradient;
                 let states = reduced.states(&step);
-                let promised = promise(&system, &states, &step);
+                let promised = system.promise(&states, &step);
                 let mut trial = point.clone();
                 for (x, change) in trial.states.iter_mut().zip(&states) {
                     for k in 0..D {
                         x[k] += change[k];
                     }
                 }
-                for (free, change) in self.free.iter().zip(step.iter()) {
-                    *trial.get_mut(free.role) += change;
+                for (free, &change) in self.free.iter().zip(step.iter()) {
+                    trial.shift(free, change);
                 }
                 let tried = self.residuals(&trial).map(|(e, r)| self.cost(&trial, &e, &r));
                 match tried {
@@ -168,13 +168,18 @@ where
         iterations: usize,
         converged: bool,
     ) -> Result<Solution<D, M>, EstimateError> {
-        let linear = self.linearise(&point, &self.roles())?;
+        let linear = self.linearise(&point)?;
         let reduced = self.equations(&point, &linear).eliminate(&self.record.t)?;
-        let covariance = invert(&reduced.schur).ok_or_else(undetermined)?;
+        let covariance = invert(&reduced.schur).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
         let state_covariance = reduced.state_covariance(&covariance);
-        let seen_variance =
-            linear.h.iter().zip(&state_covariance).map(|(h, p)| (h * p * h.transpose()).diagonal()).collect();
-        let cost = self.cost(&point, &linear.misfit, &linear.defect);
+        let (mut misfit, mut seen_variance) = (Vec::new(), Vec::new());
+        for (sight, p) in linear.sights.iter().zip(&state_covariance) {
+            misfit.push(sight.misfit);
+            seen_variance.push((sight.h * p * sight.h.transpose()).diagonal());
+        }
+        let defect: Vec<_> = linear.flow.iter().map(|link| link.defect).collect();
+        let cost = self.cost(&point, &misfit, &defect);
+        let evidence = self.evidence(&cost, reduced.log_determinant, &reduced.schur);
         Ok(Solution {
             point,
             cost,
@@ -182,25 +187,24 @@ where
             iterations,
             covariance,
             state_covariance,
-            misfit: linear.misfit,
+            evidence,
+            misfit,
             seen_variance,
-            defect: linear.defect,
+            defect,
         })
     }
 }
 
-/// Where a matrix of information has no inverse.
-pub(super) fn undetermined() -> EstimateError {
-    EstimateError::Undetermined("some of them can change together without changing the fit".into())
-}
-
-/// By how much the linear model says a step lowers the cost.
-fn promise<const D: usize>(
-    system: &Bordered<D>,
-    states: &[SVector<f64, D>],
-    parameters: &nalgebra::DVector<f64>,
-) -> f64 {
-    // At the exact step the decrease is rhs . step; for a damped one this is a lower bound's scale.
-    let states: f64 = system.rhs.iter().zip(states).map(|(b, x)| b.dot(x)).sum();
-    states + system.corner_rhs.dot(parameters)
+/// Where a matrix of information has no inverse: the parameters that can change together.
+pub(super) fn undetermined(free: &[Free], information: &DMatrix<f64>) -> EstimateError {
+    let n = free.len().min(information.nrows());
+    let scale: Vec<f64> = (0..n).map(|j| information[(j, j)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
+    let found = scaled.symmetric_eigen();
+    let least = found.eigenvalues.imin();
+    let direction = found.eigenvectors.column(least);
+    // Those that take part in the direction along which nothing changes.
+    let strong = direction.amax() * 0.1;
+    let parts = (0..n).filter(|&j| direction[j].abs() >= strong);
+    EstimateError::Undetermined(parts.collect())
 }

@@ -12,22 +12,27 @@
 //! column per candidate, give the [`score`](Estimator::score) of every effect the model may lack.
 
 mod bordered;
-mod forcing;
+mod columns;
+mod evidence;
+mod flow;
 mod forecast;
 mod gauss_newton;
 mod linearise;
 mod record;
+mod rows;
 mod score;
 mod sensor;
 mod waves;
 
 pub use bordered::{Bordered, Eliminated};
-pub use forcing::{Columns, Place};
+pub use columns::Columns;
+pub use flow::{Link, PLACES_PER_LINK, Place};
 pub use forecast::Filtered;
 pub use gauss_newton::{Cost, Options, Solution};
-pub use linearise::Linear;
-pub use record::{Free, Point, Record, Role};
-pub use score::Score;
+pub use linearise::{Linear, Sight};
+pub use record::{Free, Point, Record, Role, Set};
+pub use rows::Rows;
+pub use score::{Candidate, Score};
 pub use sensor::{AngleSensor, DiskCamera, Sensor};
 pub use waves::Probe;
 
@@ -59,8 +64,11 @@ pub enum EstimateError {
     Integration { t: f64, source: Failure },
     #[error("the data do not determine the state at t = {t} s")]
     Singular { t: f64 },
-    #[error("the data do not determine the free parameters: {0}")]
-    Undetermined(String),
+    /// The free parameters of these numbers can change together.
+    #[error(
+        "the data do not determine the free parameters: some can change together without changing the fit"
+    )]
+    Undetermined(Vec<usize>),
     #[error("{0}")]
     Invalid(String),
     #[error("interrupted")]

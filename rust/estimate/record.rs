@@ -2,10 +2,10 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// What was seen, frame by frame.
+/// What was seen, frame by frame: one film, or several one after the other.
 #[derive(Clone, Debug)]
 pub struct Record<const M: usize> {
-    /// Time of each frame, s, increasing.
+    /// Time of each frame, s, increasing within a film.
     pub t: Vec<f64>,
     /// What was seen; any number where the information is zero.
     pub seen: Vec<SVector<f64, M>>,
@@ -13,6 +13,38 @@ pub struct Record<const M: usize> {
     pub information: Vec<SMatrix<f64, M, M>>,
     /// Whether frame `i + 1` continues the motion of frame `i`; false where a new run starts.
     pub linked: Vec<bool>,
+    /// Which film each frame belongs to, and so which [`Set`] of parameters holds.
+    pub film: Vec<usize>,
+    /// How much of a frame's noise is still there in the next one, per channel: its autocorrelation.
+    pub memory: [f64; M],
+}
+
+impl<const M: usize> Default for Record<M> {
+    /// Without a frame.
+    fn default() -> Self {
+        Self {
+            t: Vec::new(),
+            seen: Vec::new(),
+            information: Vec::new(),
+            linked: Vec::new(),
+            film: Vec::new(),
+            memory: [0.0; M],
+        }
+    }
+}
+
+impl<const M: usize> Record<M> {
+    /// The frames from `first` to `last`, both included.
+    pub(super) fn part(&self, first: usize, last: usize) -> Self {
+        Self {
+            t: self.t[first..=last].to_vec(),
+            seen: self.seen[first..=last].to_vec(),
+            information: self.information[first..=last].to_vec(),
+            linked: self.linked[first..last].to_vec(),
+            film: self.film[first..=last].to_vec(),
+            memory: self.memory,
+        }
+    }
 }
 
 /// The part that a parameter plays.
@@ -30,16 +62,23 @@ pub enum Role {
 #[derive(Clone, Copy, Debug)]
 pub struct Free {
     pub role: Role,
+    /// The film that it belongs to; none where all films share it.
+    pub film: Option<usize>,
     pub mean: f64,
     /// Standard deviation of the prior; infinite for none.
     pub sd: f64,
 }
 
-/// A value of all unknowns.
-#[derive(Clone, Debug)]
-pub struct Point<const D: usize> {
-    /// The state at every frame.
-    pub states: Vec<[f64; D]>,
+impl Free {
+    /// Whether frames of this film depend on it.
+    pub fn acts_on(&self, film: usize) -> bool {
+        self.film.is_none_or(|own| own == film)
+    }
+}
+
+/// The parameters that hold for one film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Set {
     /// The model's parameters, free or not.
     pub model: Vec<f64>,
     /// The camera's parameters, free or not.
@@ -48,7 +87,7 @@ pub struct Point<const D: usize> {
     pub clock: f64,
 }
 
-impl<const D: usize> Point<D> {
+impl Set {
     /// The value of a parameter.
     pub fn get(&self, role: Role) -> f64 {
         match role {
@@ -58,12 +97,41 @@ impl<const D: usize> Point<D> {
         }
     }
 
-    /// A reference to the value of a parameter.
-    pub fn get_mut(&mut self, role: Role) -> &mut f64 {
+    fn get_mut(&mut self, role: Role) -> &mut f64 {
         match role {
             Role::Model(j) => &mut self.model[j],
             Role::Camera(j) => &mut self.camera[j],
             Role::Clock => &mut self.clock,
+        }
+    }
+
+    /// How fast the model's time runs.
+    pub(super) fn pace(&self) -> f64 {
+        1.0 + self.clock
+    }
+}
+
+/// A value of all unknowns.
+#[derive(Clone, Debug)]
+pub struct Point<const D: usize> {
+    /// The state at every frame.
+    pub states: Vec<[f64; D]>,
+    /// The parameters of every film.
+    pub sets: Vec<Set>,
+}
+
+impl<const D: usize> Point<D> {
+    /// The value of a free parameter.
+    pub fn get(&self, free: &Free) -> f64 {
+        self.sets[free.film.unwrap_or(0)].get(free.role)
+    }
+
+    /// Changes a free parameter.
+    pub fn shift(&mut self, free: &Free, change: f64) {
+        for (film, set) in self.sets.iter_mut().enumerate() {
+            if free.acts_on(film) {
+                *set.get_mut(free.role) += change;
+            }
         }
     }
 }

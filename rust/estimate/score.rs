@@ -1,10 +1,14 @@
 //! The score of candidates: what each would do for the fit, without fitting it.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
+use super::bordered::Bordered;
+use super::columns::{Columns, TimeOrigin};
 use super::gauss_newton::undetermined;
-use super::linearise::{TimeOrigin, invert};
-use super::{EstimateError, Estimator, Linear, Point, Role, Sensor};
+use super::linearise::invert;
+use super::rows::Rows;
+use super::{EstimateError, Estimator, Free, Linear, Point, Role, Sensor};
 use crate::model::Family;
 
 /// The candidates' amplitudes near zero, everything else optimal: the cost falls by
@@ -18,51 +22,117 @@ pub struct Score {
     pub alone: DVector<f64>,
 }
 
+/// An effect that a model may lack: a family that holds this model's own parameters first and then its own,
+/// with their values, and which of all are its amplitudes, at zero.
+#[derive(Clone, Debug)]
+pub struct Candidate<F> {
+    pub family: F,
+    pub more: Vec<f64>,
+    pub amplitudes: Vec<Role>,
+}
+
+/// How many columns are scored in one solve, about.
+const BATCH: usize = 24;
+
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
 where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// Scores candidates around a minimum. Each group is a family that holds this model's own
-    /// parameters first and then those of more effects, all amplitudes zero, with the values of all its
-    /// parameters and the amplitudes' roles. The states and all free parameters are eliminated.
-    pub fn score(
-        &self,
-        point: &Point<D>,
-        groups: &[(F, Vec<f64>, Vec<Role>)],
-    ) -> Result<Score, EstimateError> {
-        let mut linear = self.linearise(point, &self.roles())?;
-        for (family, values, roles) in groups {
-            let wider = Point { model: values.clone(), ..point.clone() };
-            linear = linear.beside(&self.linearise_as(family, &wider, roles, TimeOrigin::Record)?);
-        }
-        self.score_columns(point, &linear)
+    /// Scores candidates around a minimum, all together. The states and all free parameters are eliminated.
+    pub fn score(&self, point: &Point<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
+        let linear = self.linearise(point)?;
+        let more: Vec<Columns> = candidates
+            .iter()
+            .map(|candidate| self.candidate_columns(point, &linear, candidate, TimeOrigin::Record))
+            .collect();
+        let size = more.iter().map(|columns| columns.seen.width()).sum();
+        let columns = more.iter().fold(linear.columns.clone(), |all, more| all.beside(more));
+        let scores = self.score_beside(point, &Linear { columns, ..linear }, &[size])?;
+        Ok(scores.into_iter().next().expect("one group"))
     }
 
-    /// The score of the columns that follow those of the free parameters.
-    pub(super) fn score_columns(
+    /// The columns of a candidate's amplitudes.
+    pub(super) fn candidate_columns(
         &self,
         point: &Point<D>,
         linear: &Linear<D, M>,
-    ) -> Result<Score, EstimateError> {
-        let own = self.free.len();
-        let reduced = self.equations(point, linear).eliminate(&self.record.t)?;
-        let all = reduced.schur.nrows();
-        let more = all - own;
-        let matrix = reduced.schur.view((0, 0), (own, own)).into_owned();
-        let cross = reduced.schur.view((0, own), (own, more)).into_owned();
-        let corner = reduced.schur.view((own, own), (more, more)).into_owned();
-        let gradient = reduced.gradient.rows(own, more).into_owned();
-        let alone = corner.diagonal();
-        if own == 0 {
-            return Ok(Score { gradient, information: corner, alone });
+        candidate: &Candidate<F>,
+        origin: TimeOrigin,
+    ) -> Columns {
+        let wider = |model: &Vec<f64>| [model.as_slice(), &candidate.more].concat();
+        let values: Vec<Vec<f64>> = point.sets.iter().map(|set| wider(&set.model)).collect();
+        let one = |&role: &Role| Free { role, film: None, mean: 0.0, sd: f64::INFINITY };
+        let free: Vec<Free> = candidate.amplitudes.iter().map(one).collect();
+        self.columns(point, &linear.flow, (&candidate.family, &values), &free, origin)
+    }
+
+    /// Scores columns in groups of these sizes, each group as if it were alone.
+    ///
+    /// # Panics
+    /// Where the groups are not as many columns as there are.
+    pub fn score_groups(
+        &self,
+        point: &Point<D>,
+        columns: &Columns,
+        groups: &[usize],
+    ) -> Result<Vec<Score>, EstimateError> {
+        let linear = self.linearise(point)?;
+        let mut batches: Vec<(usize, Vec<usize>)> = Vec::new();
+        let mut first = 0;
+        for &size in groups {
+            match batches.last_mut() {
+                Some((_, sizes)) if sizes.iter().sum::<usize>() + size <= BATCH => sizes.push(size),
+                _ => batches.push((first, vec![size])),
+            }
+            first += size;
         }
-        let covariance = invert(&matrix).ok_or_else(undetermined)?;
-        let solved = covariance * &cross;
-        Ok(Score {
-            gradient: gradient - solved.tr_mul(&reduced.gradient.rows(0, own)),
-            information: corner - cross.tr_mul(&solved),
-            alone,
-        })
+        let scores: Vec<Vec<Score>> = batches
+            .par_iter()
+            .map(|(first, sizes)| {
+                let own = first..&(first + sizes.iter().sum::<usize>());
+                let part = |rows: &Rows| rows.part(*own.start..*own.end);
+                let more = Columns { seen: part(&columns.seen), state: part(&columns.state) };
+                self.score_beside(point, &linear.with(&more), sizes)
+            })
+            .collect::<Result<_, EstimateError>>()?;
+        Ok(scores.concat())
+    }
+
+    /// The scores of the columns that follow those of the free parameters, in groups.
+    pub(super) fn score_beside(
+        &self,
+        point: &Point<D>,
+        linear: &Linear<D, M>,
+        groups: &[usize],
+    ) -> Result<Vec<Score>, EstimateError> {
+        let own = self.free.len();
+        let mut system = Bordered::new(linear, &self.record, &self.precision());
+        self.add_priors(point, &mut system);
+        let reduced = system.eliminate(&self.record.t)?;
+        let matrix = reduced.schur.view((0, 0), (own, own)).into_owned();
+        let covariance = invert(&matrix).ok_or_else(|| undetermined(&self.free, &matrix))?;
+        let mut first = own;
+        let one = |&size: &usize| {
+            let start = first;
+            first += size;
+            let cross = reduced.schur.view((0, start), (own, size)).into_owned();
+            let corner = reduced.schur.view((start, start), (size, size)).into_owned();
+            let solved = &covariance * &cross;
+            Score {
+                gradient: reduced.gradient.rows(start, size) - solved.tr_mul(&reduced.gradient.rows(0, own)),
+                alone: corner.diagonal(),
+                information: corner - cross.tr_mul(&solved),
+            }
+        };
+        Ok(groups.iter().map(one).collect())
+    }
+}
+
+impl<const D: usize, const M: usize> Linear<D, M> {
+    /// This linearisation with more columns.
+    pub(super) fn with(&self, more: &Columns) -> Self {
+        let columns = self.columns.beside(more);
+        Self { columns, sights: self.sights.clone(), flow: self.flow.clone() }
     }
 }

@@ -2,27 +2,23 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Const, DMatrix, Dyn, OMatrix};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::linearise::TimeOrigin;
-use super::{EstimateError, Estimator, Linear, Point, Role, Score, Sensor};
+use super::columns::{Columns, TimeOrigin};
+use super::rows::{Rows, add};
+use super::score::Candidate;
+use super::{EstimateError, Estimator, Point, Score, Sensor};
 use crate::model::Family;
 
-type Rows<const R: usize> = OMatrix<f64, Const<R>, Dyn>;
-
 /// How many frequencies are scored in one solve.
-const BATCH: usize = 24;
+const BATCH: usize = 12;
 
 /// An effect `a cos(2 pi f t) + b sin(2 pi f t)` at a few frequencies, in one family: within a frame,
 /// every other frequency is a combination of these.
 pub struct Probe<F> {
-    /// The model with the effect added once per frequency, all amplitudes zero.
-    pub family: F,
-    /// Its parameters.
-    pub values: Vec<f64>,
-    /// The amplitudes `a, b` of each.
-    pub roles: Vec<Role>,
+    /// The effect once per frequency, with the amplitudes `a, b` of each.
+    pub candidate: Candidate<F>,
     /// The frequencies, Hz.
     pub frequencies: Vec<f64>,
 }
@@ -44,24 +40,17 @@ where
         probe: &Probe<F>,
         frequencies: &[f64],
     ) -> Result<Vec<Score>, EstimateError> {
-        let base = self.linearise(point, &self.roles())?;
-        let wider = Point { model: probe.values.clone(), ..point.clone() };
-        let responses = self.linearise_as(&probe.family, &wider, &probe.roles, TimeOrigin::Frame)?;
-        let longest = self.record.t.windows(2).map(|p| p[1] - p[0]).fold(0.0, f64::max);
+        let linear = self.linearise(point)?;
+        let responses = self.candidate_columns(point, &linear, &probe.candidate, TimeOrigin::Frame);
+        let steps = self.record.t.windows(2).zip(&self.record.linked).filter(|(_, linked)| **linked);
+        let longest = steps.map(|(pair, _)| pair[1] - pair[0]).fold(0.0, f64::max);
         let shares = shares(&probe.frequencies, longest, frequencies);
         let batches: Vec<Vec<Score>> = frequencies
             .par_chunks(BATCH)
             .zip(shares.par_chunks(BATCH))
             .map(|(frequencies, shares)| {
-                let linear = base.clone().beside(&self.waves(&responses, frequencies, shares, point.clock));
-                let score = self.score_columns(point, &linear)?;
-                Ok((0..frequencies.len())
-                    .map(|k| Score {
-                        gradient: score.gradient.rows(2 * k, 2).into_owned(),
-                        information: score.information.view((2 * k, 2 * k), (2, 2)).into_owned(),
-                        alone: score.alone.rows(2 * k, 2).into_owned(),
-                    })
-                    .collect())
+                let waves = self.waves(point, &responses, frequencies, shares);
+                self.score_beside(point, &linear.with(&waves), &vec![2; frequencies.len()])
             })
             .collect::<Result<_, EstimateError>>()?;
         Ok(batches.concat())
@@ -70,37 +59,41 @@ where
     /// The columns of waves from the responses to the probe's.
     fn waves(
         &self,
-        responses: &Linear<D, M>,
+        point: &Point<D>,
+        responses: &Columns,
         frequencies: &[f64],
         shares: &[DMatrix<f64>],
-        clock: f64,
-    ) -> Linear<D, M> {
-        let mut linear = responses.clone();
-        for i in 0..self.record.t.len() {
-            let phases = frequencies.iter().map(|f| TAU * f * self.record.t[i] * (1.0 + clock));
-            linear.g[i] = combined(&responses.g[i], shares, phases.clone());
-            linear.b[i] = combined(&responses.b[i], shares, phases);
+    ) -> Columns {
+        let n = self.record.t.len();
+        let width = 2 * frequencies.len();
+        let mut waves = Columns { seen: Rows::zeros(n * M, width), state: Rows::zeros((n - 1) * D, width) };
+        for i in 0..n {
+            let pace = point.sets[self.record.film[i]].pace();
+            for (k, (f, share)) in frequencies.iter().zip(shares).enumerate() {
+                let (sin, cos) = (TAU * f * self.record.t[i] * pace).sin_cos();
+                // cos(phase + local) and sin(phase + local), of the local waves' shares.
+                let mut own = vec![0.0; 2 * share.nrows()];
+                let (in_cos, in_sin) = own.split_at_mut(share.nrows());
+                let (c, s) = (share.column(0), share.column(1));
+                add(in_cos, cos, c.as_slice());
+                add(in_cos, -sin, s.as_slice());
+                add(in_sin, sin, c.as_slice());
+                add(in_sin, cos, s.as_slice());
+                let combine = |from: &Rows, to: &mut Rows, rows: std::ops::Range<usize>| {
+                    for r in rows {
+                        let dot = |weights: &[f64]| from.row(r).iter().zip(weights).map(|(a, b)| a * b).sum();
+                        to.row_mut(r)[2 * k] = dot(in_cos);
+                        to.row_mut(r)[2 * k + 1] = dot(in_sin);
+                    }
+                };
+                combine(&responses.seen, &mut waves.seen, M * i..M * (i + 1));
+                if i + 1 < n {
+                    combine(&responses.state, &mut waves.state, D * i..D * (i + 1));
+                }
+            }
         }
-        linear
+        waves
     }
-}
-
-/// Two columns per wave, its `cos` and `sin`, from the responses to the probe's waves.
-fn combined<const R: usize>(
-    responses: &Rows<R>,
-    shares: &[DMatrix<f64>],
-    phases: impl Iterator<Item = f64>,
-) -> Rows<R> {
-    let mut columns = Rows::<R>::zeros(2 * shares.len());
-    for (k, (share, phase)) in shares.iter().zip(phases).enumerate() {
-        let local = responses * share;
-        let (c, s) = (local.column(0), local.column(1));
-        let (sin, cos) = phase.sin_cos();
-        // cos(phase + local) and sin(phase + local)
-        columns.set_column(2 * k, &(c * cos - s * sin));
-        columns.set_column(2 * k + 1, &(c * sin + s * cos));
-    }
-    columns
 }
 
 /// How `cos` and `sin` of each frequency are made of those of the basis, on `[0, longest]`: least squares

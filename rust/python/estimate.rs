@@ -1,6 +1,6 @@
 //! The estimator's door to Python: arrays in, arrays out.
 
-use nalgebra::{Const, Dyn, OMatrix, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -10,24 +10,28 @@ use super::errors::FitError;
 use super::interrupt;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, Columns, DiskCamera, EstimateError, Estimator, Free, Options, Point, Probe, Record, Role,
-    Sensor,
+    AngleSensor, Candidate, Columns, DiskCamera, EstimateError, Estimator, Free, Options, PLACES_PER_LINK,
+    Point, Probe, Record, Role, Rows, Sensor, Set,
 };
 use crate::integrate::Tolerance;
 use crate::model::effects::Kind;
 use crate::model::{Effect, Family};
 
-/// Frame by frame: time, what was seen, its information, and whether the next frame is linked.
+/// Frame by frame: time, what was seen, its information, whether the next frame is linked, which film it
+/// belongs to; and how much of the noise each channel remembers.
 type Data<'py> = (
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray3<'py, f64>,
     PyReadonlyArray1<'py, bool>,
+    PyReadonlyArray1<'py, i64>,
+    Vec<f64>,
 );
-/// States, the camera's parameters, and the clock's error.
-type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>, f64);
-/// Role, index, prior mean and standard deviation.
-type FreeTuple = (String, usize, f64, f64);
+/// States; of each film the model's parameters, the camera's, and the clock's error.
+type Start<'py> = (PyReadonlyArray2<'py, f64>, Vec<SetTuple>);
+type SetTuple = (Vec<f64>, Vec<f64>, f64);
+/// Role, index, film (none: shared by all), prior mean and standard deviation.
+type FreeTuple = (String, usize, Option<usize>, f64, f64);
 
 /// A frame's flow is followed much more closely than the model's smallest assumed error.
 const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
@@ -36,6 +40,7 @@ impl From<EstimateError> for PyErr {
     fn from(error: EstimateError) -> Self {
         match error {
             EstimateError::Cancelled => PyKeyboardInterrupt::new_err(()),
+            EstimateError::Undetermined(ref which) => FitError::new_err((error.to_string(), which.clone())),
             other => FitError::new_err(other.to_string()),
         }
     }
@@ -53,7 +58,7 @@ fn rows<const K: usize>(array: &PyReadonlyArray2<'_, f64>, what: &str) -> PyResu
     Ok(array.rows().into_iter().map(|row| std::array::from_fn(|k| row[k])).collect())
 }
 
-fn record<const M: usize>((t, seen, information, linked): &Data<'_>) -> PyResult<Record<M>> {
+fn record<const M: usize>((t, seen, information, linked, film, memory): &Data<'_>) -> PyResult<Record<M>> {
     if information.as_array().shape()[1..] != [M, M] {
         return Err(PyValueError::new_err(format!("information must hold {M} x {M} matrices")));
     }
@@ -66,31 +71,46 @@ fn record<const M: usize>((t, seen, information, linked): &Data<'_>) -> PyResult
             .map(|own| SMatrix::from_fn(|i, j| own[[i, j]]))
             .collect(),
         linked: list(linked),
+        film: list(film).into_iter().map(|film| usize::try_from(film).unwrap_or(usize::MAX)).collect(),
+        memory: memory.as_slice().try_into().map_err(|_| PyValueError::new_err("memory: one per channel"))?,
     };
     let n = record.t.len();
-    if n == 0 || record.seen.len() != n || record.information.len() != n || record.linked.len() + 1 != n {
-        return Err(PyValueError::new_err("t, seen, information and linked have different lengths"));
+    let lengths = [record.seen.len(), record.information.len(), record.film.len(), record.linked.len() + 1];
+    if n == 0 || lengths.iter().any(|&length| length != n) {
+        return Err(PyValueError::new_err("t, seen, information, linked and film have different lengths"));
     }
     Ok(record)
 }
 
 fn frees(free: &[FreeTuple]) -> PyResult<Vec<Free>> {
-    let one = |(role, index, mean, sd): &FreeTuple| {
+    let one = |(role, index, film, mean, sd): &FreeTuple| {
         let role = match role.as_str() {
             "model" => Role::Model(*index),
             "camera" => Role::Camera(*index),
             "clock" => Role::Clock,
             other => return Err(PyValueError::new_err(format!("unknown role {other:?}"))),
         };
-        Ok(Free { role, mean: *mean, sd: *sd })
+        Ok(Free { role, film: *film, mean: *mean, sd: *sd })
     };
     free.iter().map(one).collect()
+}
+
+/// The parameters of every film, of which the model has so many.
+fn parameters<C: Sensor<D, M>, const D: usize, const M: usize>(
+    sets: &[SetTuple],
+    model: usize,
+) -> PyResult<Vec<Set>> {
+    let fits = |(own, camera, _): &SetTuple| own.len() == model && camera.len() == C::PARAMETERS.len();
+    if sets.is_empty() || !sets.iter().all(fits) {
+        return Err(PyValueError::new_err("every film needs the model's and the camera's parameters"));
+    }
+    Ok(sets.iter().cloned().map(|(model, camera, clock)| Set { model, camera, clock }).collect())
 }
 
 fn problem<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize>(
     (family, values, sensor): (F, Vec<f64>, C),
     data: &Data<'_>,
-    (states, camera, clock): &Start<'_>,
+    (states, sets): &Start<'_>,
     free: &[FreeTuple],
     diffusion: &[f64],
 ) -> PyResult<(Estimator<F, C, D, M>, Point<D>)> {
@@ -98,18 +118,20 @@ fn problem<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize>(
         .try_into()
         .map_err(|_| PyValueError::new_err(format!("diffusion must have {D} numbers")))?;
     let record = record(data)?;
-    let point = Point { states: rows(states, "states")?, model: values, camera: list(camera), clock: *clock };
-    if point.states.len() != record.t.len() || point.camera.len() != C::PARAMETERS.len() {
-        return Err(PyValueError::new_err("states and camera do not fit the record"));
+    let sets = parameters::<C, D, M>(sets, values.len())?;
+    let point = Point { states: rows(states, "states")?, sets };
+    let films = point.sets.len();
+    if point.states.len() != record.t.len() || record.film.iter().any(|&film| film >= films) {
+        return Err(PyValueError::new_err("states and parameters do not fit the record"));
     }
     let free = frees(free)?;
     for free in &free {
         let (index, most) = match free.role {
-            Role::Model(index) => (index, point.model.len()),
-            Role::Camera(index) => (index, point.camera.len()),
+            Role::Model(index) => (index, values.len()),
+            Role::Camera(index) => (index, C::PARAMETERS.len()),
             Role::Clock => (0, 1),
         };
-        if index >= most {
+        if index >= most || free.film.is_some_and(|film| film >= films) {
             return Err(PyValueError::new_err(format!("there is no parameter {index} of {most}")));
         }
     }
@@ -169,15 +191,15 @@ fn solve<'py>(
         let (n, p) = (estimator.record.t.len(), estimator.free.len());
         let result = PyDict::new(py);
         result.set_item("states", array(py, [n, D], s.point.states.iter().flatten().copied())?)?;
-        result.set_item("model", s.point.model)?;
-        result.set_item("camera", array(py, [s.point.camera.len()], s.point.camera)?)?;
-        result.set_item("clock", s.point.clock)?;
+        let sets = s.point.sets.into_iter().map(|set| (set.model, set.camera, set.clock));
+        result.set_item("sets", sets.collect::<Vec<SetTuple>>())?;
         result.set_item("covariance", array(py, [p, p], s.covariance.iter().copied())?)?;
         result.set_item("state_covariance", array(py, [n, D, D], numbers(&s.state_covariance))?)?;
         result.set_item("misfit", array(py, [n, M], numbers(&s.misfit))?)?;
         result.set_item("seen_variance", array(py, [n, M], numbers(&s.seen_variance))?)?;
         result.set_item("defect", array(py, [n - 1, D], numbers(&s.defect[..n - 1]))?)?;
         result.set_item("cost", (s.cost.misfit, s.cost.defect, s.cost.prior))?;
+        result.set_item("evidence", s.evidence)?;
         result.set_item("converged", s.converged)?;
         result.set_item("iterations", s.iterations)?;
         Ok(result)
@@ -185,8 +207,6 @@ fn solve<'py>(
     each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
 }
 
-/// A wider family with its values, and the roles of what it adds.
-type Group<F> = (F, Vec<f64>, Vec<Role>);
 /// Three arrays.
 type Three<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
@@ -208,15 +228,19 @@ fn score<'py>(
         (data, start): (&Data<'py>, &Start<'py>),
         free: &[FreeTuple],
         diffusion: &[f64],
-        groups: &[Group<F>],
+        groups: Vec<(F, Vec<f64>, Vec<usize>)>,
     ) -> PyResult<Three<'py>> {
+        let own = model.1.len();
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
-        let beyond =
-            |values: &[f64], role: &Role| matches!(role, Role::Model(index) if *index >= values.len());
-        if groups.iter().any(|(_, values, roles)| roles.iter().any(|role| beyond(values, role))) {
-            return Err(PyValueError::new_err("a candidate has no parameter of that number"));
-        }
-        let score = interrupt::run(py, |_| estimator.score(&point, groups))?;
+        let candidate = |(family, values, indices): (F, Vec<f64>, Vec<usize>)| {
+            if values.len() < own || indices.iter().any(|&index| index >= values.len()) {
+                return Err(PyValueError::new_err("a candidate has no parameter of that number"));
+            }
+            let amplitudes = indices.into_iter().map(Role::Model).collect();
+            Ok(Candidate { family, more: values[own..].to_vec(), amplitudes })
+        };
+        let candidates = groups.into_iter().map(candidate).collect::<PyResult<Vec<_>>>()?;
+        let score = interrupt::run(py, |_| estimator.score(&point, &candidates))?;
         let c = score.gradient.len();
         Ok((
             array(py, [c], score.gradient.iter().copied())?,
@@ -228,11 +252,11 @@ fn score<'py>(
     fn groups<F>(
         candidates: Vec<(Bound<'_, PyAny>, Vec<usize>)>,
         own: impl Fn(AnyModel) -> Option<(F, Vec<f64>)>,
-    ) -> PyResult<Vec<Group<F>>> {
+    ) -> PyResult<Vec<(F, Vec<f64>, Vec<usize>)>> {
         let one = |(model, indices): (Bound<'_, PyAny>, Vec<usize>)| {
             let (family, values) = own(AnyModel::to_fit(&model)?)
                 .ok_or_else(|| PyValueError::new_err("a candidate is a model of another kind"))?;
-            Ok((family, values, indices.into_iter().map(Role::Model).collect()))
+            Ok((family, values, indices))
         };
         candidates.into_iter().map(one).collect()
     }
@@ -242,14 +266,14 @@ fn score<'py>(
                 AnyModel::Disk(family, values) => Some((family, values)),
                 _ => None,
             })?;
-            run((family, values, DiskCamera), py, (&data, &start), &free, &diffusion, &groups)
+            run((family, values, DiskCamera), py, (&data, &start), &free, &diffusion, groups)
         }
         AnyModel::Pendulum(family, values) => {
             let groups = groups(candidates, |m| match m {
                 AnyModel::Pendulum(family, values) => Some((family, values)),
                 _ => None,
             })?;
-            run((family, values, AngleSensor), py, (&data, &start), &free, &diffusion, &groups)
+            run((family, values, AngleSensor), py, (&data, &start), &free, &diffusion, groups)
         }
         _ => Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
     }
@@ -271,13 +295,14 @@ fn score_ripples<'py>(
     };
     let highest = frequencies.iter().copied().fold(0.0, f64::max);
     let basis: Vec<f64> = (1..=3).map(|k| highest * f64::from(k) / 3.0).collect();
-    let (mut wide, mut wide_values, mut roles) = (family.clone(), values.clone(), Vec::new());
+    let (mut wide, mut more, mut amplitudes) = (family.clone(), Vec::new(), Vec::new());
     for &f in &basis {
         wide.effects.push(Effect::new(Kind::DriveRipple));
-        roles.extend([Role::Model(wide_values.len()), Role::Model(wide_values.len() + 1)]);
-        wide_values.extend([0.0, 0.0, f]);
+        let first = values.len() + more.len();
+        amplitudes.extend([Role::Model(first), Role::Model(first + 1)]);
+        more.extend([0.0, 0.0, f]);
     }
-    let probe = Probe { family: wide, values: wide_values, roles, frequencies: basis };
+    let probe = Probe { candidate: Candidate { family: wide, more, amplitudes }, frequencies: basis };
     let (estimator, point) = problem((family, values, DiskCamera), &data, &start, &free, &diffusion)?;
     let scores = interrupt::run(py, |_| estimator.score_waves(&point, &probe, &frequencies))?;
     let n = scores.len();
@@ -288,7 +313,7 @@ fn score_ripples<'py>(
     ))
 }
 
-/// Times (n, q), states (n, q, d) and responses (n, q, d, d) at `nodes` places of each of n links: what a unit
+/// Times (n, q), states (n, q, d) and responses (n, q, d, d) at q places of each of n links: what a unit
 /// forcing of each equation there adds to the state at the link's end.
 #[pyfunction]
 fn responses<'py>(
@@ -296,29 +321,24 @@ fn responses<'py>(
     model: &Bound<'py, PyAny>,
     data: Data<'py>,
     start: Start<'py>,
-    nodes: usize,
 ) -> PyResult<Three<'py>> {
     fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
         model: (F, Vec<f64>, C),
         py: Python<'py>,
         (data, start): (&Data<'py>, &Start<'py>),
-        nodes: usize,
     ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, &[], &[1.0; D])?;
-        let most = Estimator::<F, C, D, M>::MOST_PLACES;
-        if !(1..=most).contains(&nodes) {
-            return Err(PyValueError::new_err(format!("between 1 and {most} nodes are known, not {nodes}")));
-        }
-        let places = interrupt::run(py, |_| estimator.responses(&point, nodes))?;
-        let n = places.len() / nodes;
-        let response: Vec<_> = places.iter().map(|p| p.response).collect();
+        let links = interrupt::run(py, |_| estimator.flow(&point))?;
+        let n = links.len();
+        let places = || links.iter().flat_map(|link| link.places);
+        let response: Vec<_> = places().map(|p| p.response).collect();
         Ok((
-            array(py, [n, nodes], places.iter().map(|p| p.t))?,
-            array(py, [n, nodes, D], places.iter().flat_map(|p| p.state))?,
-            array(py, [n, nodes, D, D], numbers(&response))?,
+            array(py, [n, PLACES_PER_LINK], places().map(|p| p.t))?,
+            array(py, [n, PLACES_PER_LINK, D], places().flat_map(|p| p.state))?,
+            array(py, [n, PLACES_PER_LINK, D, D], numbers(&response))?,
         ))
     }
-    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), nodes))
+    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start)))
 }
 
 /// Gradient of each group of columns, its information, and the information were the free parameters known: the
@@ -339,12 +359,14 @@ fn score_columns<'py>(
     groups: Vec<usize>,
 ) -> PyResult<Three<'py>> {
     type Arrays<'a, 'py> = (&'a PyReadonlyArray3<'py, f64>, &'a PyReadonlyArray3<'py, f64>);
-    fn blocks<const K: usize>(array: &PyReadonlyArray3<'_, f64>) -> Vec<OMatrix<f64, Const<K>, Dyn>> {
+    fn columns(array: &PyReadonlyArray3<'_, f64>) -> Rows {
         let array = array.as_array();
-        let own = |a: numpy::ndarray::ArrayView2<'_, f64>| {
-            OMatrix::<f64, Const<K>, Dyn>::from_fn(a.ncols(), |i, j| a[[i, j]])
-        };
-        array.outer_iter().map(own).collect()
+        let (blocks, rows, width) = array.dim();
+        let mut columns = Rows::zeros(blocks * rows, width);
+        for (i, j, k) in numpy::ndarray::indices((blocks, rows, width)) {
+            columns.row_mut(rows * i + j)[k] = array[[i, j, k]];
+        }
+        columns
     }
     fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
         model: (F, Vec<f64>, C),
@@ -361,7 +383,7 @@ fn score_columns<'py>(
             let message = format!("columns must have the shapes ({}, {D}, {c}) and ({n}, {M}, {c})", n - 1);
             return Err(PyValueError::new_err(message));
         }
-        let columns = Columns { b: blocks(at_end), g: blocks(in_sight) };
+        let columns = Columns { state: columns(at_end), seen: columns(in_sight) };
         let scores = interrupt::run(py, |_| estimator.score_groups(&point, &columns, groups))?;
         let squares = groups.iter().map(|size| size * size).sum();
         Ok((
@@ -411,44 +433,46 @@ fn filter<'py>(
     each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &diffusion, &windows))
 }
 
-/// What would be seen at `times[k]`, increasing, after start `k` at `t0[k]`, by the model alone.
+/// What would be seen at `times[k]`, increasing, after start `k` of film `film[k]` at `t0[k]`, by the model alone.
 #[pyfunction]
 fn predict<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,
-    camera: PyReadonlyArray1<'py, f64>,
-    clock: f64,
+    sets: Vec<SetTuple>,
+    film: Vec<usize>,
     t0: PyReadonlyArray1<'py, f64>,
     states: PyReadonlyArray2<'py, f64>,
     times: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    type Arrays<'a, 'py> = (
-        &'a PyReadonlyArray1<'py, f64>,
-        &'a PyReadonlyArray1<'py, f64>,
-        &'a PyReadonlyArray2<'py, f64>,
-        &'a PyReadonlyArray2<'py, f64>,
-    );
+    type Arrays<'a, 'py> =
+        (&'a PyReadonlyArray1<'py, f64>, &'a PyReadonlyArray2<'py, f64>, &'a PyReadonlyArray2<'py, f64>);
     fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
         (family, values, sensor): (F, Vec<f64>, C),
         py: Python<'py>,
-        clock: f64,
-        (camera, t0, states, times): Arrays<'_, 'py>,
+        sets: Vec<SetTuple>,
+        film: &[usize],
+        (t0, states, times): Arrays<'_, 'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let starts: Vec<_> = list(t0).into_iter().zip(rows::<D>(states, "states")?).collect();
+        let sets = parameters::<C, D, M>(&sets, values.len())?;
+        let starts = rows::<D>(states, "states")?;
+        let starts: Vec<_> = film.iter().zip(list(t0)).zip(starts).map(|((&f, t), x)| (f, t, x)).collect();
         let times: Vec<Vec<f64>> = times.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
         let (k, h) = (starts.len(), times.first().map_or(0, Vec::len));
-        let camera = list(camera);
-        if times.len() != k || camera.len() != C::PARAMETERS.len() {
-            return Err(PyValueError::new_err("starts, times and camera do not fit together"));
+        if times.len() != k || film.iter().any(|&film| film >= sets.len()) {
+            return Err(PyValueError::new_err("starts, times and films do not fit together"));
         }
-        let record = Record { t: Vec::new(), seen: Vec::new(), information: Vec::new(), linked: Vec::new() };
-        let estimator =
-            Estimator { family, sensor, record, free: Vec::new(), diffusion: [1.0; D], tolerance: TOLERANCE };
-        let point = Point { states: Vec::new(), model: values, camera, clock };
-        let seen = interrupt::run(py, |_| estimator.predict(&point, &starts, &times))?;
+        let estimator = Estimator {
+            family,
+            sensor,
+            record: Record::default(),
+            free: Vec::new(),
+            diffusion: [1.0; D],
+            tolerance: TOLERANCE,
+        };
+        let seen = interrupt::run(py, |_| estimator.predict(&sets, &starts, &times))?;
         array(py, [k, h, M], seen.into_iter().flatten().flatten())
     }
-    each_family!(AnyModel::to_fit(model)?, run(py, clock, (&camera, &t0, &states, &times)))
+    each_family!(AnyModel::to_fit(model)?, run(py, sets, &film, (&t0, &states, &times)))
 }
 
 /// Names and units of a camera's parameters, for measurements of the `"disk"` or a `"pendulum"`.

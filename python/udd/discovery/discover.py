@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from udd.errors import FitError
 from udd.fitting import Fit, fit_record, record_of
@@ -23,12 +25,13 @@ _SHORTEST = 60  # frames
 
 
 def discover(
-    measurement: Measurement,
-    model: Model,
+    measurement: Measurement | Sequence[Measurement],
+    model: Model | Sequence[Model],
     free: Iterable[str] | None = None,
     *,
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    each: Iterable[str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Discovery:
     """Find the effect that a model lacks.
@@ -45,10 +48,10 @@ def discover(
 
     Parameters
     ----------
-    measurement : Measurement
-    model : Disk or Pendulum
+    measurement : Measurement or sequence of Measurement
+    model : Disk or Pendulum, or a sequence of them
         The known model; its parameters are the start and the priors' means.
-    free, camera, priors
+    free, camera, priors, each
         As for :func:`udd.fit`.
     progress : callable, optional
         Told in a few words what is being done.
@@ -81,13 +84,13 @@ def discover(
     n = len(record.t)
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
-    first = int(TRAIN * n)
-    options: dict[str, Any] = {"camera": camera, "priors": priors}
+    train = record.first(TRAIN)
+    options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each}
 
     tell("fitting the known model")
-    base = fit_record(measurement, record.part(slice(0, first)), model, free, **options)
+    base = fit_record(measurement, record.part(train), model, free, **options)
     baseline = fit_record(measurement, record, model, free, **options)
-    search = Search(record, first, tell)
+    search = Search(record, ~train, tell)
     before = search.errors(base)
     trained, final, after, accepted, scans = search.run(base, baseline, before)
     found = [f for step in accepted for f in _describe(step, final)]
@@ -109,8 +112,7 @@ def discover(
         ratio=search.improvement(before, after) if found else (1.0, 1.0, 1.0),
         scans=scans,
         looks=search.looks,
-        measurement=measurement,
-        split=record.origin + float(record.t[first]),
+        split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=trained,
     )
 

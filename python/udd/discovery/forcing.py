@@ -80,7 +80,7 @@ def responses(fit: Fit) -> Responses:
     """How a fitted motion answers to forcings."""
     model, data, start, _free, _diffusion = fit.problem.arguments(fit.point)
     linked = fit.record.linked
-    t, states, response = _core.responses(model, data, start, _NODES)
+    t, states, response = _core.responses(model, data, start)
     # Between frames that are not linked nothing moves; any state will do there.
     t = np.where(linked[:, None], t, fit.record.t[:-1, None])
     states = np.where(linked[:, None, None], states, fit.states[:-1, None])

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from udd import _core
 from udd.errors import FitError
-from udd.fitting import Fit, Record, information_for
+from udd.fitting import Fit, Record, filtered, predicted
 
 Array = NDArray[np.float64]
 
@@ -82,8 +81,8 @@ class Errors:
         return {"unit": self.unit, "starts": len(self.samples), "errors": rows, "whole_run_rms": self.whole}
 
 
-def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Errors:
-    """Errors of a fitted model on the frames of `record` from `first` on.
+def held_out_errors(fit: Fit, record: Record, held: NDArray[np.bool_], seed: int = 0) -> Errors:
+    """Errors of a fitted model on the frames of `record` that are held out.
 
     Each free run starts from a state that is filtered from the second of data before it; absolute time is
     kept.
@@ -94,24 +93,23 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
         Made without those frames.
     record : Record
         The whole measurement's frames.
-    first : int
-        Number of the first held-out frame.
+    held : ndarray of bool (n,)
+        Which frames are held out: the last ones of each measurement.
     """
     kind = fit.measurement.kind
-    windows, ends, horizons = _windows(record, first, HORIZONS[kind], _FILTER[kind])
+    windows, ends, horizons = _windows(record, held, HORIZONS[kind], _FILTER[kind])
     firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
     seen = record.seen[ends]
     there = record.observed[ends].all(axis=2)
-    camera, clock = fit.point.camera, fit.point.clock
-    predicted = _core.predict(fit.model, camera, clock, record.t[starts], states, times)
-    samples = np.where(there, _distance(kind, predicted, seen), np.nan)
+    found = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
+    samples = np.where(there, _distance(kind, found, seen), np.nan)
 
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    blocks = ((record.t[starts] - record.t[first]) // _BLOCK).astype(np.int64)
+    blocks = _blocks(record, _BLOCK)[starts]
     columns = [samples[:, k : k + 1] for k in range(len(horizons))]
     low, high = np.array([_interval(blocks, column, _median, rng) for column in columns]).T
     return Errors(
@@ -123,9 +121,16 @@ def held_out_errors(fit: Fit, record: Record, first: int, seed: int = 0) -> Erro
         floor=floor,
         samples=samples,
         blocks=blocks,
-        run=_run(fit, record, first),
-        run_blocks=((record.t[first:] - record.t[first]) // _BLOCK).astype(np.int64),
+        run=_run(fit, record, held),
+        run_blocks=_blocks(record, _BLOCK)[held],
     )
+
+
+def _blocks(record: Record, length: float) -> NDArray[np.int64]:
+    """The number of the stretch of time that each frame lies in, of each measurement its own."""
+    own = ((record.t - record.t.min()) // length).astype(np.int64)
+    result: NDArray[np.int64] = own + record.film * (int(own.max()) + 1)
+    return result
 
 
 def comparison_horizon(errors: Errors) -> float:
@@ -154,8 +159,7 @@ def cost_improvement(
     their forecasts are still equally good.
     """
     costs = np.column_stack([after, before])
-    blocks = ((record.t - record.t[0]) // _COST_BLOCK).astype(np.int64)
-    return _ratio(blocks, costs, _sum, seed)
+    return _ratio(_blocks(record, _COST_BLOCK), costs, _sum, seed)
 
 
 def _ratio(
@@ -168,25 +172,29 @@ def _ratio(
 
 
 def _windows(
-    record: Record, first: int, wanted: tuple[float, ...], window: float
+    record: Record, held: NDArray[np.bool_], wanted: tuple[float, ...], window: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
     """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
-    t = record.t
-    step = float(np.median(np.diff(t)))
-    horizons = tuple(h for h in wanted if h <= (t[-1] - t[first]) / 3 and h >= step)
+    spans = [np.flatnonzero(held & (record.film == film)) for film in range(len(record.origins))]
+    longest = max(float(np.ptp(record.t[own])) for own in spans)
+    step = float(np.median(np.diff(record.t)))
+    horizons = tuple(h for h in wanted if h <= longest / 3 and h >= step)
     if not horizons:
-        raise FitError(f"the held-out {t[-1] - t[first]:.2g} s are too short for a forecast: film for longer")
-    back, every = max(round(window / step), 6), max(round(_EVERY / step), 1)
-    ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
-    run = np.concatenate([[0], np.cumsum(~record.linked)])
+        raise FitError(f"the held-out {longest:.2g} s are too short for a forecast: film for longer")
     windows, ends = [], []
-    for start in range(first + back, len(t) - int(ahead[-1]), every):
-        if run[start - back] == run[start + ahead[-1]]:
-            windows.append((start - back, start))
-            ends.append(start + ahead)
+    run = np.concatenate([[0], np.cumsum(~record.linked)])
+    for own in spans:
+        # Every measurement has a frame rate of its own.
+        step = float(np.median(np.diff(record.t[own])))
+        back, every = max(round(window / step), 6), max(round(_EVERY / step), 1)
+        ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
+        for start in range(int(own[0]) + back, int(own[-1]) + 1 - int(ahead[-1]), every):
+            if run[start - back] == run[start + ahead[-1]]:
+                windows.append((start - back, start))
+                ends.append(start + ahead)
     if not windows:
         raise FitError(
-            f"the held-out {t[-1] - t[first]:.2g} s hold no {back * step + horizons[-1]:.2g} s "
+            f"the held-out {longest:.2g} s hold no {window + horizons[-1]:.2g} s "
             "without a gap, which a forecast takes: film for longer"
         )
     return np.array(windows, dtype=np.int64), np.array(ends, dtype=np.int64), horizons
@@ -194,22 +202,25 @@ def _windows(
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
     """States at the windows' first and last frames."""
-    data = (record.t, record.seen, information_for(fit, record), record.linked)
-    start = (record.states, fit.point.camera, fit.point.clock)
     schedule = fit.problem.schedule
-    middle = list(schedule[max(len(schedule) - 2, 0)])
-    pairs = [(int(a), int(b)) for a, b in windows]
-    first, last, _covariance = _core.filter(fit.model, data, start, middle, pairs)
+    middle = schedule[max(len(schedule) - 2, 0)]
+    first, last, _covariance = filtered(fit, record, windows, middle)
     return first, last
 
 
-def _run(fit: Fit, record: Record, first: int) -> Array:
-    """Error of one free run from the last fitted frame to the record's end, frame by frame."""
-    camera, clock = fit.point.camera, fit.point.clock
-    start, times = record.t[first - 1 : first], record.t[None, first:]
-    predicted = _core.predict(fit.model, camera, clock, start, fit.states[-1:], times)[0]
-    errors = _distance(fit.measurement.kind, predicted, record.seen[first:])
-    return np.where(record.observed[first:].all(axis=1), errors, np.nan)
+def _run(fit: Fit, record: Record, held: NDArray[np.bool_]) -> Array:
+    """Error of free runs from the last fitted frame of each measurement to its end, frame by frame."""
+    errors = np.full(len(record.t), np.nan)
+    for film in range(len(record.origins)):
+        own = np.flatnonzero(held & (record.film == film))
+        start = fit.states[fit.record.film == film][-1:]
+        times = record.t[own][None, :]
+        found = predicted(
+            fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
+        )[0]
+        errors[own] = _distance(fit.measurement.kind, found, record.seen[own])
+    result: Array = np.where(record.observed.all(axis=1), errors, np.nan)[held]
+    return result
 
 
 def _floor(
@@ -220,10 +231,13 @@ def _floor(
     ``first`` holds the states at the windows' first frames, where the made runs start.
     """
     rng = np.random.default_rng(seed)
-    camera, clock = fit.point.camera, fit.point.clock
-    n, length = len(windows), int(windows[0, 1] - windows[0, 0]) + 1
-    frames = np.hstack([windows[:, :1] + np.arange(length), ends])
-    made = _core.predict(fit.model, camera, clock, record.t[frames[:, 0]], first, record.t[frames])
+    # All windows as long as the shortest: measurements may differ in their frame rates.
+    length = int((windows[:, 1] - windows[:, 0]).min()) + 1
+    n, begins = len(windows), windows[:, 1] - length + 1
+    first = np.where((begins == windows[:, 0])[:, None], first, record.states[begins])
+    film = record.film[windows[:, 1]]
+    frames = np.hstack([begins[:, None] + np.arange(length), ends])
+    made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
     sd = fit.noise.sd(record, record.states[:, 0])[frames]
     made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
 
@@ -237,11 +251,13 @@ def _floor(
         rho=record.rho[inside],
         linked=np.tile(np.arange(length) < length - 1, n)[:-1],
         states=record.states[inside],
+        odd=record.odd[inside],
         row=record.row[inside],
+        film=record.film[inside],
     )
     starts = length * np.arange(n)
     _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
-    runs = _core.predict(fit.model, camera, clock, record.t[windows[:, 1]], last, record.t[ends])
+    runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
     there = record.observed[ends].all(axis=2)
     errors = np.where(there, _distance(fit.measurement.kind, runs, made[:, length:]), np.nan)
     result: Array = np.nanmedian(errors, axis=0)

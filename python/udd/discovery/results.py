@@ -119,9 +119,8 @@ class Discovery:
         What the score said of every candidate, for each round of the search, the best first.
     looks : list of int
         How many candidates each round looked at, every frequency counted.
-    measurement : Measurement
     split : float
-        Time from which the data were held out, s.
+        Time from which the data were held out, s; of the first measurement.
     """
 
     verdict: str
@@ -134,9 +133,13 @@ class Discovery:
     ratio: tuple[float, float, float]
     scans: list[list[Scored]]
     looks: list[int]
-    measurement: Measurement
     split: float
     trained: Fit = field(repr=False)
+
+    @property
+    def measurement(self) -> Measurement:
+        """The first measurement."""
+        return self.fit.measurement
 
     @property
     def horizon(self) -> float | None:

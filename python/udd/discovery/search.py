@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from udd.errors import FitError
@@ -102,13 +103,13 @@ class Trial:
 class Search:
     """The search on the first part of a record, tested on the rest."""
 
-    def __init__(self, record: Record, first: int, tell: Callable[[str], None]) -> None:
-        self.record, self.first, self.tell = record, first, tell
+    def __init__(self, record: Record, held: NDArray[np.bool_], tell: Callable[[str], None]) -> None:
+        self.record, self.held, self.tell = record, held, tell
         self.looks: list[int] = []
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
-        return held_out_errors(fitted, self.record, self.first)
+        return held_out_errors(fitted, self.record, self.held)
 
     def improvement(self, before: Errors, after: Errors) -> tuple[float, float, float]:
         """Held-out error after over before.
@@ -192,7 +193,7 @@ class Search:
         trials = [t for t in trials if t.fit.level == tightest >= current.part.level and t.needed]
         if not trials:
             return None
-        held = self.record.part(slice(self.first, None))
+        held = self.record.part(self.held)
         cost = held_cost(current.part, held)
         unit = min(trials, key=lambda t: t.fit.chi2).fit.inflation(current.part)
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order.

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from .fit import extend, fit, fit_record
-from .problem import Fit
+from .problem import Fit, data_of
 from .record import Record, record_of
-from .solve import held_cost, information_for, loosened
+from .solve import filtered, held_cost, loosened, predicted
 
 __all__ = [
     "Fit",
     "Record",
+    "data_of",
     "extend",
+    "filtered",
     "fit",
     "fit_record",
     "held_cost",
-    "information_for",
     "loosened",
+    "predicted",
     "record_of",
 ]

@@ -24,12 +24,13 @@ _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is l
 
 
 def fit(
-    measurement: Measurement,
-    model: Model,
+    measurement: Measurement | Sequence[Measurement],
+    model: Model | Sequence[Model],
     free: Iterable[str] | None = None,
     *,
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    each: Iterable[str] | None = None,
 ) -> Fit:
     """Fit a model to measured motion.
 
@@ -40,10 +41,12 @@ def fit(
 
     Parameters
     ----------
-    measurement : Measurement
-        Of the disk (``Y, Z, beta``) or of a pendulum (``theta``).
-    model : Disk or Pendulum
-        Its parameters are the start and the priors' means.
+    measurement : Measurement or sequence of Measurement
+        Of the disk (``Y, Z, beta``) or of a pendulum (``theta``). Several are fitted jointly: they share the
+        device's parameters.
+    model : Disk or Pendulum, or a sequence of them
+        Its parameters are the start and the priors' means. For several measurements one each, alike but for
+        their parameters' values, or one for all.
     free : iterable of str, optional
         Names of the model's free parameters; by default ``k0, k1, k2, W`` (with a prior of 5 %) of a disk,
         ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects.
@@ -52,6 +55,9 @@ def fit(
         orientation, ``row`` time of a rolling shutter, ``clock``), or which of them.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
+    each : iterable of str, optional
+        The model's parameters that every measurement has a value of its own of; by default the drive ``W``.
+        They are called ``W[0]``, ``W[1]`` ... then, as the camera's are.
 
     Returns
     -------
@@ -74,29 +80,48 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
-    return fit_record(measurement, record_of(measurement), model, free, camera=camera, priors=priors)
+    record = record_of(measurement)
+    return fit_record(measurement, record, model, free, camera=camera, priors=priors, each=each)
 
 
 def fit_record(
-    measurement: Measurement,
+    measurement: Measurement | Sequence[Measurement],
     record: Record,
-    model: Model,
+    model: Model | Sequence[Model],
     free: Iterable[str] | None = None,
     *,
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    each: Iterable[str] | None = None,
 ) -> Fit:
     """As :func:`fit`, of some of the measurement's frames."""
-    if measurement.kind != getattr(model, "kind", None):
-        raise FitError(
-            f"the measurement has columns {', '.join(measurement.names)}, "
-            f"which {type(model).__name__} does not explain"
-        )
-    parameters = free_parameters(model, free, camera, priors)
-    cameras = _core.camera_parameters(measurement.kind)
-    schedule = levels(measurement.kind)
-    problem = Problem(model, record, parameters, stated(record), schedule, schedule[0])
-    return _anneal(measurement, problem, Point(record.states, model.parameters, np.zeros(len(cameras)), 0.0))
+    measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
+    models = _models(model, measurements)
+    kind = models[0].kind
+    parameters = free_parameters(models, free, camera, priors, each)
+    cameras = [0.0] * len(_core.camera_parameters(kind))
+    schedule = levels(kind)
+    problem = Problem(models, record, parameters, stated(record), schedule, schedule[0])
+    sets = tuple((list(own.parameters.values()), list(cameras), 0.0) for own in models)
+    return _anneal(measurements, problem, Point(record.states, sets))
+
+
+def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement]) -> tuple[Model, ...]:
+    """One model per measurement, alike but for their numbers."""
+    models = tuple(model) if isinstance(model, Sequence) else (model,) * len(measurements)
+    if len(models) != len(measurements):
+        raise FitError(f"there are {len(measurements)} measurements but {len(models)} models")
+    for own, measurement in zip(models, measurements, strict=True):
+        if measurement.kind != getattr(own, "kind", None):
+            raise FitError(
+                f"the measurement has columns {', '.join(measurement.names)}, "
+                f"which {type(own).__name__} does not explain"
+            )
+        if list(own.parameters) != list(models[0].parameters):
+            raise FitError(
+                "the models of several measurements must be alike but for their parameters' values"
+            )
+    return models
 
 
 def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
@@ -114,21 +139,25 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
         Where their amplitudes start, in order.
     """
     names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
-    t = fitted.record.t
-    line = 0.5 / float(t[-1] - t[0])
+    line = 0.5 / float(np.ptp(fitted.record.t))
     scanned = [(e, p.name) for e in effects for p in e.spec.parameters if p.role == "frequency"]
     waves = [(f"{e.name}.{name}", e.parameters[name]) for e, name in scanned]
-    model = fitted.model.with_effects((*fitted.model.effects, *effects))
-    model = model.with_parameters(dict(zip(names, amplitudes, strict=True)))
-    order = list(model.parameters)
+    starts = dict(zip(names, amplitudes, strict=True))
+    models = tuple(
+        own.with_effects((*own.effects, *effects)).with_parameters(starts) for own in fitted.models
+    )
+    order = list(models[0].parameters)
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
-    problem = replace(fitted.problem, model=model, free=fitted.problem.free + more)
-    start = replace(fitted.point, model=model.parameters)
-    return tighten(fitted.measurement, problem, start, problem.schedule[1:])
+    problem = replace(fitted.problem, models=models, free=fitted.problem.free + more)
+    sets = tuple(
+        (list(own.parameters.values()), camera, clock)
+        for own, (_model, camera, clock) in zip(models, fitted.point.sets, strict=True)
+    )
+    return tighten(fitted.measurements, problem, Point(fitted.states, sets), problem.schedule[1:])
 
 
-def _anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
+def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Fit:
     """Solve from loose to tight.
 
     The noise is estimated at the loosest level at which the misfits still show it: there a wrong model does
@@ -138,23 +167,26 @@ def _anneal(measurement: Measurement, problem: Problem, point: Point) -> Fit:
     as_stated, first = problem.noise, point
     for number, diffusion in enumerate(problem.schedule):
         problem = replace(problem, diffusion=diffusion, noise=as_stated)
-        shown, problem, point = _estimate_noise(measurement, problem, point)
+        shown, problem, point = _estimate_noise(measurements, problem, point)
         if shown:
-            return tighten(measurement, problem, point, problem.schedule[number:])
+            return tighten(measurements, problem, point, problem.schedule[number:])
     # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
-    return tighten(measurement, replace(problem, noise=as_stated), first, problem.schedule)
+    believed = replace(as_stated, weight=np.ones(len(problem.record.t)))
+    return tighten(measurements, replace(problem, noise=believed), first, problem.schedule)
 
 
-def _estimate_noise(measurement: Measurement, problem: Problem, point: Point) -> tuple[bool, Problem, Point]:
+def _estimate_noise(
+    measurements: tuple[Measurement, ...], problem: Problem, point: Point
+) -> tuple[bool, Problem, Point]:
     """Fit and estimate the noise in turns; whether the misfits show it, and what was found."""
     for _ in range(_NOISE_ROUNDS):
-        result = solve(measurement, problem, point)
+        result = solve(measurements, problem, point)
         point, before = result.point, problem.noise
         omega = point.states[:, 0]
         if result.leverage > FOLLOWS:
             return False, problem, point
         noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
-        if measurement.sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):
+        if measurements[0].sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):
             return False, problem, point
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, omega):

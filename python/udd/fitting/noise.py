@@ -35,11 +35,14 @@ class Noise:
         Growth with the angular speed, in the channel's unit per rad/s.
     weight : ndarray (n,)
         How much each frame counts: 1, or less for an outlier.
+    memory : ndarray (m,)
+        How much of a frame's noise is still there in the next one: its autocorrelation.
     """
 
     factor: Array
     blur: Array
     weight: Array
+    memory: Array
 
     def sd(self, record: Record, omega: Array) -> Array:
         """Standard deviation of every frame and channel, (n, m)."""
@@ -68,9 +71,10 @@ class Noise:
 
 
 def stated(record: Record) -> Noise:
-    """The noise that the measurement itself states."""
+    """The noise that the measurement itself states; odd frames do not count."""
     channels = record.seen.shape[1]
-    return Noise(np.ones(channels), np.zeros(channels), np.ones(len(record.t)))
+    weight = np.where(record.odd, 0.0, 1.0)
+    return Noise(np.ones(channels), np.zeros(channels), weight, np.zeros(channels))
 
 
 def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array, before: Noise) -> Noise:
@@ -112,7 +116,7 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
             variance = np.maximum(terms / scale @ share, 1e-6 * power.mean() + 1e-300)
         factor[m], blur[m] = np.sqrt(share / scale)
         factor[m] = max(factor[m], 1e-3 * np.sqrt(power.mean() / (record.sigma[use, m] ** 2).mean()))
-    return Noise(factor, blur, weight)
+    return Noise(factor, blur, weight, before.memory)
 
 
 def _distance(record: Record, misfit: Array, sd: Array) -> Array:

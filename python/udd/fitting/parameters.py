@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,32 +37,48 @@ PENDULUM = {"k0": np.inf, "length": 0.05, "inertia": 0.1}
 
 @dataclass(frozen=True)
 class Free:
-    """A free parameter: its name, what it belongs to, and its Gaussian prior."""
+    """A free parameter: its name, what it belongs to, and its Gaussian prior.
+
+    Attributes
+    ----------
+    name : str
+        Followed by the number of the film in brackets where it belongs to one of several.
+    role : str
+        ``"model"``, ``"camera"`` or ``"clock"``.
+    index : int
+        Its place among the parameters of that role.
+    mean, sd : float
+        The prior; an infinite standard deviation for none.
+    film : int or None
+        The film that it belongs to; None where all share it.
+    """
 
     name: str
     role: str
     index: int
     mean: float
     sd: float
+    film: int | None = None
 
     @property
-    def core(self) -> tuple[str, int, float, float]:
+    def core(self) -> tuple[str, int, int | None, float, float]:
         """As the core takes it."""
-        return self.role, self.index, self.mean, self.sd
+        return self.role, self.index, self.film, self.mean, self.sd
 
 
 def free_parameters(
-    model: Model,
+    models: Sequence[Model],
     free: Iterable[str] | None = None,
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    each: Iterable[str] | None = None,
 ) -> tuple[Free, ...]:
     """The free parameters of a fit.
 
     Parameters
     ----------
-    model : Disk or Pendulum
-        Its values are the priors' means.
+    models : sequence of Disk or Pendulum
+        One per film; their values are the priors' means.
     free : iterable of str, optional
         Names of the model's free parameters. By default ``k0, k1, k2, W`` of a disk, ``k0, length, inertia``
         of a pendulum, and the amplitudes of all effects.
@@ -70,48 +86,73 @@ def free_parameters(
         Whether the camera's parameters are free, or which.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
+    each : iterable of str, optional
+        The model's parameters that every film has a value of its own of; by default the drive ``W``. Those of
+        the camera always are.
 
     Raises
     ------
     FitError
         A name that the model or the camera does not have, or a prior that is none.
     """
+    if isinstance(free, str) or isinstance(camera, str) or isinstance(each, str):
+        raise FitError("free, camera and each are lists of names, not a name")
+    model = models[0]
     values = model.parameters
-    amplitudes = {f"{e.name}.{p}" for e in model.effects for p in e.amplitudes}
-    spread: dict[str, float] = {}
-    if isinstance(model, Disk):
-        spread = {n: s * abs(values[n]) for n, s in DISK.items()}
-        # A drive at rest is at rest.
-        spread = {n: s for n, s in spread.items() if n != "W" or s > 0}
-        spread = {n: s if s > 0 else np.inf for n, s in spread.items()}
-    elif isinstance(model, Pendulum):
-        spread = {n: s * abs(values[n]) if np.isfinite(s) else np.inf for n, s in PENDULUM.items()}
-    if isinstance(free, str) or isinstance(camera, str):
-        raise FitError("free and camera are lists of names, not a name")
-    names = list(spread) + [n for n in values if n in amplitudes] if free is None else list(free)
-    kind = "disk" if isinstance(model, Disk) else "pendulum"
-    known = {**CAMERA[kind], **({"clock": CLOCK} if kind == "disk" else {})}
+    names = list(_spread(model)) + _amplitudes(model) if free is None else list(free)
+    known = {**CAMERA.get(model.kind, {}), **({"clock": CLOCK} if model.kind == "disk" else {})}
     wanted = list(known) if camera is True else [] if camera is False else list(camera)
     twice = {name for name in [*names, *wanted] if [*names, *wanted].count(name) > 1}
     if twice:
         raise FitError(f"{', '.join(sorted(twice))} is named twice")
-    for name in names:
+    own = {"W"} if each is None else set(each)
+    for name in [*names, *(own if each is not None else ())]:
         if name not in values:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(values)}")
     for name in wanted:
         if name not in known:
             raise FitError(f"the camera has no parameter {name!r}; it has {', '.join(known)}")
 
-    order = list(values)
-    cameras = [name for name, _unit in _core.camera_parameters(kind)]
+    several = len(models) > 1
+    order, cameras = list(values), [name for name, _unit in _core.camera_parameters(model.kind)]
     result = []
     for name in names:
-        sd = np.inf if name in amplitudes else spread.get(name, np.inf)
-        result.append(Free(name, "model", order.index(name), values[name], sd))
-    for name in wanted:
-        role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
-        result.append(Free(name, role, index, 0.0, known[name]))
-    given = dict(priors or {})
+        films = range(len(models)) if several and name in own else [None]
+        for film in films:
+            of = models[film or 0]
+            spread = _spread(of)
+            if free is None and name not in spread and name not in _amplitudes(of):
+                continue  # a drive at rest
+            label = name if film is None else f"{name}[{film}]"
+            sd = np.inf if name in _amplitudes(of) else spread.get(name, np.inf)
+            result.append(Free(label, "model", order.index(name), of.parameters[name], sd, film))
+    for film in range(len(models)):
+        for name in wanted:
+            role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
+            label = f"{name}[{film}]" if several else name
+            result.append(Free(label, role, index, 0.0, known[name], film if several else None))
+    return _with_priors(result, dict(priors or {}))
+
+
+def _amplitudes(model: Model) -> list[str]:
+    """The amplitudes of a model's effects."""
+    return [f"{e.name}.{p}" for e in model.effects for p in e.amplitudes]
+
+
+def _spread(model: Model) -> dict[str, float]:
+    """The standard deviations of the priors of what is free by default."""
+    values = model.parameters
+    if isinstance(model, Disk):
+        # A drive at rest is at rest.
+        known = {n: s * abs(values[n]) for n, s in DISK.items() if n != "W" or values[n]}
+        return {n: s if s > 0 else np.inf for n, s in known.items()}
+    if isinstance(model, Pendulum):
+        return {n: s * abs(values[n]) if np.isfinite(s) else np.inf for n, s in PENDULUM.items()}
+    return dict.fromkeys(values, np.inf)
+
+
+def _with_priors(free: list[Free], given: dict[str, tuple[float, float]]) -> tuple[Free, ...]:
+    """The parameters with the priors given, by their names or by what stands before the brackets."""
     for name, prior in given.items():
         if not (isinstance(prior, (tuple, list)) and len(prior) == 2):
             raise FitError(f"the prior of {name} must be a mean and a standard deviation, not {prior!r}")
@@ -120,7 +161,11 @@ def free_parameters(
             raise FitError(
                 f"the prior of {name} needs a finite mean and a standard deviation that must be positive"
             )
-    unknown = set(given) - {f.name for f in result}
+    unknown = set(given) - {f.name for f in free} - {f.name.split("[")[0] for f in free}
     if unknown:
         raise FitError(f"a prior is given for {', '.join(sorted(unknown))}, which is not free")
-    return tuple(Free(f.name, f.role, f.index, *given.get(f.name, (f.mean, f.sd))) for f in result)
+    result = []
+    for f in free:
+        mean, sd = given.get(f.name, given.get(f.name.split("[")[0], (f.mean, f.sd)))
+        result.append(replace(f, mean=mean, sd=sd))
+    return tuple(result)

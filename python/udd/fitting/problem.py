@@ -40,11 +40,23 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(q / _FRAME**0.5 for q in level) for level in SCHEDULE[kind])
 
 
+#: What holds for a film, as the core takes it: the model's parameters, the camera's, and the clock's error.
+Values = tuple[list[float], list[float], float]
+#: A record as the core takes it.
+Data = tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.int64], list[float]]
+
+
 @dataclass(frozen=True)
 class Problem:
-    """A measurement laid out for a model, with everything that a solve needs but its start."""
+    """Measurements laid out for a model, with everything that a solve needs but its start.
 
-    model: Model
+    Attributes
+    ----------
+    models : tuple of Model
+        One per film, alike but for their parameters' values.
+    """
+
+    models: tuple[Model, ...]
     record: Record
     free: tuple[Free, ...]
     noise: Noise
@@ -54,52 +66,58 @@ class Problem:
     def arguments(
         self, point: Point
     ) -> tuple[
-        Model,
-        tuple[Array, Array, Array, NDArray[np.bool_]],
-        tuple[Array, Array, float],
-        list[tuple[str, int, float, float]],
-        list[float],
+        Model, Data, tuple[Array, list[Values]], list[tuple[str, int, int | None, float, float]], list[float]
     ]:
         """What the core takes to describe a problem at a point."""
-        r = self.record
-        information = self.noise.information(r, point.states[:, 0])
         return (
-            self.model.with_parameters(point.model),
-            (r.t, r.seen, information, r.linked),
-            (point.states, point.camera, point.clock),
+            self.models[0],
+            data_of(self.record, self.noise, point.states[:, 0]),
+            (point.states, list(point.sets)),
             [f.core for f in self.free],
             list(self.diffusion),
         )
 
 
+def data_of(record: Record, noise: Noise, omega: Array) -> Data:
+    """A record with its noise, as the core takes it."""
+    information = noise.information(record, omega)
+    return record.t, record.seen, information, record.linked, record.film, noise.memory.tolist()
+
+
 @dataclass(frozen=True)
 class Point:
-    """Values of all unknowns: the states, the model's parameters, the camera's, and the clock's error."""
+    """Values of all unknowns: the states, and for every film the model's, the camera's and the clock's."""
 
     states: Array
-    model: Mapping[str, float]
-    camera: Array
-    clock: float
+    sets: tuple[Values, ...]
+
+    def value(self, free: Free) -> float:
+        """The value of a free parameter."""
+        model, camera, clock = self.sets[free.film or 0]
+        return {"model": model, "camera": camera}[free.role][free.index] if free.role != "clock" else clock
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A model fitted to a measurement.
+    """A model fitted to a measurement, or to several.
 
     Attributes
     ----------
-    model : Disk or Pendulum
-        With the fitted parameters.
+    models : tuple of Model
+        With the fitted parameters, one per measurement.
     parameters : dict of str to float
-        The free parameters, the camera's included.
+        The free parameters, the camera's included; those that only one of several measurements has are
+        followed by its number in brackets.
     errors : dict of str to float
         Their standard errors.
     covariance : ndarray (p, p)
         In the order of `parameters`.
     chi2, dof : float
         Sum of squares in units of the assumed noise and model error, and what it should be.
+    evidence : float
+        Logarithm of the record's likelihood, states and parameters integrated out, but for a constant.
     converged : bool
-    measurement : Measurement
+    measurements : tuple of Measurement
     record : Record
         The frames as the estimator saw them.
     states : ndarray (n, d)
@@ -114,15 +132,16 @@ class Fit:
         The measurement's noise as the record shows it.
     """
 
-    model: Model
+    models: tuple[Model, ...]
     parameters: dict[str, float]
     errors: dict[str, float]
     covariance: Array
     chi2: float
     dof: float
+    evidence: float
     converged: bool
     iterations: int
-    measurement: Measurement
+    measurements: tuple[Measurement, ...]
     record: Record
     states: Array
     state_covariance: Array
@@ -134,12 +153,26 @@ class Fit:
     point: Point
 
     @property
+    def model(self) -> Model:
+        """The fitted model, of the first measurement."""
+        return self.models[0]
+
+    @property
+    def measurement(self) -> Measurement:
+        """The first measurement."""
+        return self.measurements[0]
+
+    @property
     def residuals(self) -> Array:
-        """What was seen less what was fitted, for every row of the measurement; NaN where not seen."""
-        rows = np.full((len(self.measurement), self.misfit.shape[1]), np.nan)
-        there = self.record.row >= 0
-        rows[self.record.row[there]] = self.misfit[there]
-        return rows
+        """What was seen less what was fitted, for every row of the measurement; NaN where not seen.
+
+        Those of several measurements come one after the other.
+        """
+        rows = [np.full((len(m), self.misfit.shape[1]), np.nan) for m in self.measurements]
+        for film, own in enumerate(rows):
+            there = (self.record.film == film) & (self.record.row >= 0)
+            own[self.record.row[there]] = self.misfit[there]
+        return np.concatenate(rows)
 
     @property
     def level(self) -> int:

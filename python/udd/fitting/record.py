@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
+from scipy.ndimage import maximum_filter1d
 
 from udd.errors import FitError
 from udd.measurement import Measurement
@@ -15,15 +19,21 @@ Array = NDArray[np.float64]
 #: What a camera typically gets wrong, taken where a measurement does not say: m, m, rad; rad for a pendulum.
 _SIGMA = {"disk": (5e-4, 5e-4, 7e-3), "pendulum": (5e-3,)}
 
+#: A frame is odd that lies farther off than this times what is typical; honest noise does in 1 of 1e8.
+_ODD = 9.0
+_CLEANED = 8  # times odd frames are looked for: those that come close together spoil each other's look
+
 
 @dataclass(frozen=True)
 class Record:
     """Frames for the estimator.
 
+    One measurement's, or those of several one after the other.
+
     Attributes
     ----------
     t : ndarray (n,)
-        Time of each frame since the measurement's first row, s. Frames that were missing in short gaps are
+        Time of each frame since its measurement's first row, s. Frames that were missing in short gaps are
         put in, so that no flow runs for long.
     seen : ndarray (n, m)
         What was seen; 0 where it was not.
@@ -35,10 +45,14 @@ class Record:
         Whether frame i + 1 continues the motion of frame i.
     states : ndarray (n, d)
         A first guess of the states.
+    odd : ndarray of bool (n,)
+        Frames that lie far from where their neighbours point; a fit starts without them.
     row : ndarray of int (n,)
         The measurement's row that a frame came from; -1 where it was put in.
-    origin : float
-        The measurement's time of its first row, s, from which the model's time counts: a drift's drive and a
+    film : ndarray of int (n,)
+        The number of the measurement that a frame belongs to.
+    origins : tuple of float
+        Each measurement's time of its first row, s, from which the model's time counts: a drift's drive and a
         ripple's phase are those at the record's start.
     """
 
@@ -48,21 +62,46 @@ class Record:
     rho: Array
     linked: NDArray[np.bool_]
     states: Array
+    odd: NDArray[np.bool_]
     row: NDArray[np.int64]
-    origin: float
+    film: NDArray[np.int64]
+    origins: tuple[float, ...]
 
-    def part(self, frames: slice) -> Record:
-        """The frames in a slice with step 1."""
+    def part(self, frames: slice | NDArray[Any]) -> Record:
+        """Some frames: a slice, a mask or numbers that increase. Those that do not follow one another are not linked."""
+        chosen = np.arange(len(self.t))[frames]
+        follow = np.diff(chosen) == 1
         return replace(
             self,
-            t=self.t[frames],
-            seen=self.seen[frames],
-            sigma=self.sigma[frames],
-            rho=self.rho[frames],
-            linked=self.linked[frames][: max(len(self.t[frames]) - 1, 0)],
-            states=self.states[frames],
-            row=self.row[frames],
+            t=self.t[chosen],
+            seen=self.seen[chosen],
+            sigma=self.sigma[chosen],
+            rho=self.rho[chosen],
+            linked=self.linked[chosen[:-1]] & follow,
+            states=self.states[chosen],
+            odd=self.odd[chosen],
+            row=self.row[chosen],
+            film=self.film[chosen],
         )
+
+    @property
+    def origin(self) -> float:
+        """The first measurement's time of its first row, s."""
+        return self.origins[0]
+
+    @property
+    def clock(self) -> Array:
+        """Every frame's time on its measurement's clock, s."""
+        result: Array = self.t + np.array(self.origins)[self.film]
+        return result
+
+    def first(self, share: float) -> NDArray[np.bool_]:
+        """Which frames belong to the first part of their measurement, by number."""
+        result = np.zeros(len(self.t), dtype=bool)
+        for film in range(len(self.origins)):
+            own = np.flatnonzero(self.film == film)
+            result[own[: int(share * len(own))]] = True
+        return result
 
     @property
     def observed(self) -> NDArray[np.bool_]:
@@ -70,8 +109,8 @@ class Record:
         return np.isfinite(self.sigma)
 
 
-def record_of(measurement: Measurement) -> Record:
-    """Lay a measurement out for the estimator.
+def record_of(measurement: Measurement | Sequence[Measurement]) -> Record:
+    """Lay a measurement out for the estimator, or several one after the other.
 
     Raises
     ------
@@ -79,6 +118,8 @@ def record_of(measurement: Measurement) -> Record:
         Where it is no measurement, or too few frames were seen.
     """
     if not isinstance(measurement, Measurement):
+        if isinstance(measurement, Sequence) and not isinstance(measurement, str) and len(measurement):
+            return _joined([record_of(own) for own in measurement])
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     values, seen = measurement.values, measurement.seen
     if seen.sum() < 10:
@@ -105,7 +146,27 @@ def record_of(measurement: Measurement) -> Record:
     if np.ptp(known[:, -1]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
         known[:, -1] = np.unwrap(known[:, -1])
     guess = np.column_stack([np.interp(t, t[there], known[:, m]) for m in range(channels)])
-    return Record(t, full, sigma, rho, linked, _states(t, guess, linked), row, origin)
+    odd = _odd(guess, np.median(sigma[there], axis=0), linked)
+    for channel in guess.T:
+        channel[odd] = _between(odd, channel)
+    film = np.zeros(len(t), dtype=np.int64)
+    return Record(t, full, sigma, rho, linked, _states(t, guess, linked), odd, row, film, (origin,))
+
+
+def _joined(records: Sequence[Record]) -> Record:
+    """Records one after the other; the last frame of one is not linked with the first of the next."""
+    if len({record.seen.shape[1] for record in records}) > 1:
+        raise FitError("measurements that are fitted together must see the same kind of body")
+    links = [np.append(record.linked, False) for record in records]
+    return Record(
+        *(np.concatenate([getattr(r, name) for r in records]) for name in ("t", "seen", "sigma", "rho")),
+        linked=np.concatenate(links)[:-1],
+        states=np.concatenate([r.states for r in records]),
+        odd=np.concatenate([r.odd for r in records]),
+        row=np.concatenate([r.row for r in records]),
+        film=np.concatenate([np.full(len(r.t), film, dtype=np.int64) for film, r in enumerate(records)]),
+        origins=tuple(origin for r in records for origin in r.origins),
+    )
 
 
 def _fill(
@@ -119,6 +180,40 @@ def _fill(
         origin += [np.full(extra, -1), np.array([r])]
         links += [np.full(extra + 1, b - a <= longest)]
     return np.concatenate(times), np.concatenate(origin), np.concatenate(links)
+
+
+def _odd(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Frames far from the cubic through the two before and the two after, in any channel (its noise: `sigma`)."""
+    n = len(guess)
+    odd = np.zeros(n, dtype=bool)
+    inside = np.zeros(n, dtype=bool)
+    inside[2:-2] = linked[:-3] & linked[1:-2] & linked[2:-1] & linked[3:]
+    if not inside.any():
+        return odd
+    filled = guess.copy()
+    for _ in range(_CLEANED):
+        off = np.zeros_like(guess)
+        cubic = (4 * (filled[1:-3] + filled[3:-1]) - filled[:-4] - filled[4:]) / 6
+        off[2:-2] = np.abs(filled[2:-2] - cubic)
+        off[~inside | odd] = 0.0
+        # Of frames whose neighbours are odd too only the worst goes: it spoils the others' look.
+        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
+        far = (off / typical).max(axis=1)
+        found = (far > _ODD) & (far >= maximum_filter1d(far, 5))
+        if not found.any():
+            break
+        odd |= found
+        for channel in filled.T:
+            channel[odd] = _between(odd, channel)
+    return odd
+
+
+def _between(odd: NDArray[np.bool_], x: Array) -> Array:
+    """What the other frames make of the odd ones: a curve that follows the motion's bends."""
+    good = np.flatnonzero(~odd)
+    inside = np.clip(np.flatnonzero(odd), good[0], good[-1])
+    result: Array = Akima1DInterpolator(good, x[good])(inside)
+    return result
 
 
 def _states(t: Array, guess: Array, linked: NDArray[np.bool_]) -> Array:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 from udd import _core
 from udd.errors import FitError
 from udd.measurement import Measurement
+from udd.models import Model
 
-from .parameters import Free
-from .problem import Fit, Point, Problem
+from .problem import Fit, Point, Problem, Values, data_of
 from .record import Record
 
 Array = NDArray[np.float64]
@@ -22,60 +21,111 @@ Array = NDArray[np.float64]
 _STEPS = 20  # a right model converges in three to seven
 
 
-def solve(measurement: Measurement, problem: Problem, point: Point, iterations: int = 40) -> Fit:
+def solve(measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = 40) -> Fit:
     """Minimise once, for the problem's assumed model error, from a point."""
     try:
         found = _core.solve(*problem.arguments(point), iterations)
     except ValueError as error:
-        raise FitError(f"the fit failed: {error}") from error
+        raise FitError(_said(error, problem)) from error
     record = problem.record
-    model = problem.model.with_parameters(dict(zip(problem.model.parameters, found["model"], strict=True)))
     names = [f.name for f in problem.free]
-    end = Point(found["states"], model.parameters, found["camera"], found["clock"])
-    values = {f.name: _value(f, found) for f in problem.free}
-    chi2 = float(sum(found["cost"]))
+    end = Point(found["states"], tuple(found["sets"]))
+    models = tuple(
+        model.with_parameters(dict(zip(model.parameters, values, strict=True)))
+        for model, (values, _camera, _clock) in zip(problem.models, end.sets, strict=True)
+    )
     seen = record.observed
     # Every state but a run's first is tied to the one before: what remains are the frames' misfits.
     runs = 1 + int((~record.linked).sum())
     proper = sum(np.isfinite(f.sd) for f in problem.free)
     dof = float(seen.sum()) + proper - len(problem.free) - runs * found["states"].shape[1]
-    defect = np.where(record.linked[:, None], found["defect"] / np.diff(record.t)[:, None], np.nan)
+    linked = record.linked[:, None]
+    dt = np.where(linked, np.diff(record.t)[:, None], 1.0)
     return Fit(
-        model=model,
-        parameters=values,
+        models=models,
+        parameters={f.name: end.value(f) for f in problem.free},
         errors=dict(zip(names, np.sqrt(np.diag(found["covariance"])).tolist(), strict=True)),
         covariance=found["covariance"],
-        chi2=chi2,
+        chi2=float(sum(found["cost"])),
         dof=dof,
+        evidence=found["evidence"],
         converged=found["converged"],
         iterations=found["iterations"],
-        measurement=measurement,
+        measurements=measurements,
         record=record,
         states=found["states"],
         state_covariance=found["state_covariance"],
         misfit=np.where(seen, found["misfit"], np.nan),
         misfit_variance=found["seen_variance"],
-        defect=defect,
+        defect=np.where(linked, found["defect"] / dt, np.nan),
         noise=problem.noise,
         problem=problem,
         point=end,
     )
 
 
-def _value(free: Free, found: Mapping[str, Any]) -> float:
-    if free.role == "clock":
-        return float(found["clock"])
-    return float(found[free.role][free.index])
+def _said(error: ValueError, problem: Problem) -> str:
+    """What went wrong; parameters that can change together by their names."""
+    if len(error.args) == 2:
+        together = [problem.free[k].name for k in error.args[1]]
+        return (
+            f"the data do not determine the free parameters: {' and '.join(together)} can change "
+            "together without changing the fit; give one of them a prior, or hold it"
+            if len(together) > 1
+            else f"the data say nothing of {together[0]}; give it a prior, or hold it"
+        )
+    return f"the fit failed: {error}"
+
+
+def predicted(
+    models: Sequence[Model],
+    sets: Sequence[Values],
+    film: NDArray[np.int64],
+    t0: Array,
+    states: Array,
+    times: Array,
+) -> Array:
+    """What would be seen at times (k, h), increasing, after starts (k,), by the models alone.
+
+    Parameters
+    ----------
+    models : sequence of Model
+        One per film, alike but for their parameters' values, for which `sets` count.
+    sets : sequence of Values
+        As a fit's ``point.sets``.
+    film : ndarray of int (k,)
+        Of each start.
+    t0, states : ndarray (k,), (k, d)
+    times : ndarray (k, h)
+
+    Returns
+    -------
+    ndarray (k, h, m)
+    """
+    return _core.predict(models[0], list(sets), film.tolist(), t0, states, times)
+
+
+def filtered(
+    fitted: Fit, record: Record, windows: NDArray[np.int64], diffusion: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """From windows of frames alone, with a fit's parameters: the states at the first and at the last frame, and
+    the latter's covariance."""
+    data = data_of(record, replace(fitted.noise, weight=np.ones(len(record.t))), record.states[:, 0])
+    pairs = [(int(a), int(b)) for a, b in windows]
+    return _core.filter(fitted.model, data, (record.states, list(fitted.point.sets)), list(diffusion), pairs)
 
 
 def tighten(
-    measurement: Measurement, problem: Problem, point: Point, schedule: Sequence[tuple[float, ...]]
+    measurements: tuple[Measurement, ...],
+    problem: Problem,
+    point: Point,
+    schedule: Sequence[tuple[float, ...]],
 ) -> Fit:
     """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck."""
     best: Fit | None = None
     for diffusion in schedule:
         problem = replace(problem, diffusion=diffusion)
-        result = solve(measurement, problem, point, _STEPS)
+        result = solve(measurements, problem, point, _STEPS)
         if best is not None and not result.converged:
             break
         best, point = result, result.point
@@ -94,7 +144,7 @@ def loosened(fitted: Fit, scatter: float) -> Fit:
     for diffusion in reversed(problem.schedule[: fitted.level]):
         if result.scatter < scatter:
             break
-        result = solve(fitted.measurement, replace(problem, diffusion=diffusion), result.point)
+        result = solve(fitted.measurements, replace(problem, diffusion=diffusion), result.point)
     return result
 
 
@@ -113,21 +163,15 @@ def held_cost(fitted: Fit, record: Record) -> Array:
         Squared misfit of a frame in units of the noise, with the squared defect of the link that leaves it in
         units of the model's assumed error.
     """
-    problem = replace(fitted.problem, record=record, free=(), model=fitted.model)
+    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
     problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
     start = replace(fitted.point, states=record.states)
-    end = tighten(fitted.measurement, problem, start, problem.schedule)
+    end = tighten(fitted.measurements, problem, start, problem.schedule)
     information = problem.noise.information(record, end.states[:, 0])
     misfit = np.nan_to_num(end.misfit)
     cost: Array = np.einsum("ni,nij,nj->n", misfit, information, misfit)
     # A defect is kept per second; its variance over a link of length dt is diffusion^2 dt.
-    dt = np.diff(record.t)[:, None]
+    dt = np.abs(np.diff(record.t))[:, None]
     links = np.nan_to_num(end.defect) ** 2 * dt / np.array(end.problem.diffusion) ** 2
     cost[:-1] += links.sum(axis=1)
     return cost
-
-
-def information_for(fitted: Fit, record: Record) -> Array:
-    """The information of another record's frames, with the noise that a fit found."""
-    noise = replace(fitted.noise, weight=np.ones(len(record.t)))
-    return noise.information(record, record.states[:, 0])

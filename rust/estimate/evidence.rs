@@ -1,0 +1,73 @@
+//! How likely a record is.
+
+use nalgebra::{DMatrix, SVector};
+
+use super::{Cost, Estimator, Sensor};
+use crate::model::Family;
+
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// The misfits' cost: their squares in units of the noise, less what the frame before foretold of them.
+    pub(super) fn misfit_cost(&self, misfit: &[SVector<f64, M>]) -> f64 {
+        let record = &self.record;
+        if record.memory == [0.0; M] {
+            return misfit.iter().zip(&record.information).map(|(e, own)| e.dot(&(own * e))).sum();
+        }
+        let mut cost = 0.0;
+        let mut before = ([false; M], SVector::<f64, M>::zeros());
+        for (i, e) in misfit.iter().enumerate() {
+            let root = super::bordered::root(&record.information[i]);
+            let own = root * e;
+            let mut there = [false; M];
+            for m in 0..M {
+                there[m] = root[(m, m)] != 0.0;
+                if !there[m] {
+                    continue;
+                }
+                let memory = record.memory[m];
+                let remembers = memory != 0.0 && i > 0 && record.linked[i - 1] && before.0[m];
+                cost += match remembers {
+                    true => (own[m] - memory * before.1[m]).powi(2) / (1.0 - memory * memory),
+                    false => own[m] * own[m],
+                };
+            }
+            before = (there, own);
+        }
+        cost
+    }
+
+    /// Logarithm of the likelihood, by Laplace's approximation around a minimum with this cost.
+    ///
+    /// The determinants are those of the states' part of the normal equations, and of what remains for the
+    /// parameters.
+    pub(super) fn evidence(&self, cost: &Cost, states: f64, schur: &DMatrix<f64>) -> f64 {
+        let record = &self.record;
+        let mut given = 0.0;
+        let mut before = [false; M];
+        for (i, information) in record.information.iter().enumerate() {
+            let root = super::bordered::root(information);
+            let mut there = [false; M];
+            for m in (0..M).filter(|&m| root[(m, m)] != 0.0) {
+                there[m] = true;
+                given += 2.0 * root[(m, m)].ln();
+                if i > 0 && record.linked[i - 1] && before[m] {
+                    given -= (1.0 - record.memory[m].powi(2)).ln();
+                }
+            }
+            before = there;
+        }
+        for (precision, _) in self.precision().iter().zip(&record.linked).filter(|(_, linked)| **linked) {
+            given += precision.iter().map(|q| q.ln()).sum::<f64>();
+        }
+        let priors = self.free.iter().filter(|free| free.sd.is_finite());
+        given += priors.map(|free| -2.0 * free.sd.ln()).sum::<f64>();
+        let parameters = match nalgebra::Cholesky::new(schur.clone()) {
+            Some(lower) => 2.0 * lower.l().diagonal().iter().map(|v| v.ln()).sum::<f64>(),
+            None => f64::INFINITY,
+        };
+        0.5 * (given - cost.total() - states - parameters)
+    }
+}
