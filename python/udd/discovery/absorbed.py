@@ -2,49 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from udd.fitting import Fit
 
 from .curves import Curve, score_groups
 from .forcing import responses
-
-Array = NDArray[np.float64]
+from .smoothing import Absorbed
 
 _ABSORBED = 0.05  # a curve of which the free parameters leave no more is theirs
-
-
-@dataclass(frozen=True)
-class Absorbed:
-    """What the free parameters of a fit do as well as a curve would.
-
-    A constant that moves the wheels is the drive's speed, a torque proportional to Omega is friction: how
-    much of these belongs to the curve cannot be known.
-
-    Attributes
-    ----------
-    rows : ndarray (a, k)
-        How much of each of a such curves there is in coefficients.
-    vectors : ndarray (k, a)
-        By how much the coefficients change, most likely, with each.
-    """
-
-    rows: Array
-    vectors: Array
-
-    def aligned(self, coefficients: Array, to: Array) -> Array:
-        """The coefficients with as much of these curves as others have, to compare the two."""
-        result: Array = coefficients + self.vectors @ (self.rows @ (to - coefficients))
-        return result
-
-    def left(self, covariance: Array) -> Array:
-        """The covariance of a curve of which these are agreed upon."""
-        result: Array = covariance - self.vectors @ self.rows @ covariance
-        return result
 
 
 def absorbed(curve: Curve, fit: Fit) -> Absorbed:
@@ -60,4 +29,5 @@ def absorbed(curve: Curve, fit: Fit) -> Absorbed:
 
 def distinct(curve: Curve, fit: Fit) -> Curve:
     """The curve with the errors that remain where what the free parameters absorb is agreed upon."""
-    return replace(curve, covariance=absorbed(curve, fit).left(curve.covariance))
+    theirs = absorbed(curve, fit)
+    return replace(curve, covariance=theirs.left(curve.covariance), absorbed=theirs)

@@ -14,7 +14,7 @@ from udd.models import Model
 
 from .coordinates import Coordinate, Slot, coordinates, slots
 from .forcing import Responses, Score, responses, score_forcings
-from .smoothing import chance, smooth
+from .smoothing import Absorbed, chance, smooth
 from .splines import Spline, along, product, rough_product
 
 Array = NDArray[np.float64]
@@ -54,6 +54,8 @@ class Curve:
     places : tuple of ndarray
         Where the record visits the coordinates, every frame's first place.
     score : Score
+    absorbed : Absorbed or None
+        What of it is agreed upon, where `covariance` is what remains then.
     """
 
     slot: Slot
@@ -69,6 +71,7 @@ class Curve:
     directions: int
     places: tuple[Array, ...]
     score: Score
+    absorbed: Absorbed | None = None
 
     @property
     def title(self) -> str:
@@ -96,6 +99,16 @@ class Curve:
         result: Array = np.sqrt(
             np.maximum(np.einsum("...k,kl,...l->...", design, self.covariance, design), 0.0)
         )
+        return result
+
+    def beside(self, values: Array, *x: Array) -> Array:
+        """Another curve's values at places, as they compare: with as much of what is agreed upon as this."""
+        if self.absorbed is None:
+            return values
+        design = self.design(*x)
+        weak = 1e-9 * np.trace(design.T @ design) / np.trace(self.roughness) * self.roughness
+        own = np.linalg.solve(design.T @ design + weak, design.T @ values)
+        result: Array = values + design @ (self.absorbed.aligned(own, self.coefficients) - own)
         return result
 
     @property
@@ -221,6 +234,7 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
         df=smoothed.df,
         evidence=smoothed.evidence,
         score=moved,
+        absorbed=None,
     )
 
 

@@ -66,6 +66,35 @@ class Smooth:
     evidence: float
 
 
+@dataclass(frozen=True)
+class Absorbed:
+    """What the free parameters of a fit do as well as a curve would.
+
+    A constant that moves the wheels is the drive's speed, a torque proportional to Omega is friction: how
+    much of these belongs to the curve cannot be known.
+
+    Attributes
+    ----------
+    rows : ndarray (a, k)
+        How much of each of a such curves there is in coefficients.
+    vectors : ndarray (k, a)
+        By how much the coefficients change, most likely, with each.
+    """
+
+    rows: Array
+    vectors: Array
+
+    def aligned(self, coefficients: Array, to: Array) -> Array:
+        """The coefficients with as much of these curves as others have, to compare the two."""
+        result: Array = coefficients + self.vectors @ (self.rows @ (to - coefficients))
+        return result
+
+    def left(self, covariance: Array) -> Array:
+        """The covariance of a curve of which these are agreed upon."""
+        result: Array = covariance - self.vectors @ self.rows @ covariance
+        return result
+
+
 def directions(score: Score, roughness: Array) -> Directions:
     """Diagonalise information and roughness together (Demmler and Reinsch)."""
     information = score.information
