@@ -15,7 +15,6 @@ from .coordinates import Coordinate, Slot
 
 Array = NDArray[np.float64]
 
-_NODES = 3  # places in every link: an orientation turns by half a radian between frames
 _COLUMNS = 240  # scored at a time: what a long record takes in memory
 
 
@@ -44,6 +43,8 @@ class Responses:
         ``[i, q, :, m]`` is what a unit forcing of the m-th equation there adds to the state at frame i + 1.
     linked : ndarray of bool (n,)
         Where frames are not linked there is no motion between them.
+    films : tuple of ndarray of bool (n,)
+        Which links each film holds.
     """
 
     fit: Fit
@@ -52,6 +53,7 @@ class Responses:
     rates: Array
     response: Array
     linked: NDArray[np.bool_]
+    films: tuple[NDArray[np.bool_], ...]
 
     def along(self, coordinate: Coordinate) -> Array:
         """A coordinate's values, (n, q)."""
@@ -65,10 +67,10 @@ class Responses:
         """What forcings (n, q, k), changing at these rates, add to the state at a link's end, (n, d, k)."""
         one, none = np.ones(self.t.shape), np.zeros(self.t.shape)
         result: Array = np.zeros((len(self.t), self.states.shape[-1], value.shape[-1]))
-        for own, part in (
-            (slot.forcing(self.fit.model, self.states, one, none), value),
-            (slot.forcing(self.fit.model, self.states, none, one), rate),
-        ):
+        for strengths, part in (((one, none), value), ((none, one), rate)):
+            own = np.zeros(self.states.shape)
+            for model, film in zip(self.fit.models, self.films, strict=True):
+                own[film] = slot.forcing(model, self.states[film], *(s[film] for s in strengths))
             if own.any():
                 # One product of matrices per frame: (d, q) with (q, k).
                 acting = np.einsum("iqdm,iqm->iqd", self.response, own)
@@ -84,7 +86,11 @@ def responses(fit: Fit) -> Responses:
     # Between frames that are not linked nothing moves; any state will do there.
     t = np.where(linked[:, None], t, fit.record.t[:-1, None])
     states = np.where(linked[:, None, None], states, fit.states[:-1, None])
-    return Responses(fit, t, states, fit.model.rates(t, states), response, linked)
+    films = tuple(fit.record.film[:-1] == k for k in range(len(fit.models)))
+    rates = np.zeros(states.shape)
+    for own, film in zip(fit.models, films, strict=True):
+        rates[film] = own.rates(t[film], states[film])
+    return Responses(fit, t, states, rates, response, linked, films)
 
 
 def score_forcings(fit: Fit, columns: Sequence[Array], known: bool = False) -> list[Score]:
