@@ -45,18 +45,6 @@ impl<const D: usize> Bordered<D> {
         row[p] += precision * (mean - value);
     }
 
-    /// Levenberg-Marquardt damping: the diagonal grows by the factor `1 + lambda`.
-    pub fn damp(&mut self, lambda: f64) {
-        for block in &mut self.diagonal {
-            for k in 0..D {
-                block[(k, k)] *= 1.0 + lambda;
-            }
-        }
-        for j in 0..self.parameters() {
-            self.corner.row_mut(j)[j] *= 1.0 + lambda;
-        }
-    }
-
     /// By how much the linear model says that a step lowers the cost.
     pub fn promise(&self, states: &[SVector<f64, D>], parameters: &DVector<f64>) -> f64 {
         let p = self.parameters();

@@ -1,11 +1,18 @@
 //! The minimum, by Gauss-Newton with Levenberg-Marquardt damping.
 
-use nalgebra::{DMatrix, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::linearise::invert;
-use super::{Bordered, EstimateError, Estimator, Free, Linear, Point, Sensor};
+use super::{Bordered, Eliminated, EstimateError, Estimator, Free, Linear, Point, Sensor};
 use crate::model::Family;
 use crate::run::Stop;
+
+/// Trials of one step, ever shorter.
+const MOST_TRIALS: i32 = 12;
+/// Damping beyond which parameters no longer move.
+const MOST_DAMPING: f64 = 1e4;
+/// So many steps in a row without gain are the end.
+const ENOUGH: usize = 3;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +94,11 @@ where
         cost
     }
 
+    fn cost_at(&self, point: &Point<D>) -> Result<Cost, EstimateError> {
+        let (misfit, defect) = self.residuals(point)?;
+        Ok(self.cost(point, &misfit, &defect))
+    }
+
     /// Adds the free parameters' priors to normal equations at a point.
     pub(super) fn add_priors(&self, point: &Point<D>, system: &mut Bordered<D>) {
         for (j, free) in self.free.iter().enumerate() {
@@ -108,57 +120,82 @@ where
         stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
         let mut point = start;
-        let (misfit, defect) = self.residuals(&point)?;
-        let mut cost = self.cost(&point, &misfit, &defect);
-        let mut lambda = 0.0_f64;
-        let mut iterations = 0;
-        loop {
+        let mut cost = self.cost_at(&point)?;
+        let mut damping = 0.0;
+        let mut still = 0;
+        for iteration in 1..=options.iterations {
             stop.check().map_err(|_| EstimateError::Cancelled)?;
             let linear = self.linearise(&point)?;
             let system = self.equations(&point, &linear);
-            let mut converged = false;
-            let mut improved = false;
+            let reduced = system.clone().eliminate(&self.record.t)?;
+            let mut gained = 0.0;
+            let mut easy = false;
             // A step that does not lower the cost is damped more strongly and tried again.
-            while !improved && !converged && iterations < options.iterations {
-                iterations += 1;
-                let mut damped = system.clone();
-                damped.damp(lambda);
-                let reduced = damped.eliminate(&self.record.t)?;
-                let inverse = invert(&reduced.schur);
-                let step =
-                    inverse.ok_or_else(|| undetermined(&self.free, &reduced.schur))? * &reduced.gradient;
-                let states = reduced.states(&step);
-                let promised = system.promise(&states, &step);
-                let mut trial = point.clone();
-                for (x, change) in trial.states.iter_mut().zip(&states) {
-                    for k in 0..D {
-                        x[k] += change[k];
-                    }
+            for shorter in 0..MOST_TRIALS {
+                let (states, parameters) = self.step(&reduced, damping)?;
+                let promised = system.promise(&states, &parameters);
+                if promised < options.decrease {
+                    easy = true;
                 }
-                for (free, &change) in self.free.iter().zip(step.iter()) {
-                    trial.shift(free, change);
-                }
-                let tried = self.residuals(&trial).map(|(e, r)| self.cost(&trial, &e, &r));
-                match tried {
-                    Ok(new) if new.total().is_finite() && new.total() <= cost.total() + 1e-9 => {
-                        let gained = cost.total() - new.total();
-                        point = trial;
-                        cost = new;
-                        improved = true;
-                        converged = lambda == 0.0 && promised.max(gained) < options.decrease;
-                        lambda = if lambda < 1e-4 { 0.0 } else { lambda * 0.1 };
-                    }
-                    _ if promised < options.decrease => converged = true,
-                    _ => lambda = if lambda == 0.0 { 1e-3 } else { lambda * 10.0 },
-                }
-                if lambda > 1e8 {
+                // Where damped parameters do not help it is the states that go too far.
+                let length = if damping > MOST_DAMPING { 0.5_f64.powi(shorter) } else { 1.0 };
+                let trial = self.moved(&point, &states, &parameters, length);
+                let new = self.cost_at(&trial).ok().filter(|new| new.total() <= cost.total());
+                if let Some(new) = new {
+                    gained = cost.total() - new.total();
+                    easy &= damping == 0.0;
+                    (point, cost) = (trial, new);
+                    damping = if damping < 1e-2 { 0.0 } else { damping * 0.1 };
                     break;
                 }
+                if easy && damping == 0.0 {
+                    break;
+                }
+                damping = if damping == 0.0 { 1e-2 } else { damping * 10.0 };
             }
-            if converged || !improved || iterations >= options.iterations {
-                return self.finish(point, iterations, converged);
+            // At a kink of the law the cost has one too: there full steps keep promising more than they hold.
+            still = if gained < options.decrease { still + 1 } else { 0 };
+            if (easy && gained < options.decrease) || still == ENOUGH {
+                return self.finish(point, iteration, true);
             }
         }
+        self.finish(point, options.iterations, false)
+    }
+
+    /// The step to the minimum of the linearised problem; the parameters damped.
+    #[allow(clippy::type_complexity)]
+    fn step(
+        &self,
+        reduced: &Eliminated<D>,
+        damping: f64,
+    ) -> Result<(Vec<SVector<f64, D>>, DVector<f64>), EstimateError> {
+        let mut information = reduced.schur.clone();
+        for j in 0..information.nrows() {
+            information[(j, j)] *= 1.0 + damping;
+        }
+        let inverse = invert(&information).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
+        let parameters = inverse * &reduced.gradient;
+        Ok((reduced.states(&parameters), parameters))
+    }
+
+    /// A point moved by a part of a step.
+    fn moved(
+        &self,
+        point: &Point<D>,
+        states: &[SVector<f64, D>],
+        parameters: &DVector<f64>,
+        length: f64,
+    ) -> Point<D> {
+        let mut moved = point.clone();
+        for (x, change) in moved.states.iter_mut().zip(states) {
+            for k in 0..D {
+                x[k] += length * change[k];
+            }
+        }
+        for (free, &change) in self.free.iter().zip(parameters.iter()) {
+            moved.shift(free, length * change);
+        }
+        moved
     }
 
     /// The covariances at the minimum.
