@@ -19,6 +19,8 @@ from .splines import Spline, along, product, rough_product
 
 Array = NDArray[np.float64]
 
+#: Curves whose evidences differ by less are not told apart.
+NATS = 10.0
 #: Intervals between knots along one coordinate, and along each of two.
 INTERVALS, INTERVALS_OF_TWO = 14, 3
 #: The same along an angle that goes round: five waves per turn are seen.
@@ -130,6 +132,11 @@ class CurveScan:
 
     curves: list[Curve]
     looks: int
+
+    @property
+    def alike(self) -> list[Curve]:
+        """The curves that are at most 10 nats less likely than the first, which comes first."""
+        return [c for c in self.curves if c.evidence > self.curves[0].evidence - NATS]
 
     @property
     def p(self) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import least_squares
 
-from .curves import Curve
+from .curves import NATS, Curve
 from .expressions import (
     Node,
     constants,
@@ -29,8 +29,6 @@ from .guesses import regression, usual
 
 Array = NDArray[np.float64]
 
-#: A formula that is this many nats worse than the curve itself does not explain it.
-NATS = 10.0
 _MOST = 12  # formulas looked at closely
 _FAR = 40.0  # nats below the curve, from which shortening does not bring a formula back
 _HUGE = 1e6

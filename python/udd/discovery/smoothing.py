@@ -135,8 +135,11 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
     g = d.gradient if at is None else d.vectors.T @ (score.gradient + score.information @ at)
     f, bent = d.information, d.roughness > 0
 
+    # What is far beyond a unit's information is not held back by it.
+    straight = f / np.maximum(observations, g**2 / np.maximum(f, 1e-300))
+
     def prior(log_precision: float) -> Array:
-        return np.where(bent, np.exp(log_precision) * d.roughness, f / observations)
+        return np.where(bent, np.exp(log_precision) * d.roughness, straight)
 
     def evidence(log_precision: float) -> float:
         own = prior(log_precision)
