@@ -155,7 +155,7 @@ def cost_improvement(
 ) -> tuple[float, float, float]:
     """The ratio of two fits' costs on a record that neither saw, with its 95 % interval from paired blocks.
 
-    The costs are those of :func:`udd.fitting.held_cost`, frame by frame. They tell two models apart where
+    The costs are those of :func:`udd.fitting.frame_costs`. They tell two models apart where
     their forecasts are still equally good.
     """
     costs = np.column_stack([after, before])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from udd.errors import FitError
-from udd.fitting import Fit, Record, extend, held_cost, loosened
+from udd.fitting import Fit, Record, at_level, extend, frame_costs, held, loosened
 
 from .candidates import Candidate, library
 from .heldout import (
@@ -62,6 +62,8 @@ class Trial:
 
     candidates: list[Candidate]
     fit: Fit
+    compared: Fit
+    """The same held as tightly as those that it is compared with."""
 
     @property
     def names(self) -> list[str]:
@@ -76,7 +78,7 @@ class Trial:
     def criterion(self, unit: float) -> float:
         """chi2 in a common unit with the price of a parameter (BIC): the smaller the better."""
         price = math.log(np.isfinite(self.fit.misfit).sum())
-        return self.fit.chi2 / unit + price * sum(c.parameters for c in self.candidates)
+        return self.compared.chi2 / unit + price * sum(c.parameters for c in self.candidates)
 
     @property
     def needed(self) -> bool:
@@ -179,7 +181,8 @@ class Search:
 
     def _try(self, current: Fit, candidates: list[Candidate], start: list[float]) -> Trial | None:
         try:
-            trial = Trial(candidates, extend(current, [c.effect for c in candidates], start))
+            fitted = extend(current, [c.effect for c in candidates], start)
+            trial = Trial(candidates, fitted, fitted)
         except FitError:
             return None
         return trial if trial.physical and trial.fit.converged else None
@@ -188,35 +191,47 @@ class Search:
         self, current: State, trials: list[Trial], scanned: Scan, looks: int
     ) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
-        # chi2 compares only where the model is held equally tightly; a form that cannot be is worse.
-        tightest = max((t.fit.level for t in trials), default=0)
-        trials = [t for t in trials if t.fit.level == tightest >= current.part.level and t.needed]
+        trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         if not trials:
             return None
-        held = self.record.part(self.held)
-        cost = held_cost(current.part, held)
-        unit = min(trials, key=lambda t: t.fit.chi2).fit.inflation(current.part)
+        # chi2 compares only where the models are held equally tightly.
+        level = min(t.fit.level for t in trials)
+        trials = [replace(t, compared=at_level(t.fit, level)) for t in trials]
+        unit = min(trials, key=lambda t: t.compared.chi2).compared.inflation(at_level(current.part, level))
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit), 3))
         least = trials[0].criterion(unit)
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in trials if t.criterion(unit) - least <= 2 * NATS):
-            ratio = cost_improvement(cost, held_cost(trial.fit, held), held)
+            ratio = self._held_ratio(current.part, trial.fit)
             whole = self._try(current.whole, trial.candidates, trial.amplitudes) if ratio[2] < 1.0 else None
-            if whole is None or whole.fit.level < current.whole.level:
+            if whole is None:
                 continue
-            fall = (current.whole.chi2 - whole.fit.chi2) / whole.fit.inflation(current.whole)
+            before, after = self._level(current.whole, whole.fit)
+            fall = (before.chi2 - after.chi2) / after.inflation(before)
             p = min(float(chi2.sf(fall, len(trial.amplitudes))) * looks, 1.0)
             if p >= ALPHA:
                 continue
             try:
-                after = self.errors(trial.fit)
+                errors = self.errors(trial.fit)
             except FitError:
                 continue
-            if not self._worse(current.errors, after):
+            if not self._worse(current.errors, errors):
                 others = self._alternatives(trial, trials, scanned, unit)
-                return Step(trial.candidates, fall, p, ratio, others), State(trial.fit, whole.fit, after)
+                return Step(trial.candidates, fall, p, ratio, others), State(trial.fit, whole.fit, errors)
         return None
+
+    def _level(self, one: Fit, other: Fit) -> tuple[Fit, Fit]:
+        """Two fits of the same data, held equally tightly."""
+        level = min(one.level, other.level)
+        return at_level(one, level), at_level(other, level)
+
+    def _held_ratio(self, before: Fit, after: Fit) -> tuple[float, float, float]:
+        """Cost of the held-out frames after over before, all parameters held, with its 95 % interval."""
+        record = self.record.part(self.held)
+        level = min(before.level, after.level)
+        costs = self._level(held(before, record, level), held(after, record, level))
+        return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), record)
 
     def _worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""

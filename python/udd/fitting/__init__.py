@@ -5,17 +5,19 @@ from __future__ import annotations
 from .fit import extend, fit, fit_record
 from .problem import Fit, data_of
 from .record import Record, record_of
-from .solve import filtered, held_cost, loosened, predicted
+from .solve import at_level, filtered, frame_costs, held, loosened, predicted
 
 __all__ = [
     "Fit",
     "Record",
+    "at_level",
     "data_of",
     "extend",
     "filtered",
     "fit",
     "fit_record",
-    "held_cost",
+    "frame_costs",
+    "held",
     "loosened",
     "predicted",
     "record_of",

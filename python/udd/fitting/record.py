@@ -68,7 +68,7 @@ class Record:
     origins: tuple[float, ...]
 
     def part(self, frames: slice | NDArray[Any]) -> Record:
-        """Some frames: a slice, a mask or numbers that increase. Those that do not follow one another are not linked."""
+        """Some frames: a slice, a mask or increasing numbers. Only those that follow one another are linked."""
         chosen = np.arange(len(self.t))[frames]
         follow = np.diff(chosen) == 1
         return replace(
@@ -183,7 +183,7 @@ def _fill(
 
 
 def _odd(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Frames far from the cubic through the two before and the two after, in any channel (its noise: `sigma`)."""
+    """Frames far from the cubic through the two before and the two after, in any channel (noise `sigma`)."""
     n = len(guess)
     odd = np.zeros(n, dtype=bool)
     inside = np.zeros(n, dtype=bool)

@@ -108,8 +108,10 @@ def predicted(
 def filtered(
     fitted: Fit, record: Record, windows: NDArray[np.int64], diffusion: Sequence[float]
 ) -> tuple[Array, Array, Array]:
-    """From windows of frames alone, with a fit's parameters: the states at the first and at the last frame, and
-    the latter's covariance."""
+    """From windows of frames alone: the states at the first and the last frame, the latter's covariance.
+
+    All parameters are a fit's.
+    """
     data = data_of(record, replace(fitted.noise, weight=np.ones(len(record.t))), record.states[:, 0])
     pairs = [(int(a), int(b)) for a, b in windows]
     return _core.filter(fitted.model, data, (record.states, list(fitted.point.sets)), list(diffusion), pairs)
@@ -148,14 +150,27 @@ def loosened(fitted: Fit, scatter: float) -> Fit:
     return result
 
 
-def held_cost(fitted: Fit, record: Record) -> Array:
-    """Cost of every frame of another record, with all parameters held and the states free.
+def at_level(fitted: Fit, level: int) -> Fit:
+    """The same model, held as tightly as a level of the schedule says."""
+    if level == fitted.level:
+        return fitted
+    problem = replace(fitted.problem, diffusion=fitted.problem.schedule[level])
+    return solve(fitted.measurements, problem, fitted.point)
 
-    Parameters
-    ----------
-    fitted : Fit
-        Its parameters, camera and noise are held.
-    record : Record
+
+def held(fitted: Fit, record: Record, level: int) -> Fit:
+    """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
+
+    A wrong model may not get that far: the level of the result says how far it got.
+    """
+    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
+    problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
+    start = replace(fitted.point, states=record.states)
+    return tighten(fitted.measurements, problem, start, problem.schedule[: level + 1])
+
+
+def frame_costs(fitted: Fit) -> Array:
+    """Cost of every frame of a fit.
 
     Returns
     -------
@@ -163,15 +178,12 @@ def held_cost(fitted: Fit, record: Record) -> Array:
         Squared misfit of a frame in units of the noise, with the squared defect of the link that leaves it in
         units of the model's assumed error.
     """
-    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
-    problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
-    start = replace(fitted.point, states=record.states)
-    end = tighten(fitted.measurements, problem, start, problem.schedule)
-    information = problem.noise.information(record, end.states[:, 0])
-    misfit = np.nan_to_num(end.misfit)
+    record, problem = fitted.record, fitted.problem
+    information = problem.noise.information(record, fitted.states[:, 0])
+    misfit = np.nan_to_num(fitted.misfit)
     cost: Array = np.einsum("ni,nij,nj->n", misfit, information, misfit)
     # A defect is kept per second; its variance over a link of length dt is diffusion^2 dt.
     dt = np.abs(np.diff(record.t))[:, None]
-    links = np.nan_to_num(end.defect) ** 2 * dt / np.array(end.problem.diffusion) ** 2
+    links = np.nan_to_num(fitted.defect) ** 2 * dt / np.array(problem.diffusion) ** 2
     cost[:-1] += links.sum(axis=1)
     return cost
