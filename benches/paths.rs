@@ -7,6 +7,7 @@ use criterion::{Criterion, Throughput};
 use nalgebra::{SMatrix, SVector};
 use rayon::ThreadPoolBuilder;
 use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, Set};
+use udd::formula::{Expression, Names};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
 use udd::model::{DiskFamily, DleFamily, Family};
@@ -14,7 +15,6 @@ use udd::run::{
     Crew, Ensemble, Lyapunov, LyapunovOptions, Output, Section, Sections, Stepper, Stop, trajectory,
 };
 use udd::scalar::Isa;
-use udd::tape::{Expression, Names};
 
 /// One piece of work, always the same, on one thread.
 struct Path {
@@ -76,7 +76,8 @@ fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
     let units = (count * values.len()) as u64;
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "B"]));
-    let function = Expression::parse("z", Names { states: &states, parameters: &parameters }).unwrap();
+    let function =
+        Expression::parse("z", Names { states: &states, parameters: &parameters, rates: true }).unwrap();
     let surface = [Section { function, rising: true, falling: false }];
     let work = move |isa| {
         let wanted = Sections {

@@ -1,7 +1,7 @@
 //! The core of `udd`, the laboratory of the upward-driven disk.
 //!
 //! Data flows one way; nothing below knows what stands above it:
-//! [`scalar`] (what a number is) → [`model`] (what is integrated) → [`integrate`] (how a step is
+//! [`scalar`] (what a number is) → [`formula`] (what a user writes) → [`model`] (what is integrated) → [`integrate`] (how a step is
 //! taken) → [`observe`] (what is seen on the way) → [`run`] (who drives it) → [`estimate`] (what
 //! measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
 
@@ -9,6 +9,7 @@
 #![allow(clippy::needless_range_loop)]
 
 pub mod estimate;
+pub mod formula;
 pub mod integrate;
 pub mod model;
 pub mod observe;

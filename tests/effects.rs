@@ -28,15 +28,15 @@ fn values(effect: &Effect, amplitude: f64) -> Vec<f64> {
         Role::Amplitude => amplitude,
         _ => p.default,
     };
-    effect.kind.spec().parameters.iter().map(of).collect()
+    effect.kind().unwrap().spec().parameters.iter().map(of).collect()
 }
 
-fn family(effect: Effect) -> DiskFamily {
-    DiskFamily { effects: vec![effect], edge: false }
+fn family(effect: &Effect) -> DiskFamily {
+    DiskFamily { effects: vec![effect.clone()], edge: false }
 }
 
-fn with(effect: Effect, amplitude: f64) -> Disk<f64> {
-    family(effect).build(&[&PLAIN[..], &values(&effect, amplitude)].concat())
+fn with(effect: &Effect, amplitude: f64) -> Disk<f64> {
+    family(effect).build(&[&PLAIN[..], &values(effect, amplitude)].concat())
 }
 
 fn rates<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: &[S; D]) -> [S; D] {
@@ -86,7 +86,7 @@ proptest! {
     fn zero_amplitude_changes_nothing((t, x) in anywhere()) {
         let plain = rates(&DiskFamily { effects: vec![], edge: false }.build(&PLAIN), t, &x);
         for effect in all() {
-            let changed = rates(&with(effect, 0.0), t, &x);
+            let changed = rates(&with(&effect, 0.0), t, &x);
             for n in 0..4 {
                 // The terms of the third equation are summed in another order.
                 prop_assert!((changed[n] - plain[n]).abs() <= 1e-13 * (1.0 + plain[n].abs()), "{effect:?}");
@@ -98,9 +98,9 @@ proptest! {
     fn an_amplitude_changes_the_equation_it_enters((t, x) in anywhere()) {
         let plain = rates(&DiskFamily { effects: vec![], edge: false }.build(&PLAIN), t, &x);
         for effect in all() {
-            let changed = rates(&with(effect, 0.1), t, &x);
+            let changed = rates(&with(&effect, 0.1), t, &x);
             let differs = |n: usize| (changed[n] - plain[n]).abs() > 1e-12;
-            let spec = effect.kind.spec();
+            let spec = effect.kind().unwrap().spec();
             let has = |slot| spec.slots.contains(&slot);
             prop_assert!(has(Slot::Lateral) || !differs(1), "{effect:?} changes dY/dT");
             prop_assert!(has(Slot::Vertical) || !differs(2), "{effect:?} changes dZ/dT");
@@ -121,12 +121,12 @@ proptest! {
                 let at = |shift: f64| {
                     let (mut x, mut p) = (x, plain.clone());
                     if i < 4 { x[i] += shift } else { p[i - 4] += shift }
-                    rates(&family(effect).build(&p), t, &x)
+                    rates(&family(&effect).build(&p), t, &x)
                 };
                 let tagged = |value: f64, mine: bool| if mine { N::variable(value, 0) } else { N::fixed(value) };
                 let p: Vec<N> = plain.iter().enumerate().map(|(k, &v)| tagged(v, i == 4 + k)).collect();
                 let state = from_fn(|k| tagged(x[k], i == k));
-                let exact = rates(&family(effect).build(&p), N::fixed(t), &state);
+                let exact = rates(&family(&effect).build(&p), N::fixed(t), &state);
                 let size = if i < 4 { x[i] } else { plain[i - 4] }.abs();
                 // Fourth-order differences over 3e-4 of a typical size.
                 let h = 3e-4 * size.max(0.01);
@@ -154,7 +154,7 @@ proptest! {
         let [w, radius, g, k0, k1, k2] = PLAIN;
         for effect in all() {
             let own = values(&effect, 0.1);
-            let flow = rates(&with(effect, 0.1), t, &x);
+            let flow = rates(&with(&effect, 0.1), t, &x);
             let time = N { re: t, d: [1.0] };
             let [omega, y, z, beta]: [N; 4] = from_fn(|n| N { re: x[n], d: [flow[n]] });
             let speed = if x[0] > 0.0 { omega } else { -omega };
@@ -166,7 +166,7 @@ proptest! {
                 w: N::fixed(w), g: N::fixed(g), radius: N::fixed(radius),
                 contact: Contact { sign: N::fixed(x[0].signum()), bristle: N::fixed(0.0) },
             };
-            let term = &Term::list(&[effect], &own)[0];
+            let term = &Term::list(std::slice::from_ref(&effect), &own)[0];
             let mut slots = Slots::default();
             term.enter(&N::fixed, &at, &mut slots);
 
@@ -195,7 +195,7 @@ fn sensitivities_of_runs_agree_with_differences() {
     let x0 = [0.0, 1e-3, 0.04, 0.3];
     let tight = Tolerance { rtol: 1e-12, atol: 1e-14 };
     for effect in all() {
-        for (i, p) in effect.kind.spec().parameters.iter().enumerate() {
+        for (i, p) in effect.kind().unwrap().spec().parameters.iter().enumerate() {
             if p.role != Role::Amplitude {
                 continue;
             }
@@ -203,12 +203,12 @@ fn sensitivities_of_runs_agree_with_differences() {
             let run = |by: f64| {
                 let mut p = plain.clone();
                 p[6 + i] += by;
-                propagate(&family(effect).build(&p), 0.0, 0.5, x0, &tight).unwrap()
+                propagate(&family(&effect).build(&p), 0.0, 0.5, x0, &tight).unwrap()
             };
             let tagged: Vec<N> =
                 (0..plain.len()).map(|k| N { re: plain[k], d: [f64::from(k == 6 + i)] }).collect();
             let exact =
-                propagate(&family(effect).build(&tagged), 0.0, 0.5, x0.map(N::fixed), &tight).unwrap();
+                propagate(&family(&effect).build(&tagged), 0.0, 0.5, x0.map(N::fixed), &tight).unwrap();
             let h = 1e-5;
             let (up, down) = (run(h), run(-h));
             for n in 0..4 {
@@ -233,9 +233,9 @@ fn effects_act_alike_on_pendulum_and_disk() {
         let own = values(&effect, 0.1);
         let (length, theta) = (0.05, 0.4f64);
         let inertia = 0.0032 + length * length;
-        let pendulum = PendulumFamily { effects: vec![effect] }
+        let pendulum = PendulumFamily { effects: vec![effect.clone()] }
             .build(&[&[length, inertia, 9.81, 0.012][..], &own].concat());
-        let disk = DiskFamily { effects: vec![effect], edge: false }
+        let disk = DiskFamily { effects: vec![effect.clone()], edge: false }
             .build(&[&[0.0, 0.08, 9.81, 0.012, 0.012, 0.0][..], &own].concat());
         // The same place and speed; gravity's own torque, opposite by the models' conventions, is left out.
         for omega in [-2.0, 0.5] {

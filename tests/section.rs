@@ -5,11 +5,12 @@ mod counting;
 use std::sync::atomic::AtomicUsize;
 
 use counting::allocations;
+use udd::formula::{Expression, Names, Place};
 use udd::integrate::{Dopri5, Driver, Taylor, Tolerance};
 use udd::model::{DiskFamily, DleFamily, Family};
 use udd::run::{Crew, Crossings, Ended, Output, Section, Sections, Stop, trajectory};
 use udd::scalar::Isa;
-use udd::tape::{Expression, Names, Place, Tape};
+use udd::tape::Tape;
 
 const TIGHT: Tolerance = Tolerance { rtol: 1e-13, atol: 1e-15 };
 const START: [f64; 3] = [1.0, 1.0, 0.01];
@@ -25,7 +26,8 @@ fn section<F: Family<D>, const D: usize>(family: &F, text: &str, direction: i32)
         _ => names(&["Omega", "Y", "Z", "beta"]),
     };
     let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
-    let function = Expression::parse(text, Names { states: &states, parameters: &parameters }).unwrap();
+    let function =
+        Expression::parse(text, Names { states: &states, parameters: &parameters, rates: true }).unwrap();
     Section { function, rising: direction >= 0, falling: direction <= 0 }
 }
 
@@ -291,7 +293,7 @@ fn laws_without_a_series_have_sections_too() {
 
 fn value(text: &str) -> f64 {
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "tilt.angle"]));
-    let names = Names { states: &states, parameters: &parameters };
+    let names = Names { states: &states, parameters: &parameters, rates: true };
     let parsed = Expression::parse(text, names).unwrap_or_else(|mistake| panic!("{text} {mistake}"));
     let place = Place { t: 0.25, x: &[2.0, -3.0, 0.5], rates: &[7.0, 11.0, 13.0], parameters: &[5.0, 0.1] };
     parsed.value(&place, &mut parsed.stack())
@@ -299,7 +301,9 @@ fn value(text: &str) -> f64 {
 
 fn mistake(text: &str) -> String {
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w"]));
-    Expression::parse(text, Names { states: &states, parameters: &parameters }).unwrap_err().to_string()
+    Expression::parse(text, Names { states: &states, parameters: &parameters, rates: true })
+        .unwrap_err()
+        .to_string()
 }
 
 #[test]
@@ -321,6 +325,12 @@ fn formulas_mean_what_they_do_on_paper() {
         ("1e3 + .5 + 2.E-1", 1000.7),
         ("cos(pi)", -1.0),
         ("y^3", -27.0),
+        ("tan(z) - sin(z)/cos(z)", 0.0),
+        ("sinh(z)^2 - cosh(z)^2", -1.0),
+        ("log(omega) - ln(2)", 0.0),
+        ("bspline(z) - (1.5^3 - 4*0.5^3)/6", 0.0),
+        ("bspline(-2*z)", 1.0 / 6.0),
+        ("bspline(y)", 0.0),
         ("+z", 0.5),
     ] {
         assert!((value(text) - wanted).abs() < 1e-15 * wanted.abs().max(1.0), "{text}: {}", value(text));
@@ -350,9 +360,9 @@ fn mistakes_are_named() {
     ] {
         assert!(mistake(text).contains(wanted), "{text}: {}", mistake(text));
     }
-    assert!(mistake(&"z+".repeat(600)).contains("longer than 1000 characters"));
+    assert!(mistake(&"z+".repeat(6000)).contains("longer than 10000 characters"));
     for open in ["(", "-", "sin(", "2^"] {
-        assert!(mistake(&format!("{}z", open.repeat(200))).contains("nested deeper than 50"), "{open}");
+        assert!(mistake(&format!("{}z", open.repeat(200))).contains("nested deeper than 100"), "{open}");
     }
 }
 

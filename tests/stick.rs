@@ -427,7 +427,7 @@ fn methods_agree_on_when_it_sticks() {
         // Errors of 1e-12 a step, which the disk amplifies while it slides.
         assert!(count > 10 && apart < 1e-9, "{treatment:?}: {count} events, {apart:e}");
         let ripple = Effect::new(Kind::DriveRipple);
-        let disk = DiskFamily { effects: vec![dry[0], ripple], edge: false };
+        let disk = DiskFamily { effects: vec![dry[0].clone(), ripple], edge: false };
         let values = [&DISK[..], &[0.02, 0.05, -0.9, 0.0, 10.0]].concat();
         let (count, apart) = events(&disk, &values, [0.0, 1.7e-3, 0.0, 0.0]);
         assert!(count > 50 && apart < 1e-8, "{treatment:?}: {count} events, {apart:e}");

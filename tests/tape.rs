@@ -31,7 +31,7 @@ fn values(effect: &Effect, amplitude: f64) -> Vec<f64> {
         Role::Amplitude => amplitude,
         _ => p.default,
     };
-    effect.kind.spec().parameters.iter().map(of).collect()
+    effect.kind().unwrap().spec().parameters.iter().map(of).collect()
 }
 
 /// The disk without effects, with each one, and with all torques at once.

@@ -1,10 +1,10 @@
-"""What is integrated: the equations of the paper, and of a pendulum."""
+"""What is integrated: the equations of the paper, of a pendulum, and of the user."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,23 +12,81 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import array, number
 from udd.effects import Effect
+from udd.effects.specs import Own
 from udd.errors import ModelError
+
+if TYPE_CHECKING:
+    from udd._expressions import Expression
+    from udd.own_models import OwnModel
 
 __all__ = ["DLE", "Disk", "Model", "Pendulum"]
 
 
 class Model:
-    """What all models have in common. Models are immutable: changes make a new one."""
+    """A model of the user's own; and what all models have in common.
+
+    Models are immutable: changes make a new one.
+
+    Parameters
+    ----------
+    states : sequence of str
+        The names of the state's components, 1 to 6.
+    equations : mapping of str to formula, or sequence of formula
+        The rate of each state: text or a SymPy expression of the states, the parameters, the time ``t``,
+        numbers and ``pi``, with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``,
+        ``sinh``, ``cosh``, ``tanh``, ``abs`` and ``bspline``, the cardinal cubic B-spline.
+    parameters : mapping of str to float, optional
+        The parameters' values.
+    angles : iterable of str
+        The states that are angles in rad: they may grow without end.
+
+    Raises
+    ------
+    ModelError
+        A name that a formula may not use, a state without an equation, a value that is not finite.
+
+    Notes
+    -----
+    The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
+
+    Examples
+    --------
+    >>> import udd
+    >>> lorenz = udd.Model(
+    ...     ["x", "y", "z"],
+    ...     {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
+    ...     {"sigma": 10.0, "rho": 28.0, "beta": 8 / 3},
+    ... )
+    >>> lorenz.rates(0.0, [1.0, 2.0, 3.0])
+    array([10., 23., -6.])
+    >>> udd.simulate(lorenz, 1.0, [1.0, 1.0, 1.0], method="taylor").outcome
+    'finished'
+    """
 
     kind: ClassVar[str]
-    """``"dle"``, ``"disk"`` or ``"pendulum"``."""
+    """``"dle"``, ``"disk"``, ``"pendulum"`` or ``"own"``."""
     state_names: ClassVar[tuple[str, ...]]
     """The names of the state's components, in order."""
     state_units: ClassVar[tuple[str, ...]]
     """Their units, empty where dimensionless."""
+    angles: ClassVar[tuple[str, ...]] = ()
+    """The components that are angles: they may grow without end."""
     _plain: ClassVar[tuple[str, ...]]
     _options: ClassVar[tuple[str, ...]] = ("effects",)
     effects: tuple[Effect, ...]
+
+    def __new__(
+        cls,
+        states: Sequence[str],
+        equations: Mapping[str, Expression] | Sequence[Expression],
+        parameters: Mapping[str, float] | None = None,
+        *,
+        angles: Iterable[str] = (),
+    ) -> OwnModel:
+        """A user's own model is one of a subclass, like those that are built in."""
+        from udd.own_models import OwnModel
+
+        return OwnModel.__new__(OwnModel)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -41,12 +99,13 @@ class Model:
     @property
     def units(self) -> dict[str, str]:
         """The unit of every parameter, empty where dimensionless."""
-        return dict(_core.model_parameters(self))
+        own = {f"{e.name}.{p.name}": p.unit for e in self.effects if e.made for p in e.spec.parameters}
+        return dict(_core.model_parameters(self)) | own
 
     @property
-    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None, str | None]], bool]:
+    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None, str | None, Own | None]], bool]:
         """What the core needs to know."""
-        effects = [(effect.name, effect.momentum, effect.treatment) for effect in self.effects]
+        effects = [(e.name, e.momentum, e.treatment, e.spec.own) for e in self.effects]
         return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
@@ -200,8 +259,16 @@ class Model:
         return new.with_parameters(dotted) if dotted else new
 
 
+class _BuiltIn(Model):
+    """A model whose law is compiled into the core."""
+
+    def __new__(cls, *_arguments: Any, **_options: Any) -> Self:
+        """Leave everything to the initialisation, which a copy or a pickle does not need."""
+        return object.__new__(cls)
+
+
 @dataclass(frozen=True)
-class DLE(Model):
+class DLE(_BuiltIn):
     """The diffusionless Lorenz equations, dimensionless, for the state ``[omega, y, z]``.
 
     ::
@@ -256,7 +323,7 @@ class DLE(Model):
 
 
 @dataclass(frozen=True)
-class Disk(Model):
+class Disk(_BuiltIn):
     """The upward-driven disk, per unit mass, for the state ``[Omega, Y, Z, beta]`` in rad/s, m, m, rad.
 
     ::
@@ -302,6 +369,7 @@ class Disk(Model):
     kind: ClassVar[str] = "disk"
     state_names: ClassVar[tuple[str, ...]] = ("Omega", "Y", "Z", "beta")
     state_units: ClassVar[tuple[str, ...]] = ("rad/s", "m", "m", "rad")
+    angles: ClassVar[tuple[str, ...]] = ("beta",)
     _plain: ClassVar[tuple[str, ...]] = ("W", "R", "g", "k0", "k1", "k2")
     _options: ClassVar[tuple[str, ...]] = ("effects", "edge")
 
@@ -325,7 +393,7 @@ class Disk(Model):
 
 
 @dataclass(frozen=True, init=False)
-class Pendulum(Model):
+class Pendulum(_BuiltIn):
     """A pendulum, per unit mass, for the state ``[Omega, theta]`` in rad/s, rad, with ``theta = 0`` hanging.
 
     ::
@@ -360,6 +428,7 @@ class Pendulum(Model):
     kind: ClassVar[str] = "pendulum"
     state_names: ClassVar[tuple[str, ...]] = ("Omega", "theta")
     state_units: ClassVar[tuple[str, ...]] = ("rad/s", "rad")
+    angles: ClassVar[tuple[str, ...]] = ("theta",)
     _plain: ClassVar[tuple[str, ...]] = ("length", "inertia", "g", "k0")
 
     length: float

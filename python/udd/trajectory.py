@@ -181,7 +181,9 @@ def method_for(model: Model, method: str, rtol: float) -> str:
     effects = getattr(model, "effects", ())
     if any(getattr(effect, "treatment", "smoothed") not in (None, "smoothed") for effect in effects):
         return "dop853" if rtol <= 1e-8 else "dopri5"
-    return "taylor"
+    # A law that a user wrote may depend on comparisons.
+    written = model.kind == "own" or any(effect.made for effect in effects)
+    return "dop853" if written and not _core.has_series(model) else "taylor"
 
 
 def tolerances(rtol: float, atol: float) -> tuple[float, float]:
@@ -194,7 +196,7 @@ def tolerances(rtol: float, atol: float) -> tuple[float, float]:
 def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
     """A checked initial state."""
     if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
     state = array("state0", state0)
     if state.shape != (len(model.state_names),):
         raise ModelError(
@@ -219,7 +221,7 @@ def simulate(
     Parameters
     ----------
     model : Model
-        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+        :class:`udd.DLE`, :class:`udd.Disk`, :class:`udd.Pendulum` or a user's own :class:`udd.Model`.
     t : array_like, shape (n,), or float
         Times at which the state is wanted, increasing; the first is the initial time. A number is the
         end of a run from 0, of which the states after all accepted steps are given.

@@ -9,6 +9,7 @@ mod bristle;
 mod disk;
 mod dle;
 pub mod effects;
+mod own;
 mod pendulum;
 pub mod stick;
 
@@ -16,6 +17,7 @@ pub use bristle::Bristled;
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
 pub use effects::{Effect, Momentum, Treatment};
+pub use own::{Own, OwnFamily};
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick::Sticking;
 

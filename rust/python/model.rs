@@ -1,14 +1,18 @@
 //! Models as Python hands them over.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 
 use super::errors::ModelError;
-use crate::model::effects::{Body, Kind, Slot, Treatment};
+use crate::formula::is_reserved;
+use crate::model::effects::{Body, Formula, Kind, Slot, Source, Treatment};
 use crate::model::{
-    Bristled, DiskFamily, DleFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of,
+    Bristled, DiskFamily, DleFamily, Effect, Family, Momentum, OwnFamily, PendulumFamily, System, sides_of,
 };
+use crate::run::rows::tape;
 
 /// Any model with its parameter values, in the order of its family's parameters.
 #[derive(Clone, Debug)]
@@ -19,6 +23,13 @@ pub enum AnyModel {
     /// With LuGre friction, whose bristles are one more state.
     BristledDisk(Bristled<DiskFamily>, Vec<f64>),
     BristledPendulum(Bristled<PendulumFamily>, Vec<f64>),
+    /// The user's own, by the number of states.
+    Own1(OwnFamily<1>, Vec<f64>),
+    Own2(OwnFamily<2>, Vec<f64>),
+    Own3(OwnFamily<3>, Vec<f64>),
+    Own4(OwnFamily<4>, Vec<f64>),
+    Own5(OwnFamily<5>, Vec<f64>),
+    Own6(OwnFamily<6>, Vec<f64>),
 }
 
 /// Runs the expression with the model's family and values, whatever its dimension.
@@ -30,6 +41,12 @@ macro_rules! with_model {
             $crate::python::model::AnyModel::Pendulum($family, $values) => $body,
             $crate::python::model::AnyModel::BristledDisk($family, $values) => $body,
             $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
+            $crate::python::model::AnyModel::Own1($family, $values) => $body,
+            $crate::python::model::AnyModel::Own2($family, $values) => $body,
+            $crate::python::model::AnyModel::Own3($family, $values) => $body,
+            $crate::python::model::AnyModel::Own4($family, $values) => $body,
+            $crate::python::model::AnyModel::Own5($family, $values) => $body,
+            $crate::python::model::AnyModel::Own6($family, $values) => $body,
         }
     };
 }
@@ -52,8 +69,10 @@ macro_rules! with_wide_model {
 }
 pub(crate) use with_wide_model;
 
-/// An effect's name, momentum and treatment.
-type EffectSpec = (String, Option<String>, Option<String>);
+/// The slot of a user's own effect, its formula, its parameters' names, and those of the amplitudes.
+type FormulaSpec = (String, String, Vec<String>, Vec<String>);
+/// An effect's name, momentum and treatment, and its formula where it is a user's own.
+type EffectSpec = (String, Option<String>, Option<String>, Option<FormulaSpec>);
 /// What a Python model's `_spec` holds: kind, values, effects, edge.
 type Spec = (String, Vec<f64>, Vec<EffectSpec>, bool);
 
@@ -69,7 +88,7 @@ impl AnyModel {
                     || error.is_instance_of::<PyTypeError>(py) =>
             {
                 return Err(ModelError::new_err(format!(
-                    "a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {}",
+                    "a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {}",
                     model.get_type().name()?
                 )));
             }
@@ -78,24 +97,22 @@ impl AnyModel {
         };
         let effects = effects.iter().map(effect).collect::<PyResult<Vec<_>>>()?;
         let bristles = bristled(&effects)?;
+        if kind == "disk" {
+            able(&effects, Body::Disk)?;
+        }
         let model = match kind.as_str() {
             "dle" => AnyModel::Dle(DleFamily, values),
             "disk" if bristles => AnyModel::BristledDisk(Bristled(DiskFamily { effects, edge }), values),
             "disk" => AnyModel::Disk(DiskFamily { effects, edge }, values),
             "pendulum" => {
-                if let Some(other) =
-                    effects.iter().find(|effect| !effect.kind.spec().bodies.contains(&Body::Pendulum))
-                {
-                    let name = other.kind.spec().name;
-                    let message = format!("the effect {name} acts on a disk, not on a pendulum");
-                    return Err(ModelError::new_err(message));
-                }
+                able(&effects, Body::Pendulum)?;
                 let family = PendulumFamily { effects };
                 match bristles {
                     true => AnyModel::BristledPendulum(Bristled(family), values),
                     false => AnyModel::Pendulum(family, values),
                 }
             }
+            "own" => own(&model.getattr("_own")?.extract()?, values)?,
             _ => return Err(ModelError::new_err(format!("unknown kind of model: {kind}"))),
         };
         let wanted = with_model!(&model, |family, _values| family.parameters().len());
@@ -110,14 +127,14 @@ impl AnyModel {
     pub fn to_fit(model: &Bound<'_, PyAny>) -> PyResult<Self> {
         let model = Self::from_python(model)?;
         let effects: &[Effect] = match &model {
-            AnyModel::Dle(..) => &[],
             AnyModel::Disk(family, _) | AnyModel::BristledDisk(Bristled(family), _) => &family.effects,
             AnyModel::Pendulum(family, _) | AnyModel::BristledPendulum(Bristled(family), _) => {
                 &family.effects
             }
+            _ => &[],
         };
         if let Some(effect) = effects.iter().find(|effect| effect.treatment != Treatment::Smoothed) {
-            let (name, treatment) = (effect.kind.spec().name, effect.treatment.name());
+            let (name, treatment) = (effect.name(), effect.treatment.name());
             return Err(ModelError::new_err(format!(
                 "a fit needs smoothed friction: give {name} the treatment smoothed, not {treatment}"
             )));
@@ -125,9 +142,77 @@ impl AnyModel {
         Ok(model)
     }
 
+    /// The names of the state's components, and which of them are angles, which may grow without end.
+    pub fn states(&self) -> Vec<(String, bool)> {
+        let names: &[&str] = match self {
+            AnyModel::Dle(..) => &["omega", "y", "z"],
+            AnyModel::Disk(..) => &["Omega", "Y", "Z", "beta"],
+            AnyModel::Pendulum(..) => &["Omega", "theta"],
+            AnyModel::BristledDisk(..) => &["Omega", "Y", "Z", "beta", "bristle"],
+            AnyModel::BristledPendulum(..) => &["Omega", "theta", "bristle"],
+            AnyModel::Own1(family, _) => return family.states(),
+            AnyModel::Own2(family, _) => return family.states(),
+            AnyModel::Own3(family, _) => return family.states(),
+            AnyModel::Own4(family, _) => return family.states(),
+            AnyModel::Own5(family, _) => return family.states(),
+            AnyModel::Own6(family, _) => return family.states(),
+        };
+        names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
+    }
+
     /// The parameter values.
     pub fn values(&self) -> &[f64] {
         with_model!(self, |_family, values| values)
+    }
+}
+
+/// What a user's own model consists of: the states' names, the rates' formulas, the parameters' names.
+/// and which states are angles.
+type OwnSpec = (Vec<String>, Vec<String>, Vec<String>, Vec<String>);
+
+fn own((states, equations, parameters, angles): &OwnSpec, values: Vec<f64>) -> PyResult<AnyModel> {
+    for (i, name) in states.iter().chain(parameters).enumerate() {
+        let what = if i < states.len() { "state" } else { "parameter" };
+        if is_reserved(name) {
+            let message =
+                format!("a {what} cannot be called {name}, which means something else in a formula");
+            return Err(ModelError::new_err(message));
+        }
+        if states.iter().chain(parameters).filter(|other| *other == name).count() > 1 {
+            return Err(ModelError::new_err(format!("the name {name} is given twice")));
+        }
+    }
+    if states.len() != equations.len() {
+        let message = format!("there are {} states but {} equations", states.len(), equations.len());
+        return Err(ModelError::new_err(message));
+    }
+    let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
+    macro_rules! parsed {
+        ($($d:literal $Own:ident),+) => {
+            match states.len() {
+                $($d => OwnFamily::<$d>::parse(states, &texts, parameters)
+                    .map(|family| AnyModel::$Own(family.with_angles(angles), values)),)+
+                n => return Err(ModelError::new_err(format!("a model has 1 to 6 states, not {n}"))),
+            }
+        };
+    }
+    parsed!(1 Own1, 2 Own2, 3 Own3, 4 Own4, 5 Own5, 6 Own6)
+        .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
+}
+
+/// Refuses effects that this body cannot have.
+fn able(effects: &[Effect], body: Body) -> PyResult<()> {
+    match effects.iter().find(|effect| !effect.bodies().contains(&body)) {
+        None => Ok(()),
+        Some(other) => {
+            let bodies: Vec<_> = other.bodies().iter().map(|body| body.name()).collect();
+            Err(ModelError::new_err(format!(
+                "the effect {} acts on a {}, not on a {}",
+                other.name(),
+                bodies.join(" or "),
+                body.name()
+            )))
+        }
     }
 }
 
@@ -137,21 +222,26 @@ fn bristled(effects: &[Effect]) -> PyResult<bool> {
     if !effects.iter().any(|effect| bristles(&effect)) {
         return Ok(false);
     }
-    if effects.iter().any(|effect| effect.kind.dry() && !bristles(&effect)) {
+    if effects.iter().any(|effect| effect.kind().is_some_and(Kind::dry) && !bristles(&effect)) {
         let message =
             "where one effect has the treatment lugre all dry friction must have it: it shares the bristles";
         return Err(ModelError::new_err(message));
     }
-    if !effects.iter().filter(bristles).any(|effect| effect.kind == Kind::Coulomb) {
+    if !effects.iter().filter(bristles).any(|effect| effect.kind() == Some(Kind::Coulomb)) {
         let message = "stribeck with the treatment lugre needs coulomb beside it: without friction at speed the bristles would follow any motion at once";
         return Err(ModelError::new_err(message));
     }
     Ok(true)
 }
 
-fn effect((name, momentum, treatment): &EffectSpec) -> PyResult<Effect> {
-    let kind = Kind::ALL.iter().copied().find(|kind| kind.spec().name == name);
-    let kind = kind.ok_or_else(|| ModelError::new_err(format!("no effect is called {name}")))?;
+fn effect((name, momentum, treatment, formula): &EffectSpec) -> PyResult<Effect> {
+    let effect = match formula {
+        Some(own) => Effect::formula(Arc::new(self::formula(name, own)?)),
+        None => {
+            let kind = Kind::ALL.iter().copied().find(|kind| kind.spec().name == name);
+            Effect::new(kind.ok_or_else(|| ModelError::new_err(format!("no effect is called {name}")))?)
+        }
+    };
     let momentum = match momentum.as_deref() {
         None => None,
         Some("consistent") => Some(Momentum::Consistent),
@@ -162,20 +252,43 @@ fn effect((name, momentum, treatment): &EffectSpec) -> PyResult<Effect> {
             )));
         }
     };
-    let velocity = kind.spec().slots.iter().any(|slot| matches!(slot, Slot::Lateral | Slot::Vertical));
-    if velocity != momentum.is_some() || momentum.is_some_and(|m| !kind.spec().momenta.contains(&m)) {
+    let allowed = match &effect.source {
+        Source::Library(kind) => momentum.is_none_or(|m| kind.spec().momenta.contains(&m)),
+        Source::Formula(_) => true,
+    };
+    // An effect enters the momentum by default where it can at all.
+    if effect.momentum.is_some() != momentum.is_some() || !allowed {
         return Err(ModelError::new_err(format!("the effect {name} cannot enter the momentum that way")));
     }
     let treatment = match treatment.as_deref() {
         None => Treatment::Smoothed,
         Some(given) => {
             let found = Treatment::ALL.iter().copied().find(|treatment| treatment.name() == given);
-            found.filter(|_| kind.dry()).ok_or_else(|| {
+            found.filter(|_| effect.kind().is_some_and(Kind::dry)).ok_or_else(|| {
                 ModelError::new_err(format!("the effect {name} has no treatment called {given}"))
             })?
         }
     };
-    Ok(Effect::new(kind).with_momentum(momentum).with_treatment(treatment))
+    Ok(effect.with_momentum(momentum).with_treatment(treatment))
+}
+
+/// A user's own effect.
+fn formula(name: &str, (slot, text, parameters, amplitudes): &FormulaSpec) -> PyResult<Formula> {
+    let found = Slot::ALL.iter().copied().find(|known| known.name() == slot);
+    let slot = found.ok_or_else(|| {
+        let known: Vec<_> = Slot::ALL.iter().map(|slot| slot.name()).collect();
+        ModelError::new_err(format!("the slot must be one of {}, not {slot:?}", known.join(", ")))
+    })?;
+    Formula::parse(name, slot, text, parameters, amplitudes).map_err(|mistake| {
+        let (shown, long) = (text.chars().take(80).collect::<String>(), text.chars().count() > 80);
+        ModelError::new_err(format!("the formula \"{shown}{}\" {mistake}", if long { "..." } else { "" }))
+    })
+}
+
+/// Checks a user's own effect; the bodies that it can act on.
+#[pyfunction]
+fn formula_bodies(name: &str, spec: FormulaSpec) -> PyResult<Vec<&'static str>> {
+    Ok(formula(name, &spec)?.bodies().iter().map(|body| body.name()).collect())
 }
 
 /// The state as an array of the dimension asked for.
@@ -183,6 +296,13 @@ pub fn state<const D: usize>(values: &[f64]) -> PyResult<[f64; D]> {
     values
         .try_into()
         .map_err(|_| ModelError::new_err(format!("the state needs {D} numbers, not {}", values.len())))
+}
+
+/// Whether the model's solutions have power series, which the Taylor method needs.
+#[pyfunction]
+fn has_series(model: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let model = AnyModel::from_python(model)?;
+    Ok(with_model!(&model, |family, values| tape(family, &[values.to_vec()]).is_some()))
 }
 
 /// Names and units of a model's parameters, in order.
@@ -224,6 +344,8 @@ fn rates<'py>(
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(formula_bodies, module)?)?;
+    module.add_function(wrap_pyfunction!(has_series, module)?)?;
     module.add_function(wrap_pyfunction!(model_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(rates, module)?)
 }

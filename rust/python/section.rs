@@ -8,10 +8,10 @@ use pyo3::types::PyDict;
 use super::errors::ModelError;
 use super::jobs::{self, Jobs};
 use super::model::{AnyModel, with_wide_model};
+use crate::formula::{Expression, Names};
 use crate::integrate::Tolerance;
 use crate::model::Family;
 use crate::run::{Crew, Crossings, Ended, Section, Sections};
-use crate::tape::{Expression, Names};
 
 fn code(ended: Ended) -> u8 {
     match ended {
@@ -24,25 +24,8 @@ fn code(ended: Ended) -> u8 {
     }
 }
 
-/// The names of the state's components.
-fn state_names(model: &AnyModel) -> Vec<String> {
-    let names: &[&str] = match model {
-        AnyModel::Dle(..) => &["omega", "y", "z"],
-        AnyModel::Disk(..) => &["Omega", "Y", "Z", "beta"],
-        AnyModel::Pendulum(..) => &["Omega", "theta"],
-        AnyModel::BristledDisk(..) => &["Omega", "Y", "Z", "beta", "bristle"],
-        AnyModel::BristledPendulum(..) => &["Omega", "theta", "bristle"],
-    };
-    names.iter().map(|&name| name.to_owned()).collect()
-}
-
-/// Angles grow without end.
-fn bounded(name: &str) -> bool {
-    !matches!(name, "beta" | "theta")
-}
-
 fn parse(text: &str, direction: i32, states: &[String], parameters: &[String]) -> PyResult<Section> {
-    let names = Names { states, parameters };
+    let names = Names { states, parameters, rates: true };
     let wrong = |what: String| Err(ModelError::new_err(format!("the section {text:?} {what}")));
     match Expression::parse(text, names) {
         Err(mistake) => wrong(mistake.to_string()),
@@ -158,7 +141,7 @@ fn sections<'py>(
     if count == 0 {
         return Err(ModelError::new_err("at least one point must be asked for"));
     }
-    let names = state_names(&model);
+    let (names, angles): (Vec<String>, Vec<bool>) = model.states().into_iter().unzip();
     let rows = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
     let (table, signal) = with_wide_model!(&model, |family, _values| {
@@ -177,7 +160,7 @@ fn sections<'py>(
             skip,
             count,
             end: t_max,
-            bounded: std::array::from_fn(|n| bounded(&names[n])),
+            bounded: std::array::from_fn(|n| !angles[n]),
             tolerance: Tolerance { rtol, atol },
         };
         watched.watch(py, |crew| collect(&sections, table, crew))?

@@ -4,11 +4,11 @@ use super::polynomial::{Polynomials, Room, Scanned};
 use super::section::Section;
 use super::ship::Ship;
 use super::signs::{Side, Stretch, judge, leave_out};
+use crate::formula::{Binary, Expression, Leaf, Op, Place};
 use crate::integrate::root::bracketed;
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
 use crate::scalar::{Isa, Mask, Real};
-use crate::tape::{Binary, Expression, Leaf, Op, Place};
 
 /// Looked for to this part of the function's largest value near the crossing, and to this size.
 const ZERO: f64 = 1e-14;

@@ -5,10 +5,10 @@ use super::fleet::{Crew, Fleet, Queue, Yields, sail};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
+use crate::formula::Expression;
 use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
 use crate::scalar::{Isa, Mask, Real};
-use crate::tape::Expression;
 
 /// A component of the state beyond this has escaped to infinity.
 pub const FAR: f64 = 1e6;

@@ -4,17 +4,14 @@
 //! what repeated evaluation of the rates cannot: the Taylor coefficients of the solution, order by
 //! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
 
-mod expression;
 mod jet;
 mod known;
 mod node;
-mod parse;
 mod reach;
 mod record;
 mod series;
 mod symbol;
 
-pub use expression::{Binary, Expression, Leaf, Mistake, Names, Op, Place, Unary};
 pub use jet::{HIGH, Jets, LOW};
 pub use node::{Held, Node, Step};
 pub use record::Unrecordable;

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from udd.effects import Effect, library
+from udd.effects import Effect, as_json, library
 from udd.errors import ModelError
 from udd.models import DLE, Disk, Model, Pendulum
 
@@ -60,6 +60,8 @@ def model_from_dict(data: object) -> Model:
 
 
 def _effect_to_dict(effect: Effect) -> dict[str, Any]:
+    if effect.made is not None:
+        return as_json.to_dict(effect)
     choices = {"momentum": effect.momentum, "treatment": effect.treatment}
     made = {key: choice for key, choice in choices.items() if choice is not None}
     return {"name": effect.name, **effect.parameters, **made}
@@ -67,6 +69,8 @@ def _effect_to_dict(effect: Effect) -> dict[str, Any]:
 
 def _effect_from_dict(data: object) -> Effect:
     given = _mapping("an effect", data)
+    if given.keys() & {"formula", "curve"}:
+        return as_json.from_dict(given)
     name = given.pop("name", None)
     choices = given.pop("momentum", None), given.pop("treatment", None)
     specs = {spec.name: spec for spec in library()}

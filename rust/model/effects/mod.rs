@@ -3,13 +3,16 @@
 //! **To add one**: write a file like [`quadratic_drag`](QuadraticDrag) that states the formula, its
 //! parameters with units and ranges, and the slots it enters; then name it in the list at the end of
 //! this file. The constructor, the fit, the list of candidates, its documentation and the generic
-//! tests follow from that.
+//! tests follow from that. One that is known only when the program runs is a [`Formula`].
 
 mod dry;
+mod formula;
+mod term;
 
 pub use dry::{Contact, Dry, Treatment};
+pub use formula::Formula;
+pub use term::{Effect, Source, Term};
 
-use super::{Parameter, parameter};
 use crate::scalar::Scalar;
 
 /// What an effect may look at: the state and the plain model's quantities.
@@ -76,6 +79,9 @@ pub enum Slot {
 }
 
 impl Slot {
+    /// All of them.
+    pub const ALL: &[Slot] = &[Slot::Torque, Slot::Friction, Slot::Lateral, Slot::Vertical];
+
     /// Its name in Python.
     pub fn name(self) -> &'static str {
         match self {
@@ -204,84 +210,8 @@ pub trait Law {
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>);
 }
 
-/// An effect that a model has, its numbers left open.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Effect {
-    pub kind: Kind,
-    /// `None` for an effect that enters through torque or friction.
-    pub momentum: Option<Momentum>,
-    /// [`Treatment::Smoothed`] for all but dry friction, which has the choice.
-    pub treatment: Treatment,
-}
-
-impl Effect {
-    /// The effect, entering as is usual for it.
-    pub fn new(kind: Kind) -> Self {
-        let momentum = kind.spec().momenta.first().copied();
-        Self { kind, momentum, treatment: Treatment::Smoothed }
-    }
-
-    /// Entering the angular momentum this way.
-    pub fn with_momentum(self, momentum: Option<Momentum>) -> Self {
-        Self { momentum, ..self }
-    }
-
-    /// Treating dry friction this way.
-    pub fn with_treatment(self, treatment: Treatment) -> Self {
-        Self { treatment, ..self }
-    }
-
-    /// Its parameters, called `effect.name`.
-    pub fn parameters(&self) -> Vec<Parameter> {
-        let spec = self.kind.spec();
-        spec.parameters.iter().map(|p| parameter(&format!("{}.{}", spec.name, p.name), p.unit)).collect()
-    }
-}
-
-/// The most parameters an effect can have.
+/// The most parameters an effect of the library can have.
 const MAX_PARAMETERS: usize = 4;
-
-/// An effect with its numbers.
-#[derive(Clone, Copy, Debug)]
-pub struct Term<S> {
-    pub kind: Kind,
-    pub momentum: Option<Momentum>,
-    pub treatment: Treatment,
-    pub values: [S; MAX_PARAMETERS],
-}
-
-impl<S: Scalar> Term<S> {
-    /// The effects with their values taken one after the other from `values`.
-    pub fn list(effects: &[Effect], mut values: &[S]) -> Vec<Self> {
-        let mut terms = Vec::with_capacity(effects.len());
-        for effect in effects {
-            let (own, rest) = values.split_at(effect.kind.spec().parameters.len());
-            let mut padded = [S::zero(); MAX_PARAMETERS];
-            padded[..own.len()].copy_from_slice(own);
-            let &Effect { kind, momentum, treatment } = effect;
-            terms.push(Term { kind, momentum, treatment, values: padded });
-            values = rest;
-        }
-        terms
-    }
-
-    /// Adds the effect to its slots, over the model's scalar or over duals of it.
-    #[inline]
-    pub fn enter<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
-        slots.treatment = self.treatment;
-        self.kind.enter(&self.values.map(lift), at, slots);
-    }
-
-    /// Whether it holds a body at rest.
-    pub fn sticks(&self) -> bool {
-        matches!(self.treatment, Treatment::SetValued | Treatment::Karnopp)
-    }
-
-    /// Whether it takes slow sliding for rest.
-    pub fn has_band(&self) -> bool {
-        self.treatment == Treatment::Karnopp
-    }
-}
 
 macro_rules! library {
     ($($module:ident :: $Name:ident),+ $(,)?) => {

@@ -3,30 +3,38 @@
 //! It is parsed by a whitelist of names, operators and functions to a list of operations on a stack,
 //! which can be evaluated over any [`Scalar`]; nothing else in the text means anything.
 
+mod parse;
+
 use thiserror::Error;
 
-use super::parse;
 use crate::scalar::{Mask, Scalar};
 
 /// The most characters of a formula.
-pub const LONGEST: usize = 1000;
+pub const LONGEST: usize = 10_000;
 /// How deep its brackets, powers and signs may be nested.
-pub const DEEPEST: usize = 50;
+pub const DEEPEST: usize = 100;
 /// The largest whole exponent.
 pub const HIGHEST: i32 = 1024;
+
+/// Whether a name means something in every formula, so that nothing else can be called so.
+pub fn is_reserved(name: &str) -> bool {
+    name == "t" || name == "pi" || parse::FUNCTIONS.iter().any(|(function, _)| *function == name)
+}
 
 /// The names that a formula may use, beside the time `t`, the number `pi` and the functions.
 #[derive(Clone, Copy, Debug)]
 pub struct Names<'a> {
-    /// The state's components; `name'` is the component's rate.
+    /// The state's components.
     pub states: &'a [String],
     pub parameters: &'a [String],
+    /// Whether `name'` is the rate of a component of the state.
+    pub rates: bool,
 }
 
 /// What is wrong with a formula.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{0}")]
-pub struct Mistake(pub(super) String);
+pub struct Mistake(pub String);
 
 /// What a formula takes from where it is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +57,12 @@ pub enum Unary {
     Ln,
     Sin,
     Cos,
+    Tan,
+    Sinh,
+    Cosh,
     Tanh,
+    /// The cardinal cubic B-spline: a bump over -2 to 2 whose second derivative is continuous.
+    Bspline,
     /// A whole power.
     Power(i32),
 }
@@ -86,9 +99,9 @@ pub struct Place<'a, S> {
 /// A formula, ready to be evaluated.
 ///
 /// ```
-/// use udd::tape::{Expression, Names, Place};
+/// use udd::formula::{Expression, Names, Place};
 /// let states = ["omega", "y", "z"].map(String::from);
-/// let names = Names { states: &states, parameters: &["w".to_owned()] };
+/// let names = Names { states: &states, parameters: &["w".to_owned()], rates: false };
 /// let energy = Expression::parse("(y^2 + z^2)/2 = w", names).unwrap();
 /// let place = Place { t: 0.0, x: &[1.0, 2.0, 4.0], rates: &[], parameters: &[7.0] };
 /// assert_eq!(energy.value(&place, &mut energy.stack()), 3.0);
@@ -119,9 +132,25 @@ impl Expression {
         Ok(Self { ops, depth })
     }
 
+    /// Puts one operation in the place of these wherever they stand, one that pushes as much.
+    pub(crate) fn replace(&mut self, old: &[Op], new: Op) {
+        let mut at = 0;
+        while at + old.len() <= self.ops.len() {
+            if self.ops[at..].starts_with(old) {
+                self.ops.splice(at..at + old.len(), [new]);
+            }
+            at += 1;
+        }
+    }
+
     /// The operations.
     pub fn ops(&self) -> &[Op] {
         &self.ops
+    }
+
+    /// How many numbers are on the stack at most.
+    pub fn depth(&self) -> usize {
+        self.depth
     }
 
     /// Room for [`value`](Expression::value), which allocates nothing.
@@ -145,17 +174,27 @@ impl Expression {
     /// Where the stack was made for another formula, or the place lacks what the formula takes.
     #[inline(always)]
     pub fn value<S: Scalar>(&self, place: &Place<'_, S>, stack: &mut [S]) -> S {
+        let leaf = |leaf| match leaf {
+            Leaf::Number(value) => S::constant(value),
+            Leaf::Time => place.t,
+            Leaf::State(n) => place.x[n],
+            Leaf::Rate(n) => place.rates[n],
+            Leaf::Parameter(i) => place.parameters[i],
+        };
+        self.value_of(leaf, stack)
+    }
+
+    /// Its value where its leaves have these.
+    ///
+    /// # Panics
+    /// Where the stack is lower than the formula's [depth](Expression::depth).
+    #[inline(always)]
+    pub fn value_of<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, stack: &mut [S]) -> S {
         let mut top = 0;
         for op in &self.ops {
             match *op {
-                Op::Push(leaf) => {
-                    stack[top] = match leaf {
-                        Leaf::Number(value) => S::constant(value),
-                        Leaf::Time => place.t,
-                        Leaf::State(n) => place.x[n],
-                        Leaf::Rate(n) => place.rates[n],
-                        Leaf::Parameter(i) => place.parameters[i],
-                    };
+                Op::Push(own) => {
+                    stack[top] = leaf(own);
                     top += 1;
                 }
                 Op::Unary(function) => stack[top - 1] = function.of(stack[top - 1]),
@@ -175,13 +214,20 @@ impl Unary {
     pub fn of<S: Scalar>(self, a: S) -> S {
         match self {
             Unary::Neg => -a,
-            Unary::Abs => S::select(a.less(S::zero()).not(), a, -a),
+            Unary::Abs => abs(a),
             Unary::Sqrt => a.sqrt(),
             Unary::Exp => a.exp(),
             Unary::Ln => a.ln(),
             Unary::Sin => a.sin(),
             Unary::Cos => a.cos(),
+            Unary::Tan => {
+                let (sin, cos) = a.sin_cos();
+                sin / cos
+            }
+            Unary::Sinh => (a.exp() - (-a).exp()).scale(0.5),
+            Unary::Cosh => (a.exp() + (-a).exp()).scale(0.5),
             Unary::Tanh => a.tanh(),
+            Unary::Bspline => bspline(a),
             Unary::Power(n) => power(a, n),
         }
     }
@@ -199,6 +245,26 @@ impl Binary {
             Binary::Power => (b * a.ln()).exp(),
         }
     }
+}
+
+#[inline(always)]
+fn abs<S: Scalar>(a: S) -> S {
+    S::select(a.less(S::zero()).not(), a, -a)
+}
+
+/// `((2 - |a|)^3 - 4 (1 - |a|)^3)/6`, both cubes only where positive.
+#[inline(always)]
+fn bspline<S: Scalar>(a: S) -> S {
+    let size = abs(a);
+    // Most of a curve's bumps are elsewhere.
+    if !size.less(S::constant(2.0)).any() {
+        return S::zero();
+    }
+    let cube = |width: f64| {
+        let left = S::constant(width) - size;
+        S::select(S::zero().less(left), left.square() * left, S::zero())
+    };
+    (cube(2.0) - cube(1.0).scale(4.0)).scale(1.0 / 6.0)
 }
 
 /// By repeated squaring.

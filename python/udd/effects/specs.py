@@ -1,34 +1,22 @@
-"""Physical effects that the plain models lack.
-
-Each effect of the library has a constructor here, named after it: ``relaxation(b=5.0)``,
-``quadratic_drag(c=1e-4)``, ... They follow from the core's library, where each effect is one file that
-states its formula, its parameters with units and ranges, and the equation that it enters;
-:func:`library` lists them.
-
-Examples
---------
->>> from udd import Disk, effects
->>> effects.relaxation(b=5.0)
-relaxation(b=5.0, momentum='constraint')
->>> model = Disk(0.039, effects=[effects.relaxation(b=5.0), effects.quadratic_drag(c=1e-4)])
->>> model.parameters["relaxation.b"]
-5.0
-"""
+"""Effects with their numbers, and what is said of them."""
 
 from __future__ import annotations
 
 import functools
-import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TypeAlias
 
 from udd import _core
 from udd._validate import number
 from udd.errors import ModelError
 
 __all__ = ["Effect", "Parameter", "Spec", "library"]
+
+#: What the core needs to know of a user's own effect: slot, formula, parameters, amplitudes.
+Own: TypeAlias = tuple[str, str, list[str], list[str]]
 
 #: What stands in a formula for the smoothed sign of the speed.
 _SIGNS = {"set-valued": "Sgn(Omega)", "karnopp": "Karnopp(Omega, eps)", "lugre": "LuGre(Omega, eps)"}
@@ -124,7 +112,27 @@ class Spec:
             if name not in known:
                 raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
         given = tuple(p.check(self.name, values.get(p.name, p.default), strict=True) for p in self.parameters)
-        return Effect(self.name, given, momentum, treatment)
+        return Effect(self.name, given, momentum, treatment, self if self.own else None)
+
+    @property
+    def own(self) -> Own | None:
+        """What the core needs to know of an effect that is not of the library."""
+        return None
+
+    def expression(self, values: Mapping[str, float], equation: str) -> str:
+        """The equation with these numbers put in."""
+
+        def put(match: re.Match[str]) -> str:
+            value = values[match[0]]
+            return f"({value:.4g})" if value < 0 else f"{value:.4g}"
+
+        left, equals, right = equation.partition(" = ")
+        names = "|".join(map(re.escape, values))
+        return left + equals + (re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, right) if names else right)
+
+    def call(self, effect: Effect) -> tuple[str, list[str]]:
+        """The function that makes the effect, and its arguments as text."""
+        return self.name, [f"{name}={value!r}" for name, value in effect.parameters.items()]
 
 
 @functools.cache
@@ -174,6 +182,8 @@ class Effect:
     treatment : str, optional
         ``"smoothed"``, ``"set-valued"``, ``"karnopp"`` or ``"lugre"`` for dry friction; by default
         the first. See :class:`Spec`.
+    made : Spec, optional
+        What is said of an effect that is not of the library.
 
     Raises
     ------
@@ -198,9 +208,10 @@ class Effect:
     values: tuple[float, ...]
     momentum: str | None = None
     treatment: str | None = None
+    made: Spec | None = None
 
     def __post_init__(self) -> None:
-        if self.name not in _specs():
+        if self.made is None and self.name not in _specs():
             raise ModelError(f"no effect is called {self.name!r}; there are {', '.join(_specs())}")
         spec = self.spec
         if len(self.values) != len(spec.parameters):
@@ -222,8 +233,8 @@ class Effect:
 
     @property
     def spec(self) -> Spec:
-        """What the library says of it."""
-        return _specs()[self.name]
+        """What is said of it."""
+        return self.made or _specs()[self.name]
 
     @property
     def title(self) -> str:
@@ -266,14 +277,7 @@ class Effect:
         >>> effects.quadratic_drag(c=1.5e-4).expression
         'torque = -0.00015 |Omega| Omega'
         """
-        values = self.parameters
-
-        def put(match: re.Match[str]) -> str:
-            value = values[match[0]]
-            return f"({value:.4g})" if value < 0 else f"{value:.4g}"
-
-        names = "|".join(map(re.escape, values))
-        return re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, self.equation)
+        return self.spec.expression(self.parameters, self.equation)
 
     def replace(self, **values: float) -> Effect:
         """The effect with other values of some parameters.
@@ -288,51 +292,12 @@ class Effect:
             if name not in new:
                 raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(new)}")
             new[name] = value
-        return Effect(self.name, tuple(new.values()), self.momentum, self.treatment)
+        return Effect(self.name, tuple(new.values()), self.momentum, self.treatment, self.made)
 
     def __repr__(self) -> str:
-        items = [f"{name}={value!r}" for name, value in self.parameters.items()]
+        function, items = self.spec.call(self)
         if self.momentum is not None:
             items.append(f"momentum={self.momentum!r}")
         if self.treatment not in (None, "smoothed"):
             items.append(f"treatment={self.treatment!r}")
-        return f"{self.name}({', '.join(items)})"
-
-
-def _constructor(spec: Spec) -> Callable[..., Effect]:
-    """The function that makes an effect, with its signature and documentation."""
-    kind = inspect.Parameter.KEYWORD_ONLY
-    arguments = [inspect.Parameter(p.name, kind, default=p.default) for p in spec.parameters]
-    if spec.momenta:
-        arguments.append(inspect.Parameter("momentum", kind, default=spec.momenta[0]))
-    if spec.treatments:
-        arguments.append(inspect.Parameter("treatment", kind, default=spec.treatments[0]))
-
-    def make(*, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
-        return spec.make(momentum=momentum, treatment=treatment, **values)
-
-    lines = [f"{spec.title[0].upper()}{spec.title[1:]}: ``{spec.equation}``.", ""]
-    lines += [f"{spec.meaning[0].upper()}{spec.meaning[1:]}.", "", "Parameters", "----------"]
-    for p in spec.parameters:
-        low, high = p.range
-        lines += [f"{p.name} : float", f"    {p.role.capitalize()} [{p.unit or '1'}], {low:g} to {high:g}."]
-    if spec.momenta:
-        lines += [f"momentum : {{{', '.join(map(repr, spec.momenta))}}}", "    How it enters the momentum."]
-    if spec.treatments:
-        lines += [f"treatment : {{{', '.join(map(repr, spec.treatments))}}}", "    What it does at rest."]
-    lines += ["", "Returns", "-------", "Effect"]
-    make.__name__ = make.__qualname__ = spec.name
-    make.__doc__ = "\n".join(lines)
-    make.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
-    return make
-
-
-def __getattr__(name: str) -> Callable[..., Effect]:
-    if name in _specs():
-        made = globals()[name] = _constructor(_specs()[name])
-        return made
-    raise AttributeError(f"no effect is called {name!r}; there are {', '.join(_specs())}")
-
-
-def __dir__() -> list[str]:
-    return sorted([*__all__, *_specs()])
+        return f"{function}({', '.join(items)})"

@@ -9,16 +9,22 @@
 //! atom     = number | name ["'"] | function "(" sum ")" | "(" sum ")"
 //! ```
 
-use super::expression::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Unary};
+use super::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Unary};
 
-const FUNCTIONS: [(&str, Unary); 7] = [
+/// The functions by their names.
+pub(super) const FUNCTIONS: [(&str, Unary); 12] = [
     ("sqrt", Unary::Sqrt),
     ("exp", Unary::Exp),
     ("ln", Unary::Ln),
+    ("log", Unary::Ln),
     ("sin", Unary::Sin),
     ("cos", Unary::Cos),
+    ("tan", Unary::Tan),
+    ("sinh", Unary::Sinh),
+    ("cosh", Unary::Cosh),
     ("tanh", Unary::Tanh),
     ("abs", Unary::Abs),
+    ("bspline", Unary::Bspline),
 ];
 
 type Parsed = Result<Vec<Op>, Mistake>;
@@ -221,7 +227,7 @@ impl Parser<'_> {
     fn name(&mut self, name: &str) -> Parsed {
         let find = |list: &[String]| list.iter().position(|own| own == name);
         let leaf = if let Some(n) = find(self.names.states) {
-            if self.takes("'") { Leaf::Rate(n) } else { Leaf::State(n) }
+            if self.names.rates && self.takes("'") { Leaf::Rate(n) } else { Leaf::State(n) }
         } else if let Some(i) = find(self.names.parameters) {
             Leaf::Parameter(i)
         } else if name == "t" {
@@ -239,7 +245,12 @@ impl Parser<'_> {
             return mistake(format!("has the unknown name {name}; {}", allowed(self.names)));
         };
         if self.peek() == Some(&Token::Sign("'")) {
-            return mistake(format!("has {name}', but only the state's components have rates"));
+            let why = if self.names.rates {
+                "only the state's components have"
+            } else {
+                "this formula may not use"
+            };
+            return mistake(format!("has {name}', but {why} rates"));
         }
         Ok(vec![Op::Push(leaf)])
     }
@@ -247,17 +258,20 @@ impl Parser<'_> {
 
 /// What a formula may use.
 fn allowed(names: Names<'_>) -> String {
-    let rates: Vec<String> = names.states.iter().map(|name| format!("{name}'")).collect();
+    let states = names.states.join(", ");
+    let rates = match names.rates {
+        true => format!(
+            ", its rates {}",
+            names.states.iter().map(|name| format!("{name}'")).collect::<Vec<_>>().join(", ")
+        ),
+        false => String::new(),
+    };
     let functions = FUNCTIONS.map(|(name, _)| name).join(", ");
     let parameters = match names.parameters {
         [] => String::new(),
         list => format!(", the parameters {}", list.join(", ")),
     };
-    format!(
-        "allowed are the state {}, its rates {}, the time t{parameters}, numbers, pi and {functions}",
-        names.states.join(", "),
-        rates.join(", ")
-    )
+    format!("allowed are the state {states}{rates}, the time t{parameters}, numbers, pi and {functions}")
 }
 
 fn number(ops: &[Op]) -> Option<f64> {

@@ -1,0 +1,56 @@
+"""Formulas and curves as JSON, both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from udd.errors import ModelError
+
+from .own import UNLIMITED, CurveSpec, FormulaSpec, curve, written
+from .specs import Effect
+
+
+def to_dict(effect: Effect) -> dict[str, Any]:
+    """A formula or a curve as JSON knows it; :func:`from_dict` makes the same effect of it."""
+    spec = effect.made
+    common = {"slot": effect.slots[0], "name": effect.name, "momentum": effect.momentum}
+    if isinstance(spec, CurveSpec):
+        where = {"coordinate": spec.coordinate, "low": spec.low, "high": spec.high}
+        return {"curve": {**common, **where, "coefficients": list(effect.values)}}
+    if not isinstance(spec, FormulaSpec):
+        raise ModelError(f"{effect.name} is an effect of the library")
+    ranges = {p.name: [None if np.isinf(x) else x for x in p.range] for p in spec.parameters}
+    what = {"expression": spec.text, "title": spec.title, "amplitudes": list(effect.amplitudes)}
+    return {"formula": {**common, **what, "ranges": ranges, "parameters": effect.parameters}}
+
+
+def from_dict(data: Mapping[str, Any]) -> Effect:
+    """The formula or curve that :func:`to_dict`, or a person, wrote down.
+
+    Raises
+    ------
+    ModelError
+        Something is missing, unknown or unusable.
+    """
+    if len(data) != 1 or not data.keys() <= {"formula", "curve"}:
+        raise ModelError(f"an effect of no library must be a formula or a curve, not {data!r}")
+    ((kind, content),) = data.items()
+    try:
+        given = dict(content)
+        momentum = given.pop("momentum", None)
+        if kind == "curve":
+            return curve(**given, momentum=momentum)
+        values = dict(given.pop("parameters", {}))
+        limits: dict[str, Any] = {
+            name: tuple(own if x is None else x for x, own in zip(pair, UNLIMITED, strict=True))
+            for name, pair in given.pop("ranges", {}).items()
+        }
+        defaults: dict[str, Any] = {"name": "formula", "title": None, "amplitudes": None}
+        spec = written(**(defaults | given), ranges=limits, names=tuple(values))
+        # Not `make`: fitted amplitudes may lie outside their physical ranges.
+        return Effect(spec.name, tuple(values.values()), momentum, made=spec)
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"this {kind} cannot be read: {error}") from None

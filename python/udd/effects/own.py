@@ -1,0 +1,314 @@
+"""Effects of no library: a formula of the user's, or a curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._expressions import Expression, text_of
+from udd._validate import array, number
+from udd.errors import ModelError
+
+from .specs import Effect, Own, Parameter, Spec, _specs
+
+__all__ = ["curve", "formula"]
+
+#: Where each slot enters: the left side of an equation, the slot's unit, and what it would mean.
+_SLOTS = {
+    "torque": ("torque = ", "m^2/s^2", "a torque that the model lacks"),
+    "friction": ("k = k_plain + ", "m^2/s", "the friction changes"),
+    "lateral": ("u = ", "m/s", "the contact moves sideways"),
+    "vertical": ("W_c = W + ", "m/s", "the contact moves up or down beside the drive"),
+}
+_MOMENTA = {"lateral": ("consistent", "constraint"), "vertical": ("consistent", "constraint")}
+
+
+@dataclass(frozen=True)
+class FormulaSpec(Spec):
+    """What is said of an effect that a user wrote: see :func:`formula`.
+
+    Attributes
+    ----------
+    text : str
+        The formula.
+    """
+
+    text: str
+
+    @property
+    def own(self) -> Own:
+        """What the core needs to know."""
+        names = [p.name for p in self.parameters]
+        return self.slots[0], self.text, names, [p.name for p in self.parameters if p.role == "amplitude"]
+
+    def call(self, effect: Effect) -> tuple[str, list[str]]:
+        """The function that makes the effect, and its arguments as text."""
+        items = [repr(self.slots[0]), repr(self.text)]
+        if self.name != "formula":
+            items.append(f"name={self.name!r}")
+        if self.title != self.name:
+            items.append(f"title={self.title!r}")
+        if any(p.role != "amplitude" for p in self.parameters):
+            items.append(f"amplitudes={effect.amplitudes!r}")
+        ranges = {p.name: p.range for p in self.parameters if p.range != UNLIMITED}
+        if ranges:
+            shown = ", ".join(f"{name!r}: ({low}, {high})" for name, (low, high) in ranges.items())
+            items.append(f"ranges={{{shown}}}".replace("inf", 'float("inf")'))
+        return "formula", items + [f"{name}={value!r}" for name, value in effect.parameters.items()]
+
+
+@dataclass(frozen=True)
+class CurveSpec(FormulaSpec):
+    """What is said of a curve: see :func:`curve`.
+
+    Attributes
+    ----------
+    coordinate : str
+        What the curve is a function of.
+    low, high : float
+        Where it begins and ends.
+    """
+
+    coordinate: str
+    low: float
+    high: float
+
+    @property
+    def step(self) -> float:
+        """The distance of its knots."""
+        return (self.high - self.low) / (len(self.parameters) - 3)
+
+    def basis(self, x: ArrayLike) -> NDArray[np.float64]:
+        """The curve's values for each coefficient alone.
+
+        Parameters
+        ----------
+        x : array_like (...)
+            Values of the coordinate.
+
+        Returns
+        -------
+        ndarray (..., coefficients)
+        """
+        places = (array("x", x)[..., None] - self.low) / self.step + 1.0 - np.arange(len(self.parameters))
+        outer, inner = (np.clip(width - np.abs(places), 0.0, None) for width in (2.0, 1.0))
+        result: NDArray[np.float64] = (outer**3 - 4.0 * inner**3) / 6.0
+        return result
+
+    def expression(self, values: Mapping[str, float], equation: str) -> str:
+        """The curve by its values at the knots."""
+        knots = self.low + self.step * np.arange(len(self.parameters) - 2)
+        at = self.basis(knots) @ np.array(list(values.values()))
+        shown = ", ".join(f"s({x:.4g}) = {value:.4g}" for x, value in zip(knots, at, strict=True))
+        return f"{equation}, {shown}"
+
+    def call(self, effect: Effect) -> tuple[str, list[str]]:
+        """The function that makes the effect, and its arguments as text."""
+        where = [repr(self.slots[0]), repr(self.coordinate), repr(self.low), repr(self.high)]
+        items = [*where, repr(list(effect.values))]
+        if self.name != "curve":
+            items.append(f"name={self.name!r}")
+        return "curve", items
+
+
+UNLIMITED = (-np.inf, np.inf)
+
+
+def formula(
+    slot: str,
+    expression: Expression,
+    *,
+    momentum: str | None = None,
+    name: str = "formula",
+    title: str | None = None,
+    amplitudes: Iterable[str] | None = None,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    **parameters: float,
+) -> Effect:
+    """An effect given as a formula.
+
+    Parameters
+    ----------
+    slot : {"torque", "friction", "lateral", "vertical"}
+        What the formula adds to: the torque [m^2/s^2], the friction coefficient k [m^2/s], the contact's
+        lateral velocity u or its vertical velocity W_c [m/s].
+    expression : str or SymPy expression
+        Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
+        friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
+        numbers, ``pi``, and the effect's own parameters; with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``,
+        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``abs`` and ``bspline``, the cardinal cubic
+        B-spline.
+    momentum : {"consistent", "constraint"}, optional
+        How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
+    name : str
+        What its parameters are called after: ``name.parameter``.
+    title : str, optional
+        What a reader calls it; by default its name.
+    amplitudes : iterable of str, optional
+        The parameters to which the formula is proportional, taken together; by default all.
+    ranges : mapping of str to (low, high), optional
+        The physically sensible ranges of parameters.
+    **parameters : float
+        The effect's own parameters.
+
+    Returns
+    -------
+    Effect
+
+    Raises
+    ------
+    ModelError
+        A name that the formula may not use, a formula that is not proportional to its amplitudes, or a
+        parameter that it does not use.
+
+    Notes
+    -----
+    The text is parsed to a list of operations, which the core evaluates as it does the library's effects;
+    nothing in it is executed. ``abs(Omega)`` may have its kink: the integrator lands there. At other kinks it
+    does not, and jumps are none of a formula's.
+
+    Examples
+    --------
+    >>> import udd
+    >>> warp = udd.effects.formula("torque", "a*sin(2*beta) + b*cos(2*beta)", name="warp", a=0.01, b=0.0)
+    >>> warp.expression
+    'torque = 0.01*sin(2*beta) + 0*cos(2*beta)'
+    >>> udd.Disk(0.039, effects=[warp]).parameters["warp.a"]
+    0.01
+    """
+    given = {key: number(f"{key} of {name}", value) for key, value in parameters.items()}
+    spec = written(slot, expression, name, title, amplitudes, ranges, tuple(given))
+    return spec.make(momentum=momentum, treatment=None, **given)
+
+
+def written(
+    slot: str,
+    expression: Expression,
+    name: str,
+    title: str | None,
+    amplitudes: Iterable[str] | None,
+    ranges: Mapping[str, tuple[float, float]] | None,
+    names: tuple[str, ...],
+) -> FormulaSpec:
+    """What is said of a formula."""
+    linear = names if amplitudes is None else _names(amplitudes)
+    limits = dict(ranges or {})
+    for other in (*linear, *limits):
+        if other not in names:
+            raise ModelError(f"{name} has no parameter {other!r}; it has {', '.join(names) or 'none'}")
+    listed = tuple(_parameter(name, own, "", own in linear, limits.get(own, UNLIMITED)) for own in names)
+    text = text_of("the formula", expression)
+    return FormulaSpec(*_described(slot, name, title or name, text, text, listed), listed, text)
+
+
+def curve(
+    slot: str,
+    coordinate: str,
+    low: float,
+    high: float,
+    coefficients: Sequence[float],
+    *,
+    momentum: str | None = None,
+    name: str = "curve",
+) -> Effect:
+    """An effect given as a curve: a cubic spline over one coordinate.
+
+    Parameters
+    ----------
+    slot : {"torque", "friction", "lateral", "vertical"}
+        What the curve adds to; see :func:`formula`.
+    coordinate : str
+        What it is a function of: ``"Omega"``, ``"Y"``, ``"Z"``, ``"beta"``, ``"t"`` or any other that a
+        formula knows.
+    low, high : float
+        Where it begins and ends. Beyond, it falls to zero within two knots.
+    coefficients : sequence of float
+        At least four; they are the parameters ``c0``, ``c1``, ..., all amplitudes.
+    momentum : {"consistent", "constraint"}, optional
+        How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
+    name : str
+        What its parameters are called after.
+
+    Returns
+    -------
+    Effect
+
+    Raises
+    ------
+    ModelError
+        A coordinate that there is not, fewer than four coefficients, or a range that is none.
+
+    Notes
+    -----
+    The curve is ``sum of c[i] B((x - low)/h + 1 - i)`` with the cardinal cubic B-spline ``B`` and
+    ``h = (high - low)/(n - 3)`` for ``n`` coefficients: every cubic spline with these knots from `low` to
+    `high`. Its second derivative is continuous.
+
+    Examples
+    --------
+    >>> import udd
+    >>> drag = udd.effects.curve("torque", "Omega", -8.0, 8.0, [0.02, 0.01, 0.0, -0.01, -0.02])
+    >>> drag.expression
+    'torque = s(Omega), a cubic spline from -8 to 8, s(-8) = 0.01, s(0) = 0, s(8) = -0.01'
+    >>> list(udd.Disk(0.039, effects=drag).parameters)[6:]
+    ['curve.c0', 'curve.c1', 'curve.c2', 'curve.c3', 'curve.c4']
+    """
+    values = array("coefficients", coefficients)
+    if values.ndim != 1 or len(values) < 4:
+        raise ModelError("a curve needs a list of at least four coefficients")
+    first, last = number("low", low), number("high", high, above=float(low))
+    if not (isinstance(coordinate, str) and coordinate.isidentifier()):
+        raise ModelError(f"the coordinate must be a name such as 'Omega', not {coordinate!r}")
+    _slot(slot)
+    unit = _SLOTS[slot][1]
+    names = [f"c{i}" for i in range(len(values))]
+    listed = tuple(_parameter(name, own, unit, True, UNLIMITED) for own in names)
+    per, start = (len(values) - 3) / (last - first), 1.0 - first * (len(values) - 3) / (last - first)
+    text = " + ".join(f"{own}*bspline({per!r}*{coordinate} + {start - i!r})" for i, own in enumerate(names))
+    shown = f"s({coordinate}), a cubic spline from {first:g} to {last:g}"
+    common = _described(slot, name, f"{slot} over {coordinate}", shown, text, listed)
+    spec = CurveSpec(*common, listed, text, coordinate, first, last)
+    return spec.make(momentum=momentum, treatment=None, **dict(zip(names, values.tolist(), strict=True)))
+
+
+def _described(
+    slot: str, name: str, title: str, shown: str, text: str, parameters: tuple[Parameter, ...]
+) -> tuple[str, str, str, str, tuple[str, ...], tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """The checked attributes of a spec before its parameters."""
+    _slot(slot)
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise ModelError(f"an effect's name must be a single word, not {name!r}")
+    if name in _specs():
+        raise ModelError(f"the library has an effect called {name!r} already: give the formula another name")
+    left, _unit, meaning = _SLOTS[slot]
+    names = [p.name for p in parameters]
+    linear = [p.name for p in parameters if p.role == "amplitude"]
+    bodies = tuple(_core.formula_bodies(name, (slot, text, names, linear)))
+    return name, title, left + shown, meaning, bodies, (slot,), _MOMENTA.get(slot, ()), ()
+
+
+def _slot(slot: str) -> None:
+    if slot not in _SLOTS:
+        raise ModelError(f"the slot must be one of {', '.join(_SLOTS)}, not {slot!r}")
+
+
+def _names(names: Iterable[str]) -> tuple[str, ...]:
+    if isinstance(names, str):
+        raise ModelError("amplitudes must be a list of names, not a name")
+    return tuple(names)
+
+
+def _parameter(effect: str, name: str, unit: str, linear: bool, limits: tuple[float, float]) -> Parameter:
+    try:
+        low, high = (float(limit) for limit in limits)
+    except (TypeError, ValueError):
+        raise ModelError(f"the range of {name} must be two numbers, not {limits!r}") from None
+    if not low <= high:
+        raise ModelError(f"the range of {name} of {effect} must go upwards, not from {low} to {high}")
+    # What is taken where no value is given must not depend on the values.
+    default = min(max(0.0, low), high)
+    return Parameter(name, unit, default, (low, high), "amplitude" if linear else "shape", ())

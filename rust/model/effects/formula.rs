@@ -1,0 +1,207 @@
+//! An effect that a user writes as text.
+
+use super::{At, Body, Slot, Slots};
+use crate::formula::{Binary, Expression, Leaf, Mistake, Names, Op, Unary, is_reserved};
+use crate::scalar::Scalar;
+
+/// What a formula may look at beside the time: the [`At`] by its names. The last two are a pendulum's names
+/// of `beta` and `R`.
+const QUANTITIES: [&str; 12] =
+    ["Omega", "speed", "Y", "Z", "beta", "k", "inertia", "W", "g", "R", "theta", "length"];
+/// The places of `Omega`, `|Omega|` and those that only one of the bodies has.
+const OMEGA: usize = 0;
+const SPEED: usize = 1;
+const OF_DISK: [usize; 2] = [7, 9];
+const OF_PENDULUM: [usize; 2] = [10, 11];
+
+/// The most intermediate values of a formula; most need few.
+const DEEP: usize = 32;
+const SHALLOW: usize = 6;
+
+/// An effect given as text, with parameters of its own.
+///
+/// ```
+/// use udd::model::effects::{Formula, Slot};
+/// let own = ["c".to_owned()];
+/// let warp = Formula::parse("warp", Slot::Torque, "c*sin(2*beta)", &own, &own).unwrap();
+/// assert_eq!(warp.parameters(), own);
+/// assert!(Formula::parse("warp", Slot::Torque, "sin(c*beta)", &own, &own).is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Formula {
+    name: String,
+    slot: Slot,
+    function: Expression,
+    parameters: Vec<String>,
+    bodies: Vec<Body>,
+}
+
+impl Formula {
+    /// Parses the text of an effect that enters this slot. It must be proportional to its `amplitudes`,
+    /// which are some of its `parameters`.
+    ///
+    /// # Errors
+    /// What is wrong, in words that continue "the formula ...".
+    pub fn parse(
+        name: &str,
+        slot: Slot,
+        text: &str,
+        parameters: &[String],
+        amplitudes: &[String],
+    ) -> Result<Self, Mistake> {
+        let wrong = |what: String| Err(Mistake(what));
+        for own in parameters {
+            if is_reserved(own) || QUANTITIES.contains(&own.as_str()) {
+                return wrong(format!("cannot have a parameter called {own}, which means something else"));
+            }
+        }
+        if text.contains('=') {
+            return wrong("has =, but what is wanted is only what adds to its slot".to_owned());
+        }
+        let states = QUANTITIES.map(str::to_owned);
+        let mut function = Expression::parse(text, Names { states: &states, parameters, rates: false })?;
+        // The side of |Omega| is known, so that its kink is landed on.
+        function
+            .replace(&[Op::Push(Leaf::State(OMEGA)), Op::Unary(Unary::Abs)], Op::Push(Leaf::State(SPEED)));
+        let uses = |leaf| function.ops().contains(&Op::Push(leaf));
+        for (i, own) in parameters.iter().enumerate() {
+            if !uses(Leaf::Parameter(i)) {
+                return wrong(format!("does not use its parameter {own}"));
+            }
+        }
+        if function.depth() > DEEP {
+            return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
+        }
+        let is_amplitude: Vec<bool> = parameters.iter().map(|own| amplitudes.contains(own)).collect();
+        if !amplitudes.is_empty() && degree(&function, &is_amplitude) != Degree::One {
+            return wrong(format!(
+                "is not proportional to {}; name those to which it is as the amplitudes",
+                amplitudes.join(", ")
+            ));
+        }
+        let any = |list: &[usize]| list.iter().any(|&n| uses(Leaf::State(n)));
+        let velocity = matches!(slot, Slot::Lateral | Slot::Vertical);
+        let mut bodies = Vec::new();
+        if !any(&OF_PENDULUM) {
+            bodies.push(Body::Disk);
+        }
+        if !any(&OF_DISK) && !velocity {
+            bodies.push(Body::Pendulum);
+        }
+        if bodies.is_empty() {
+            return wrong(
+                "mixes what only a disk has (W, R, a moving contact) with theta or length".to_owned(),
+            );
+        }
+        Ok(Self { name: name.to_owned(), slot, function, parameters: parameters.to_vec(), bodies })
+    }
+
+    /// Its name among a model's effects.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The slot that it enters.
+    pub fn slot(&self) -> Slot {
+        self.slot
+    }
+
+    /// The names of its own parameters.
+    pub fn parameters(&self) -> &[String] {
+        &self.parameters
+    }
+
+    /// What it can act on.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// Adds it, with these values of its parameters, to its slot.
+    // One function for each kind of number, as for the library's.
+    #[inline(never)]
+    pub(super) fn enter<S: Scalar, A: Scalar>(
+        &self,
+        values: &[S],
+        lift: &dyn Fn(S) -> A,
+        at: &At<A>,
+        slots: &mut Slots<A>,
+    ) {
+        let leaf = |leaf| match leaf {
+            Leaf::Number(value) => A::constant(value),
+            Leaf::Time => at.t,
+            Leaf::State(n) | Leaf::Rate(n) => at.quantity(n),
+            Leaf::Parameter(i) => lift(values[i]),
+        };
+        let value = if self.function.depth() <= SHALLOW {
+            self.function.value_of(leaf, &mut [A::zero(); SHALLOW])
+        } else {
+            self.function.value_of(leaf, &mut [A::zero(); DEEP])
+        };
+        match self.slot {
+            Slot::Torque => slots.torque += value,
+            Slot::Friction => slots.friction += value,
+            Slot::Lateral => slots.lateral += value,
+            Slot::Vertical => slots.vertical += value,
+        }
+    }
+}
+
+impl<S: Scalar> At<S> {
+    /// By its place among the [`QUANTITIES`].
+    #[inline(always)]
+    fn quantity(&self, n: usize) -> S {
+        match n {
+            OMEGA => self.omega,
+            SPEED => self.speed,
+            2 => self.y,
+            3 => self.z,
+            4 | 10 => self.beta,
+            5 => self.k,
+            6 => self.inertia,
+            7 => self.w,
+            8 => self.g,
+            _ => self.radius,
+        }
+    }
+}
+
+/// How a value depends on the amplitudes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Degree {
+    /// Not at all.
+    Zero,
+    /// It is proportional to them.
+    One,
+    Other,
+}
+
+fn degree(function: &Expression, is_amplitude: &[bool]) -> Degree {
+    use Degree::{One, Other, Zero};
+    let mut stack = Vec::new();
+    for op in function.ops() {
+        let found = match *op {
+            Op::Push(Leaf::Parameter(i)) if is_amplitude[i] => One,
+            Op::Push(_) => Zero,
+            Op::Unary(Unary::Neg) => stack.pop().unwrap_or(Zero),
+            Op::Unary(_) => {
+                if stack.pop() == Some(Zero) {
+                    Zero
+                } else {
+                    Other
+                }
+            }
+            Op::Binary(function) => {
+                let right = stack.pop().unwrap_or(Zero);
+                let left = stack.pop().unwrap_or(Zero);
+                match (function, left, right) {
+                    (_, Zero, Zero) => Zero,
+                    (Binary::Add | Binary::Sub, One, One) => One,
+                    (Binary::Mul, Zero, One) | (Binary::Mul | Binary::Div, One, Zero) => One,
+                    _ => Other,
+                }
+            }
+        };
+        stack.push(found);
+    }
+    stack.pop().unwrap_or(Zero)
+}

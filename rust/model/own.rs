@@ -1,0 +1,129 @@
+//! A model of the user's own, given as text.
+
+use std::sync::Arc;
+
+use super::{Family, Parameter, Sides, System, parameter};
+use crate::formula::{Expression, Leaf, Mistake, Names};
+use crate::scalar::Scalar;
+
+/// The most intermediate values of an equation; most need few.
+const DEEP: usize = 64;
+const SHALLOW: usize = 8;
+
+/// The equations `x' = f(t, x)` with their numbers.
+#[derive(Clone, Debug)]
+pub struct Own<S, const D: usize> {
+    equations: Arc<[Expression; D]>,
+    deep: bool,
+    parameters: Vec<S>,
+}
+
+impl<S: Scalar, const D: usize> Own<S, D> {
+    // One function for each kind of number: its loop is large.
+    #[inline(never)]
+    fn evaluate(&self, t: S, x: &[S; D], stack: &mut [S]) -> [S; D] {
+        let leaf = |leaf| match leaf {
+            Leaf::Number(value) => S::constant(value),
+            Leaf::Time => t,
+            Leaf::State(n) | Leaf::Rate(n) => x[n],
+            Leaf::Parameter(i) => self.parameters[i],
+        };
+        let mut rates = [S::zero(); D];
+        for n in 0..D {
+            rates[n] = self.equations[n].value_of(leaf, stack);
+        }
+        rates
+    }
+}
+
+impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
+    const SMOOTH: bool = true;
+
+    #[inline]
+    fn rates(&self, t: S, x: &[S; D], _sides: &Sides<S>) -> [S; D] {
+        if self.deep {
+            self.evaluate(t, x, &mut [S::zero(); DEEP])
+        } else {
+            self.evaluate(t, x, &mut [S::zero(); SHALLOW])
+        }
+    }
+}
+
+/// Builds [`Own`].
+///
+/// ```
+/// use udd::model::{Family, OwnFamily, System};
+/// let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+/// let family = OwnFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"])).unwrap();
+/// let system = family.build(&[4.0]);
+/// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; 4]), [1.0, -12.0]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct OwnFamily<const D: usize> {
+    equations: Arc<[Expression; D]>,
+    deep: bool,
+    parameters: Vec<String>,
+    states: Vec<(String, bool)>,
+}
+
+impl<const D: usize> OwnFamily<D> {
+    /// Parses the right-hand sides, in the order of the states.
+    ///
+    /// # Errors
+    /// The number of the equation and what is wrong with it, in words that continue "the formula ...".
+    ///
+    /// # Panics
+    /// Where there are not `D` states and equations.
+    pub fn parse(
+        states: &[String],
+        equations: &[&str],
+        parameters: &[String],
+    ) -> Result<Self, (usize, Mistake)> {
+        assert!(states.len() == D && equations.len() == D, "{D} states and equations are needed");
+        let mut parsed = Vec::with_capacity(D);
+        for (n, text) in equations.iter().enumerate() {
+            let wrong = |what: String| Err((n, Mistake(what)));
+            if text.contains('=') {
+                return wrong("has =, but only the right-hand side is wanted".to_owned());
+            }
+            let one = Expression::parse(text, Names { states, parameters, rates: false });
+            let one = one.map_err(|mistake| (n, mistake))?;
+            if one.depth() > DEEP {
+                return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
+            }
+            parsed.push(one);
+        }
+        let deep = parsed.iter().any(|one| one.depth() > SHALLOW);
+        let Ok(equations) = <[Expression; D]>::try_from(parsed) else { unreachable!("as many as states") };
+        let states = states.iter().map(|name| (name.clone(), false)).collect();
+        Ok(Self { equations: Arc::new(equations), deep, parameters: parameters.to_vec(), states })
+    }
+
+    /// These of its states are angles.
+    pub fn with_angles(mut self, names: &[String]) -> Self {
+        self.states.iter_mut().for_each(|(own, angle)| *angle = names.contains(own));
+        self
+    }
+
+    /// The states' names, and which of them are angles.
+    pub fn states(&self) -> Vec<(String, bool)> {
+        self.states.clone()
+    }
+
+    /// The right-hand sides.
+    pub fn equations(&self) -> &[Expression; D] {
+        &self.equations
+    }
+}
+
+impl<const D: usize> Family<D> for OwnFamily<D> {
+    type Built<S: Scalar> = Own<S, D>;
+
+    fn parameters(&self) -> Vec<Parameter> {
+        self.parameters.iter().map(|name| parameter(name, "")).collect()
+    }
+
+    fn build<S: Scalar>(&self, values: &[S]) -> Own<S, D> {
+        Own { equations: self.equations.clone(), deep: self.deep, parameters: values.to_vec() }
+    }
+}

@@ -1,0 +1,360 @@
+"""Effects as formulas and curves, and models of the user's own: what they compute, and what they refuse."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import udd
+from udd import effects
+from udd.effects import Effect, curve, formula
+from udd.errors import ModelError
+from udd.sweeping.models_json import model_from_dict, model_to_dict
+
+X = np.random.default_rng(2).normal(size=(50, 4)) * [5.0, 0.03, 0.03, 3.0]
+T = np.linspace(0.0, 5.0, 50)
+
+# --- effects
+
+
+@pytest.mark.parametrize(
+    ("library", "own"),
+    [
+        (effects.quadratic_drag(c=1e-3), formula("torque", "-c*abs(Omega)*Omega", c=1e-3)),
+        (
+            effects.coulomb(c=1e-3),
+            formula("torque", "-c*tanh(Omega/eps)", amplitudes=["c"], c=1e-3, eps=0.05),
+        ),
+        (effects.radial_friction(c=0.1), formula("friction", "c*(Y^2 + Z^2)", c=0.1)),
+        (effects.relaxation(b=5.0), formula("vertical", "-b*W*Z", momentum="constraint", b=5.0)),
+        (effects.slip(c=0.3, momentum="consistent"), formula("vertical", "-c*Z", c=0.3)),
+        (
+            effects.drive_ripple(a=0.1, b=0.2, f=1.3),
+            formula(
+                "vertical", "W*(a*cos(w*t) + b*sin(w*t))", amplitudes=["a", "b"], a=0.1, b=0.2, w=2.6 * np.pi
+            ),
+        ),
+    ],
+    ids=lambda effect: effect.name,
+)
+def test_a_formula_acts_as_the_librarys_effect_does(library: Effect, own: Effect) -> None:
+    wanted, found = (udd.Disk(0.05, effects=[effect]).rates(T, X) for effect in (library, own))
+    # Roundings of the same sums in another order.
+    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-13)
+
+
+def test_a_formula_goes_wherever_an_effect_goes() -> None:
+    warp = formula(
+        "torque",
+        "a*sin(n*beta)",
+        amplitudes=["a"],
+        ranges={"n": (1, 9)},
+        name="warp",
+        title="a warp",
+        a=0.01,
+        n=2,
+    )
+    disk = udd.Disk(0.039, effects=[effects.slip(c=0.1), warp, curve("lateral", "Z", -0.1, 0.1, [0.0] * 5)])
+    assert list(disk.parameters)[6:9] == ["slip.c", "warp.a", "warp.n"]
+    assert (warp.title, warp.equation, warp.amplitudes, warp.slots) == (
+        "a warp",
+        "torque = a*sin(n*beta)",
+        ("a",),
+        ("torque",),
+    )
+    assert disk.effects[2].momentum == "consistent" and disk.units["curve.c4"] == "m/s"
+    changed = disk.with_parameters({"warp.a": 0.5, "curve.c0": 1.0})
+    assert changed.effects[1] == formula(
+        "torque",
+        "a*sin(n*beta)",
+        amplitudes=["a"],
+        ranges={"n": (1, 9)},
+        name="warp",
+        title="a warp",
+        a=0.5,
+        n=2,
+    )
+    with pytest.raises(ModelError, match="n of warp must lie between 1 and 9"):
+        disk.with_parameters({"warp.n": 10.0})
+    for model in (disk, changed):
+        assert eval(repr(model), {**vars(effects), "slip": effects.slip, "Disk": udd.Disk}) == model
+        assert pickle.loads(pickle.dumps(model)) == model and hash(model) == hash(copy.deepcopy(model))
+        assert model_from_dict(json.loads(json.dumps(model_to_dict(model)))) == model
+    # One pendulum and one name serve too.
+    drag = formula("torque", "-c*Omega^3", c=0.1)
+    own, library = (
+        udd.Pendulum(0.5, effects=e).rates(0.0, X[:, :2]) for e in (drag, effects.cubic_drag(c=0.1))
+    )
+    np.testing.assert_allclose(own, library, rtol=1e-12)
+
+
+def test_a_run_with_a_formula_is_that_with_the_librarys_effect() -> None:
+    start, end = [1.0, 0.01, -0.02, 0.3], 3.0
+    library = effects.relaxation(b=3.0, momentum="consistent"), effects.quadratic_drag(c=1e-3)
+    own = formula("vertical", "-b*W*Z", name="own", b=3.0), formula("torque", "-c*abs(Omega)*Omega", c=1e-3)
+    for method in ("dopri5", "taylor"):
+        runs = [udd.simulate(udd.Disk(0.05, effects=e), end, start, method=method) for e in (library, own)]
+        # The same steps but for roundings, which chaos lets grow over 3 s by less than a thousand.
+        np.testing.assert_allclose(runs[0].state[-1], runs[1].state[-1], rtol=1e-9, atol=1e-11)
+        assert runs[0].events.kind == runs[1].events.kind and len(runs[0].events) > 3
+
+
+def test_a_curve_is_the_spline_with_these_coefficients() -> None:
+    from scipy.interpolate import BSpline
+
+    coefficients = np.random.default_rng(3).normal(size=9)
+    bend = curve("torque", "Y", -0.05, 0.07, coefficients)
+    step = 0.12 / 6
+    spline = BSpline(-0.05 + step * np.arange(-3, 10), coefficients, 3)
+    y = np.linspace(-0.05, 0.07, 101)
+    states = np.stack([0 * y, y, 0 * y, 0 * y], axis=-1)
+    disk = udd.Disk(0.039)
+    torque = (disk.with_effects([bend]).rates(0.0, states) - disk.rates(0.0, states))[:, 0]
+    # Numbers of order one, over an inertia of 0.003 and beside a rate of 200.
+    np.testing.assert_allclose(torque * (0.08**2 / 2 + y**2), spline(y), atol=1e-11)
+    np.testing.assert_allclose(bend.made.basis(y) @ coefficients, spline(y), atol=1e-13)
+    assert bend.expression.count("s(") == 8
+    run = udd.simulate(
+        udd.Disk(0.039, effects=bend.replace(c3=0.0)), 0.1, [1.0, 0.01, 0.0, 0.0], method="auto"
+    )
+    assert run.outcome == "finished"
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [
+        (lambda: formula("torque", "q*Z"), 'the formula "q*Z" has the unknown name q'),
+        (lambda: formula("torque", "__import__('os')"), "has the character '\\''"),
+        (lambda: formula("torque", "sin(c*Z)", c=1.0), "not proportional to c"),
+        (lambda: formula("tork", "c", c=1.0), "the slot must be one of torque, friction, lateral, vertical"),
+        (lambda: formula("torque", "c*Z", c=1.0, d=2.0), "does not use its parameter d"),
+        (lambda: formula("torque", "c*Z", c=np.nan), "c of formula must be finite"),
+        (lambda: formula("torque", "c*Z", c=1.0, momentum="consistent"), "must be left out"),
+        (
+            lambda: formula("vertical", "c*Z", c=1.0, momentum="none"),
+            "momentum of formula must be 'consistent'",
+        ),
+        (lambda: formula("torque", "c*Z", c=1.0, name="slip"), "already: give the formula another name"),
+        (lambda: formula("torque", "c*Z", c=1.0, name="a b"), "must be a single word"),
+        (lambda: formula("torque", "c*Z", c=1.0, amplitudes="c"), "amplitudes must be a list"),
+        (lambda: formula("torque", "c*Z", c=1.0, amplitudes=["d"]), "formula has no parameter 'd'"),
+        (lambda: formula("torque", "c*Z", c=1.0, ranges={"c": (1, 0)}), "must go upwards"),
+        (lambda: formula("torque", "c*Z", c=2.0, ranges={"c": (0, 1)}), "must lie between 0 and 1"),
+        (lambda: formula("torque", ["c"], c=2.0), "the formula must be text or a SymPy expression"),
+        (lambda: udd.Pendulum(0.5, effects=formula("vertical", "c*Z", c=1.0)), "acts on a disk, not on a"),
+        (lambda: udd.Disk(0.1, effects=formula("torque", "c*theta", c=1.0)), "acts on a pendulum, not on a"),
+        (lambda: curve("torque", "q", 0, 1, [1, 2, 3, 4]), "unknown name q"),
+        (lambda: curve("torque", "Z + Y", 0, 1, [1, 2, 3, 4]), "the coordinate must be a name"),
+        (lambda: curve("torque", "Z", 1, 0, [1, 2, 3, 4]), "high must be above 1"),
+        (lambda: curve("torque", "Z", 0, 1, [1, 2, 3]), "at least four coefficients"),
+    ],
+)
+def test_an_effect_that_cannot_be_used_is_named(make: Callable[[], object], named: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        make()
+    message = str(caught.value)
+    assert named in message and "\n" not in message and len(message) < 400
+
+
+# --- models
+
+
+def lorenz(**parameters: float) -> udd.Model:
+    return udd.Model(
+        ["x", "y", "z"],
+        {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
+        {"sigma": 10.0, "rho": 28.0, "beta": 8.0 / 3.0, **parameters},
+    )
+
+
+def double_pendulum() -> udd.Model:
+    """Two equal rods without weight, equal masses, g = l = 1: angles and their rates."""
+    d = "(a - b)"
+    below = f"(3 - cos(2*{d}))"
+    return udd.Model(
+        ["a", "b", "p", "q"],
+        {
+            "a": "p",
+            "b": "q",
+            "p": f"(-3*g*sin(a) - g*sin(a - 2*b) - 2*sin{d}*(q^2 + p^2*cos{d}))/{below}",
+            "q": f"2*sin{d}*(2*p^2 + 2*g*cos(a) + q^2*cos{d})/{below}",
+        },
+        {"g": 1.0},
+        angles=["a", "b"],
+    )
+
+
+def driven_pendulum() -> udd.Model:
+    return udd.Model(
+        ["theta", "v"], ["v", "-sin(theta) - c*v + f*cos(w*t)"], {"c": 0.5, "f": 1.2, "w": 2 / 3}
+    )
+
+
+def test_a_model_as_text_has_the_rates_of_the_built_in_one() -> None:
+    dle = udd.Model(
+        ["omega", "y", "z"], ["y - omega", "omega*z", "w - omega*y - B*w*z"], {"w": 1.7, "B": 0.2}
+    )
+    np.testing.assert_array_equal(dle.rates(0.0, X[:, :3]), udd.DLE(1.7, 0.2).rates(0.0, X[:, :3]))
+    disk = udd.Model(
+        ["Omega", "Y", "Z", "beta"],
+        {
+            "Omega": "(g*Y - k*Omega - Z*W*Omega)/(R^2/2 + Y^2 + Z^2)",
+            "Y": "Z*Omega",
+            "Z": "-Y*Omega + W",
+            "beta": "Omega",
+        },
+        {"W": 0.05, "R": 0.08, "g": 9.81, "k": 0.012},
+        angles=["beta"],
+    )
+    built_in = udd.Disk(0.05, k0=0.012, k1=0.0, k2=0.0).rates(0.0, X)
+    # Two sums in another order.
+    np.testing.assert_allclose(disk.rates(0.0, X), built_in, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "dop853", "taylor"])
+@pytest.mark.parametrize(
+    ("model", "start", "end"),
+    [
+        (lorenz(), [1.0, 1.0, 1.0], 5.0),
+        (double_pendulum(), [1.5, 1.0, 0.0, 0.0], 10.0),
+        (driven_pendulum(), [0.2, 0.0], 20.0),
+        (udd.Model(["x"], ["r*x*(1 - x)"], {"r": 2.0}), [0.01], 5.0),
+        (
+            udd.Model(list("abcdef"), ["b - a", "c - b", "d - c", "e - d", "f - e", "sin(t) - f"]),
+            [1.0, 0.0, 0.0, 0.0, 0.0, 2.0],
+            5.0,
+        ),
+    ],
+    ids=["lorenz", "double pendulum", "driven pendulum", "logistic", "chain"],
+)
+def test_runs_are_those_of_scipy(model: udd.Model, start: list[float], end: float, method: str) -> None:
+    from scipy.integrate import solve_ivp
+
+    run = udd.simulate(model, end, start, method=method, rtol=1e-11, atol=1e-13)
+    other = solve_ivp(model.rates, (0.0, end), start, method="DOP853", rtol=1e-12, atol=1e-14)
+    # Errors of 1e-11 a step, which Lorenz's equations amplify by e^5 or so.
+    np.testing.assert_allclose(run.state[-1], other.y[:, -1], rtol=2e-8, atol=2e-8)
+
+
+def test_the_double_pendulum_keeps_its_energy() -> None:
+    run = udd.simulate(
+        double_pendulum(), np.linspace(0, 100, 201), [2.0, 2.5, 0.0, 0.0], rtol=1e-13, method="taylor"
+    )
+    kinetic = run.p**2 + run.q**2 / 2 + run.p * run.q * np.cos(run.a - run.b)
+    energy = kinetic - 2 * np.cos(run.a) - np.cos(run.b)
+    # Over some thousand steps of 1e-13.
+    np.testing.assert_allclose(energy, energy[0], atol=1e-11)
+
+
+def test_own_models_are_values() -> None:
+    model = lorenz()
+    assert isinstance(model, udd.Model) and isinstance(udd.DLE(1.0), udd.Model)
+    assert eval(repr(model), {"Model": udd.Model}) == model and hash(model) == hash(lorenz())
+    assert eval(repr(double_pendulum()), {"Model": udd.Model}) == double_pendulum()
+    for again in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model), copy.copy(model), model.replace()):
+        assert again == model
+    changed = model.with_parameters({"rho": 14.0})
+    assert changed == lorenz(rho=14.0) == model.replace(rho=14.0) and changed != model
+    assert changed.parameters["rho"] == 14.0 and list(model.units) == ["sigma", "rho", "beta"]
+    assert model.replace(equations=["y", "z", "-x"], parameters={}).equations == {
+        "x": "y",
+        "y": "z",
+        "z": "-x",
+    }
+    with pytest.raises(AttributeError):
+        model.values = ()  # type: ignore[attr-defined]
+    with pytest.raises(AttributeError):
+        udd.simulate(model, 0.1, [1.0, 1.0, 1.0]).nonsense  # noqa: B018
+
+
+def test_a_term_is_added_to_an_equation() -> None:
+    model = lorenz()
+    more = model.with_term("y", "x*z - 1", c=0.5)  # type: ignore[attr-defined]
+    x = X[:, :3]
+    wanted = model.rates(0.0, x)
+    wanted[:, 1] += 0.5 * (x[:, 0] * x[:, 2] - 1)
+    np.testing.assert_allclose(more.rates(0.0, x), wanted, rtol=1e-13, atol=1e-13)
+    np.testing.assert_array_equal(more.with_parameters({"c": 0.0}).rates(0.0, x), model.rates(0.0, x))
+    assert list(more.parameters) == ["sigma", "rho", "beta", "c"]
+
+
+def test_expressions_of_sympy_serve_as_text() -> None:
+    sympy = pytest.importorskip("sympy", reason="SymPy is not a dependency")
+    t = sympy.Symbol("t")
+    x, v = sympy.Function("x")(t), sympy.Symbol("v")
+    rate = (
+        -sympy.sin(x)
+        + sympy.Float("0.1") * sympy.Abs(v) ** 3
+        - sympy.exp(1) * sympy.sqrt(x**2 + sympy.Rational(1, 3))
+    )
+    model = udd.Model([x.func, v], {x.func: v, v: rate})
+    states = np.random.default_rng(1).normal(size=(20, 2))
+    a, b = states.T
+    wanted = -np.sin(a) + 0.1 * np.abs(b) ** 3 - np.e * np.sqrt(a**2 + 1 / 3)
+    np.testing.assert_allclose(model.rates(0.0, states)[:, 1], wanted, rtol=1e-13, atol=1e-14)
+    with pytest.raises(ModelError, match="contains a derivative"):
+        udd.Model(["x"], [x.diff(t)])
+    c, z = sympy.symbols("c Z")
+    own = formula("torque", c * sympy.tanh(z), c=0.1)
+    np.testing.assert_array_equal(
+        udd.Disk(0.1, effects=own).rates(0.0, X),
+        udd.Disk(0.1, effects=formula("torque", "c*tanh(Z)", c=0.1)).rates(0.0, X),
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [
+        (lambda: lorenz(rho=np.inf), "the parameter rho must be finite"),
+        (
+            lambda: udd.Model(["x"], {"x": "-q*x"}),
+            "the equation of x has the unknown name q; allowed are the state x",
+        ),
+        (lambda: udd.Model(["x", "y"], {"x": "y"}), "the state y has no equation"),
+        (lambda: udd.Model(["x"], {"x": "1", "z": "2"}), "there is an equation of 'z'"),
+        (lambda: udd.Model(["x", "y"], ["y"]), "2 states but 1 equations"),
+        (lambda: udd.Model(["x"], "x"), "equations must be a table or a list"),
+        (lambda: udd.Model(["x"], [None]), "the equation of x must be text"),
+        (lambda: udd.Model(["x"], ["x' = 1"]), "may not use rates"),
+        (lambda: udd.Model(["x"], ["x = 1"]), "has =, but only the right-hand side"),
+        (lambda: udd.Model([], []), "a model has 1 to 6 states, not 0"),
+        (lambda: udd.Model(list("abcdefg"), ["1"] * 7), "a model has 1 to 6 states, not 7"),
+        (lambda: udd.Model("xy", ["1", "2"]), "states must be a list of names"),
+        (lambda: udd.Model(["x", "x"], ["1", "2"]), "the name x is given twice"),
+        (lambda: udd.Model(["x"], ["x"], {"x": 1.0}), "the name x is given twice"),
+        (lambda: udd.Model(["t"], ["1"]), "a state cannot be called t"),
+        (lambda: udd.Model(["x"], ["sin*x"], {"sin": 1.0}), "a parameter cannot be called sin"),
+        (lambda: udd.Model(["x"], ["1"], {"a b": 1.0}), "must be a single word"),
+        (lambda: udd.Model(["x"], ["1"], [1.0]), "parameters must be a table"),
+        (lambda: udd.Model(["x"], ["1"], angles=["y"]), "the angle 'y' is no state"),
+        (lambda: lorenz().with_parameters({"c": 1.0}), "has no parameter 'c'; it has sigma, rho, beta"),
+        (lambda: lorenz().replace(w=1.0), "the model has no 'w'"),
+        (lambda: lorenz().with_effects([effects.slip()]), "takes a term: with_term"),
+        (lambda: lorenz().with_term("w", "x", c=1.0), "there is no equation of 'w'"),
+        (lambda: lorenz().with_term("x", "x"), "a term has one factor"),
+        (lambda: lorenz().with_term("x", "x", rho=1.0), "has a parameter 'rho' already"),
+        (lambda: lorenz().with_term("x", "q", c=1.0), "the equation of x has the unknown name q"),
+        (lambda: udd.simulate(lorenz(), 1.0, [1.0, 2.0]), "state0 must have the 3 components x, y, z"),
+        (
+            lambda: udd.simulate(udd.Model(["x"], ["-abs(x)"]), 1.0, [1.0], method="taylor"),
+            "depends on comparisons",
+        ),
+    ],
+)
+def test_a_model_that_cannot_be_used_is_named(make: Callable[[], object], named: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        make()
+    message = str(caught.value)
+    assert named in message and "\n" not in message and len(message) < 400
+
+
+def test_auto_takes_another_method_where_there_is_no_series() -> None:
+    model = udd.Model(["x"], ["-abs(x)"])
+    run = udd.simulate(model, 1.0, [1.0], method="auto")
+    # As exact as ten steps of 1e-9.
+    assert run.state[-1, 0] == pytest.approx(np.exp(-1.0), abs=1e-8)
