@@ -116,14 +116,54 @@ proptest! {
     }
 }
 
+/// Derivatives of splines, in the coordinate and in each coefficient, against differences.
+#[test]
+fn splines_have_derivatives() {
+    type N = Dual<f64, 1>;
+    let own = ["a", "b", "c", "d", "e"];
+    for text in ["spline(Z, -0.03, 0.04, a, b, c, d, e)", "periodic(beta, 0, 6.5, a, b, c, d, e)"] {
+        let effect = Effect::formula(Arc::new(formula(Slot::Vertical, text, &own, &own).unwrap()));
+        let disk = DiskFamily { effects: vec![effect], edge: false };
+        let values: Vec<f64> = PLAIN.into_iter().chain([0.02, 0.07, -0.02, 0.04, 0.03]).collect();
+        for (z, beta) in [(0.013, 1.0), (-0.0299, -9.3), (0.05, 6.4)] {
+            let x = [1.0, 0.01, z, beta];
+            for moved in [2, 3, 10, 11, 12, 13, 14] {
+                let at = |by: f64| {
+                    let (mut x, mut p) = (x, values.clone());
+                    if moved < 4 {
+                        x[moved] += by
+                    } else {
+                        p[moved - 4] += by
+                    }
+                    rates(&disk.build(&p), 0.0, &x)
+                };
+                let of = |v: f64, i: usize| N { re: v, d: [f64::from(i == moved)] };
+                let p: Vec<N> = values.iter().enumerate().map(|(i, &v)| of(v, 4 + i)).collect();
+                let exact = rates(&disk.build(&p), N::fixed(0.0), &from_fn(|n| of(x[n], n)));
+                let (up, down) = (at(1e-6), at(-1e-6));
+                for n in 0..4 {
+                    let difference = (up[n] - down[n]) / 2e-6;
+                    // Roundings of rates of 30 over the step, and a third derivative of 1e6.
+                    assert!(
+                        (exact[n].d[0] - difference).abs() < 1e-6 + 1e-6 * difference.abs(),
+                        "{text} {moved} {n}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// A packet's lanes have the bits of single numbers, comparisons included.
 #[test]
 fn packets_have_the_bits_of_numbers() {
     type P = Packet<LANES, Plain>;
-    let text = "c*(bspline(3*Omega) + bspline(Omega - 1) + abs(Z) + Omega^3*exp(-Y) - 1/(2 + cos(beta)))";
-    let own = Effect::formula(Arc::new(formula(Slot::Vertical, text, &["c"], &["c"]).unwrap()));
+    let text = "spline(Y, -0.01, 0.05, e, f, h, l, m) + periodic(beta, 0, 3, e, f, h, l) + c*(bspline(3*Omega) + bspline(Omega - 1) + abs(Z) + Omega^3*exp(-Y) - 1/(2 + cos(beta)))";
+    let own = Effect::formula(Arc::new(
+        formula(Slot::Vertical, text, &["e", "f", "h", "l", "m", "c"], &[]).unwrap(),
+    ));
     let disk = DiskFamily { effects: vec![own], edge: false };
-    let values: Vec<f64> = PLAIN.into_iter().chain([0.1]).collect();
+    let values: Vec<f64> = PLAIN.into_iter().chain([0.1, 0.7, -0.2, 0.4, 0.3, 0.1]).collect();
     let at = |lane: usize| {
         let s = lane as f64;
         [0.7 * s - 1.0, 0.01 * s, 0.03 - 0.02 * s, s]
@@ -148,6 +188,10 @@ fn smooth_formulas_have_series() {
     assert!(recorded(Slot::Vertical, "c*W*ln(2 + sin(beta))*tanh(t)"));
     assert!(!recorded(Slot::Torque, "c*abs(Z)"));
     assert!(!recorded(Slot::Torque, "c*bspline(Omega)"));
+    let own = ["a", "b", "c", "d"];
+    let bent = formula(Slot::Torque, "spline(Z, 0, 1, a, b, c, d)", &own, &own).unwrap();
+    let bent = DiskFamily { effects: vec![Effect::formula(Arc::new(bent))], edge: false };
+    assert!(Tape::record(&bent, &[]).is_err());
 }
 
 #[test]
@@ -166,6 +210,11 @@ fn what_is_no_effect_is_refused() {
         ("W*Z", &["W"], &[], "cannot have a parameter called W"),
         ("sin*Z", &["sin"], &[], "cannot have a parameter called sin"),
         ("c = Z", &["c"], &["c"], "has ="),
+        ("spline(Z, 0, 1, a, b, c)", &["a", "b", "c"], &["a"], "needs spline(x, low, high, c0, c1, ...)"),
+        ("spline(Z, 1, 0, a, b, c, d)", &["a", "b", "c", "d"], &["a"], "needs spline(x, low, high"),
+        ("spline(Z, 0, 1, a, c, b, d)", &["a", "b", "c", "d"], &["a"], "needs spline(x, low, high"),
+        ("spline(Z, 0, 1, a, b, c, d)", &["a", "b", "c", "d"], &["a"], "not proportional to a"),
+        ("spline(a*Z, 0, 1, a, b, c, d)", &["a", "b", "c", "d"], &["a", "b", "c", "d"], "not proportional"),
         ("c*W*theta", &["c"], &["c"], "mixes what only a disk has"),
     ] {
         let found = mistake(Slot::Torque, text, own, linear);
@@ -216,8 +265,7 @@ fn equations_that_cannot_be_used_are_named() {
 #[test]
 fn nothing_is_allocated_in_an_evaluation() {
     let deep = format!("{}c*Z{}", "(1 - Y*".repeat(8), ")".repeat(8));
-    let bodies = [("c*Z", &["c"][..]), (deep.as_str(), &[])];
-    for (text, linear) in bodies {
+    for (text, linear) in [("c*Z", &["c"][..]), (deep.as_str(), &[])] {
         let own = formula(Slot::Vertical, text, &["c"], linear).unwrap();
         let disk = DiskFamily { effects: vec![Effect::formula(Arc::new(own))], edge: false };
         let disk = disk.build(&[&PLAIN[..], &[0.1]].concat());

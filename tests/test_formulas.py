@@ -104,32 +104,55 @@ def test_a_run_with_a_formula_is_that_with_the_librarys_effect() -> None:
         assert runs[0].events.kind == runs[1].events.kind and len(runs[0].events) > 3
 
 
+def torque_of(effect: Effect, states: np.ndarray) -> np.ndarray:
+    """What an effect adds to the torque."""
+    disk = udd.Disk(0.039)
+    change = disk.with_effects([effect]).rates(0.0, states) - disk.rates(0.0, states)
+    return change[:, 0] * (0.08**2 / 2 + states[:, 1] ** 2 + states[:, 2] ** 2)
+
+
 def test_a_curve_is_the_spline_with_these_coefficients() -> None:
     from scipy.interpolate import BSpline
 
     coefficients = np.random.default_rng(3).normal(size=9)
     bend = curve("torque", "Y", -0.05, 0.07, coefficients)
-    step = 0.12 / 6
-    spline = BSpline(-0.05 + step * np.arange(-3, 10), coefficients, 3)
-    y = np.linspace(-0.05, 0.07, 101)
-    states = np.stack([0 * y, y, 0 * y, 0 * y], axis=-1)
-    disk = udd.Disk(0.039)
-    torque = (disk.with_effects([bend]).rates(0.0, states) - disk.rates(0.0, states))[:, 0]
+    spline = BSpline(-0.05 + 0.02 * np.arange(-3, 10), coefficients, 3)
+    y = np.linspace(-0.07, 0.09, 101)
+    wanted = spline(np.clip(y, -0.05, 0.07))
     # Numbers of order one, over an inertia of 0.003 and beside a rate of 200.
-    np.testing.assert_allclose(torque * (0.08**2 / 2 + y**2), spline(y), atol=1e-11)
-    np.testing.assert_allclose(bend.made.basis(y) @ coefficients, spline(y), atol=1e-13)
+    torque = torque_of(bend, np.stack([0 * y, y, 0 * y, 0 * y], axis=-1))
+    np.testing.assert_allclose(torque, wanted, atol=1e-11)
+    np.testing.assert_allclose(bend.spec.basis(y) @ coefficients, wanted, atol=1e-13)  # type: ignore[attr-defined]
     assert bend.expression.count("s(") == 8
-    run = udd.simulate(
-        udd.Disk(0.039, effects=bend.replace(c3=0.0)), 0.1, [1.0, 0.01, 0.0, 0.0], method="auto"
-    )
+    # The same by its bumps, within.
+    bumps = " + ".join(f"c{i}*bspline((Y + 0.05)/0.02 + 1 - {i})" for i in range(9))
+    given = {f"c{i}": c for i, c in enumerate(coefficients)}
+    within = (y > -0.05) & (y < 0.07)
+    other = torque_of(formula("torque", bumps, **given), np.stack([0 * y, y, 0 * y, 0 * y], axis=-1))
+    np.testing.assert_allclose(other[within], wanted[within], atol=1e-11)
+    run = udd.simulate(udd.Disk(0.039, effects=bend), 0.1, [1.0, 0.01, 0.0, 0.0], method="auto")
     assert run.outcome == "finished"
+
+
+def test_a_periodic_curve_begins_anew() -> None:
+    from scipy.interpolate import BSpline
+
+    coefficients = np.random.default_rng(4).normal(size=7)
+    uneven = curve("torque", "beta", 0.0, 2 * np.pi, coefficients, periodic=True, name="uneven")
+    spline = BSpline(2 * np.pi / 7 * np.arange(-3, 11), np.append(coefficients, coefficients[:3]), 3)
+    beta = np.linspace(-20.0, 20.0, 203)
+    states = np.stack([0 * beta, 0.02 + 0 * beta, 0 * beta, beta], axis=-1)
+    wanted = spline(np.mod(beta, 2 * np.pi))
+    np.testing.assert_allclose(torque_of(uneven, states), wanted, atol=1e-11)
+    np.testing.assert_allclose(uneven.spec.basis(beta) @ coefficients, wanted, atol=1e-12)  # type: ignore[attr-defined]
+    assert eval(repr(uneven), vars(effects)) == uneven
 
 
 @pytest.mark.parametrize(
     ("make", "named"),
     [
         (lambda: formula("torque", "q*Z"), 'the formula "q*Z" has the unknown name q'),
-        (lambda: formula("torque", "__import__('os')"), "has the character '\\''"),
+        (lambda: formula("torque", "c*__import__('os')", c=1.0), "has the unknown name __import__"),
         (lambda: formula("torque", "sin(c*Z)", c=1.0), "not proportional to c"),
         (lambda: formula("tork", "c", c=1.0), "the slot must be one of torque, friction, lateral, vertical"),
         (lambda: formula("torque", "c*Z", c=1.0, d=2.0), "does not use its parameter d"),
@@ -149,7 +172,8 @@ def test_a_curve_is_the_spline_with_these_coefficients() -> None:
         (lambda: udd.Pendulum(0.5, effects=formula("vertical", "c*Z", c=1.0)), "acts on a disk, not on a"),
         (lambda: udd.Disk(0.1, effects=formula("torque", "c*theta", c=1.0)), "acts on a pendulum, not on a"),
         (lambda: curve("torque", "q", 0, 1, [1, 2, 3, 4]), "unknown name q"),
-        (lambda: curve("torque", "Z + Y", 0, 1, [1, 2, 3, 4]), "the coordinate must be a name"),
+        (lambda: curve("torque", 1j, 0, 1, [1, 2, 3, 4]), "the coordinate must be text or a SymPy"),
+        (lambda: formula("torque", "spline(Z, 0, 1, a, b)", a=1.0, b=2.0), "needs spline(x, low, high, c0"),
         (lambda: curve("torque", "Z", 1, 0, [1, 2, 3, 4]), "high must be above 1"),
         (lambda: curve("torque", "Z", 0, 1, [1, 2, 3]), "at least four coefficients"),
     ],
@@ -320,7 +344,7 @@ def test_expressions_of_sympy_serve_as_text() -> None:
         (lambda: udd.Model(["x", "y"], ["y"]), "2 states but 1 equations"),
         (lambda: udd.Model(["x"], "x"), "equations must be a table or a list"),
         (lambda: udd.Model(["x"], [None]), "the equation of x must be text"),
-        (lambda: udd.Model(["x"], ["x' = 1"]), "may not use rates"),
+        (lambda: udd.Model(["x"], ["x' - 1"]), "may not use rates"),
         (lambda: udd.Model(["x"], ["x = 1"]), "has =, but only the right-hand side"),
         (lambda: udd.Model([], []), "a model has 1 to 6 states, not 0"),
         (lambda: udd.Model(list("abcdefg"), ["1"] * 7), "a model has 1 to 6 states, not 7"),

@@ -22,6 +22,7 @@ _PUBLIC = {
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
+    "Model": "udd.models",
     "Pendulum": "udd.models",
     "Section": "udd.sections",
     "Spectrum": "udd.spectra",
@@ -73,6 +74,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.measurement import read_measurement as read_measurement
     from udd.models import DLE as DLE
     from udd.models import Disk as Disk
+    from udd.models import Model as Model
     from udd.models import Pendulum as Pendulum
     from udd.sections import Section as Section
     from udd.sections import poincare as poincare

@@ -163,7 +163,7 @@ def lyapunov(
     n, shape = len(orbits), orbits.shape
     for drives in (orbits.values[name] for name in own if n):
         DLE(float(drives.min()))  # refuses what is negative
-    slow = 1.0 if isinstance(model, DLE) else 0.25  # the disk's unit of time is 0.27 s
+    slow = model.slow
     time, skipped = span(t, transient, longest=1e5 * slow, skip=400.0 * slow)
     goal = number("tol", 2e-3 / slow if tol is None else tol, above=0.0)
     rtol, atol = tolerances(rtol, atol)

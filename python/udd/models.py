@@ -71,6 +71,8 @@ class Model:
     """Their units, empty where dimensionless."""
     angles: ClassVar[tuple[str, ...]] = ()
     """The components that are angles: they may grow without end."""
+    slow: ClassVar[float] = 0.25
+    """About the unit of time in which the motion takes place, that of the disk being 0.27 s."""
     _plain: ClassVar[tuple[str, ...]]
     _options: ClassVar[tuple[str, ...]] = ("effects",)
     effects: tuple[Effect, ...]
@@ -302,6 +304,7 @@ class DLE(_BuiltIn):
     """
 
     kind: ClassVar[str] = "dle"
+    slow: ClassVar[float] = 1.0
     state_names: ClassVar[tuple[str, ...]] = ("omega", "y", "z")
     state_units: ClassVar[tuple[str, ...]] = ("", "", "")
     _plain: ClassVar[tuple[str, ...]] = ("w", "B")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd._validate import array
 from udd.errors import ModelError
-from udd.models import DLE, Disk, Model
+from udd.models import DLE, Disk, Model, Pendulum
 
 Floats = NDArray[np.float64]
 
@@ -22,8 +22,10 @@ def default_start(model: Model) -> list[float]:
     elif isinstance(model, Disk):
         # The same state in the disk's units, for the paper's constants.
         start = [3.75, 0.0046, 5e-5, 0.0]
-    else:
+    elif isinstance(model, Pendulum):
         start = [0.0, 1.0]
+    else:
+        raise ModelError("where orbits of a model of your own start is yours to say: give state0")
     return start + [0.0] * (len(model.state_names) - len(start))  # bristles are at rest
 
 

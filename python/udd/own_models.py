@@ -35,6 +35,7 @@ class OwnModel(Model):
     """
 
     kind: ClassVar[str] = "own"
+    slow: ClassVar[float] = 1.0
     _plain: ClassVar[tuple[str, ...]] = ()
     _options: ClassVar[tuple[str, ...]] = ("states", "equations", "parameters", "angles")
 

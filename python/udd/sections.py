@@ -169,7 +169,7 @@ class Section:
         ModelError
             The state has no such component, or there is no point to start from, or parameters were varied.
         """
-        name = _HEIGHT[self.model.kind] if component is None else component
+        name = _HEIGHT.get(self.model.kind, self.model.state_names[0]) if component is None else component
         self.component(name)
         if self.t.ndim != 1:
             raise ModelError("the cusp map is that of one orbit; ask udd.poincare for the maxima of many")
@@ -275,7 +275,7 @@ def poincare(
     1.679161
     """
     if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
     surfaces, ways = surfaces_of(model, section, direction)
     count, skipped = _whole("n", n, 1), _whole("transient", transient, 0)
     rtol, atol = tolerances(rtol, atol)
@@ -341,6 +341,8 @@ def surfaces_of(
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """The expressions, and the signs of the directions in which they are crossed."""
     if section is None:
+        if model.kind not in _DEFAULT:
+            raise ModelError("where orbits of a model of your own are cut is yours to say: give section")
         section = _DEFAULT[model.kind]
     texts = [section] if isinstance(section, str) else section
     if not isinstance(texts, Sequence) or not texts or not all(isinstance(text, str) for text in texts):
@@ -389,6 +391,8 @@ def clock_of(model: Model, rows: _Floats) -> float:
     elif model.kind == "disk":
         # The same, as w = tau W/L.
         rate = np.sqrt(p["g"] * p["W"] / (4.0 * p["k0"])) / 10.0
+    elif model.kind == "own":
+        rate = np.full(len(rows), 0.1)  # its unit of time is the user's
     else:
         rate = np.sqrt(p["g"] * p["length"] / p["inertia"]) / (2.0 * np.pi)
     slowest = float(rate[np.isfinite(rate) & (rate > 0)].min(initial=1.0))

@@ -155,7 +155,7 @@ def lyapunov_spectrum(
     ((600,), True)
     """
     model = w if isinstance(w, Model) else DLE(number("w", w, least=0.0))
-    slow = 1.0 if isinstance(model, DLE) else 0.25  # the disk's unit of time is 0.27 s
+    slow = model.slow
     time, skipped = span(t, transient, longest=2e5 * slow, skip=400.0 * slow)
     goal = number("tol", 1e-3 / slow if tol is None else tol, above=0.0)
     rtol, atol = tolerances(rtol, atol)
@@ -404,7 +404,7 @@ def covariant_vectors(
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise ModelError(f"n must be a whole number of at least 1, not {n!r}")
-    slow = 1.0 if isinstance(model, DLE) else 0.25
+    slow = model.slow
     step = number("dt", 0.5 * slow if dt is None else dt, above=0.0)
     aside = number("transient", 200.0 * slow if transient is None else transient, least=0.0)
     rtol, atol = tolerances(rtol, atol)

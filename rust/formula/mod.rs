@@ -4,6 +4,9 @@
 //! which can be evaluated over any [`Scalar`]; nothing else in the text means anything.
 
 mod parse;
+mod spline;
+
+pub use spline::Spline;
 
 use thiserror::Error;
 
@@ -18,7 +21,8 @@ pub const HIGHEST: i32 = 1024;
 
 /// Whether a name means something in every formula, so that nothing else can be called so.
 pub fn is_reserved(name: &str) -> bool {
-    name == "t" || name == "pi" || parse::FUNCTIONS.iter().any(|(function, _)| *function == name)
+    let function = parse::FUNCTIONS.iter().any(|(function, _)| *function == name);
+    function || parse::SPLINES.contains(&name) || name == "t" || name == "pi"
 }
 
 /// The names that a formula may use, beside the time `t`, the number `pi` and the functions.
@@ -84,6 +88,8 @@ pub enum Op {
     Push(Leaf),
     Unary(Unary),
     Binary(Binary),
+    /// A function of one number, given by its coefficients.
+    Spline(Spline),
 }
 
 /// Where a formula is evaluated.
@@ -124,7 +130,7 @@ impl Expression {
         for op in &ops {
             match op {
                 Op::Push(_) => height += 1,
-                Op::Unary(_) => {}
+                Op::Unary(_) | Op::Spline(_) => {}
                 Op::Binary(_) => height -= 1,
             }
             depth = depth.max(height);
@@ -198,6 +204,9 @@ impl Expression {
                     top += 1;
                 }
                 Op::Unary(function) => stack[top - 1] = function.of(stack[top - 1]),
+                Op::Spline(spline) => {
+                    stack[top - 1] = spline.of(stack[top - 1], |i| leaf(Leaf::Parameter(i)));
+                }
                 Op::Binary(function) => {
                     top -= 1;
                     stack[top - 1] = function.of(stack[top - 1], stack[top]);

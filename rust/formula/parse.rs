@@ -6,10 +6,10 @@
 //! product  = signed {("*" | "/") signed}
 //! signed   = ("-" | "+") signed | power
 //! power    = atom [("^" | "**") signed]
-//! atom     = number | name ["'"] | function "(" sum ")" | "(" sum ")"
+//! atom     = number | name ["'"] | function "(" sum {"," sum} ")" | "(" sum ")"
 //! ```
 
-use super::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Unary};
+use super::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Spline, Unary};
 
 /// The functions by their names.
 pub(super) const FUNCTIONS: [(&str, Unary); 12] = [
@@ -76,7 +76,7 @@ impl Token<'_> {
     }
 }
 
-const SIGNS: [&str; 10] = ["**", "+", "-", "*", "/", "^", "(", ")", "=", "'"];
+const SIGNS: [&str; 11] = ["**", "+", "-", "*", "/", "^", "(", ")", "=", "'", ","];
 
 fn tokens(text: &str) -> Result<Vec<Token<'_>>, Mistake> {
     let mut list = Vec::new();
@@ -224,6 +224,43 @@ impl Parser<'_> {
         if self.takes(")") { Ok(()) } else { mistake("lacks a closing bracket") }
     }
 
+    /// What follows the name of a spline: `(x, low, high, c0, c1, ...)`.
+    fn spline(&mut self, name: &str) -> Parsed {
+        let usage = || {
+            mistake(format!(
+                "needs {name}(x, low, high, c0, c1, ...) with numbers low below high and at least four parameters that follow each other"
+            ))
+        };
+        if !self.takes("(") {
+            return usage();
+        }
+        let mut ops = self.sum()?;
+        let mut rest = Vec::new();
+        while self.takes(",") {
+            rest.push(self.sum()?);
+        }
+        self.close()?;
+        let [low, high, coefficients @ ..] = rest.as_slice() else { return usage() };
+        let (Some(low), Some(high)) = (number(low), number(high)) else { return usage() };
+        let places: Vec<usize> = coefficients
+            .iter()
+            .filter_map(|one| match one.as_slice() {
+                [Op::Push(Leaf::Parameter(i))] => Some(*i),
+                _ => None,
+            })
+            .collect();
+        let in_order = places.windows(2).all(|pair| pair[1] == pair[0] + 1);
+        if places.len() < 4 || places.len() != coefficients.len() || !in_order || !(low < high) {
+            return usage();
+        }
+        let spline = Spline::new(places[0], places.len(), (low, high), name == "periodic");
+        if !spline.per.is_finite() {
+            return usage();
+        }
+        ops.push(Op::Spline(spline));
+        Ok(ops)
+    }
+
     fn name(&mut self, name: &str) -> Parsed {
         let find = |list: &[String]| list.iter().position(|own| own == name);
         let leaf = if let Some(n) = find(self.names.states) {
@@ -241,6 +278,8 @@ impl Parser<'_> {
             let argument = self.sum()?;
             self.close()?;
             return Ok(unary(function, argument));
+        } else if SPLINES.contains(&name) {
+            return self.spline(name);
         } else {
             return mistake(format!("has the unknown name {name}; {}", allowed(self.names)));
         };
@@ -256,6 +295,9 @@ impl Parser<'_> {
     }
 }
 
+/// The functions that are given by coefficients.
+pub(super) const SPLINES: [&str; 2] = ["spline", "periodic"];
+
 /// What a formula may use.
 fn allowed(names: Names<'_>) -> String {
     let states = names.states.join(", ");
@@ -266,7 +308,7 @@ fn allowed(names: Names<'_>) -> String {
         ),
         false => String::new(),
     };
-    let functions = FUNCTIONS.map(|(name, _)| name).join(", ");
+    let functions = [&FUNCTIONS.map(|(name, _)| name)[..], &SPLINES].concat().join(", ");
     let parameters = match names.parameters {
         [] => String::new(),
         list => format!(", the parameters {}", list.join(", ")),

@@ -52,18 +52,18 @@ macro_rules! with_model {
 }
 pub(crate) use with_model;
 
-/// The same for work on packets, which is compiled for each instruction set: friction by bristles, rarely
-/// wanted there, would double the time that takes.
+/// The same for work on packets and tangents, which takes long to compile: not for friction by bristles and
+/// numbers of states that are rarely wanted there.
 macro_rules! with_wide_model {
     ($model:expr, |$family:ident, $values:ident| $body:expr) => {
         match $model {
             $crate::python::model::AnyModel::Dle($family, $values) => $body,
             $crate::python::model::AnyModel::Disk($family, $values) => $body,
             $crate::python::model::AnyModel::Pendulum($family, $values) => $body,
-            _ => {
-                let message = "friction with the treatment lugre is for udd.simulate; here take set-valued";
-                return Err($crate::python::errors::ModelError::new_err(message));
-            }
+            $crate::python::model::AnyModel::Own2($family, $values) => $body,
+            $crate::python::model::AnyModel::Own3($family, $values) => $body,
+            $crate::python::model::AnyModel::Own4($family, $values) => $body,
+            other => return Err(other.too_much()),
         }
     };
 }
@@ -158,6 +158,16 @@ impl AnyModel {
             AnyModel::Own6(family, _) => return family.states(),
         };
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
+    }
+
+    /// Why it is for `udd.simulate` only.
+    pub fn too_much(&self) -> PyErr {
+        ModelError::new_err(match self {
+            AnyModel::BristledDisk(..) | AnyModel::BristledPendulum(..) => {
+                "friction with the treatment lugre is for udd.simulate; here take set-valued"
+            }
+            _ => "a model of your own with 1, 5 or 6 states is for udd.simulate; here it needs 2 to 4",
+        })
     }
 
     /// The parameter values.

@@ -13,8 +13,6 @@ from udd.models import Model
 
 Floats = NDArray[np.float64]
 
-_ANGLES = ("beta", "theta")
-
 
 @dataclass(frozen=True)
 class Coordinates:
@@ -60,7 +58,7 @@ def coordinates_of(model: Model, states: Floats) -> Coordinates:
     size = np.array(
         [sizes.get(name, float(top) or 1.0) for name, top in zip(model.state_names, largest, strict=True)]
     )
-    angle = np.array([name in _ANGLES for name in model.state_names])
+    angle = np.array([name in model.angles for name in model.state_names])
     # At states of no particular kind; the same in every process.
     probes = size * np.random.default_rng(1).uniform(-0.9, 0.9, (8, len(size)))
     for k in np.flatnonzero(angle):

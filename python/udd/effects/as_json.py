@@ -18,7 +18,7 @@ def to_dict(effect: Effect) -> dict[str, Any]:
     spec = effect.made
     common = {"slot": effect.slots[0], "name": effect.name, "momentum": effect.momentum}
     if isinstance(spec, CurveSpec):
-        where = {"coordinate": spec.coordinate, "low": spec.low, "high": spec.high}
+        where = {"coordinate": spec.coordinate, "low": spec.low, "high": spec.high, "periodic": spec.periodic}
         return {"curve": {**common, **where, "coefficients": list(effect.values)}}
     if not isinstance(spec, FormulaSpec):
         raise ModelError(f"{effect.name} is an effect of the library")

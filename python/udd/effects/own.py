@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,16 +71,24 @@ class CurveSpec(FormulaSpec):
         What the curve is a function of.
     low, high : float
         Where it begins and ends.
+    periodic : bool
+        Whether it begins anew where it ends.
     """
 
     coordinate: str
     low: float
     high: float
+    periodic: bool
+
+    @property
+    def cells(self) -> int:
+        """How many stretches there are between its knots."""
+        return len(self.parameters) - (0 if self.periodic else 3)
 
     @property
     def step(self) -> float:
         """The distance of its knots."""
-        return (self.high - self.low) / (len(self.parameters) - 3)
+        return (self.high - self.low) / self.cells
 
     def basis(self, x: ArrayLike) -> NDArray[np.float64]:
         """The curve's values for each coefficient alone.
@@ -94,14 +102,19 @@ class CurveSpec(FormulaSpec):
         -------
         ndarray (..., coefficients)
         """
-        places = (array("x", x)[..., None] - self.low) / self.step + 1.0 - np.arange(len(self.parameters))
-        outer, inner = (np.clip(width - np.abs(places), 0.0, None) for width in (2.0, 1.0))
+        u = (array("x", x) - self.low) / self.step
+        u = np.mod(u, self.cells) if self.periodic else np.clip(u, 0.0, self.cells)
+        away = np.abs(u[..., None] + 1.0 - np.arange(self.cells + 3))
+        outer, inner = (np.clip(width - away, 0.0, None) for width in (2.0, 1.0))
         result: NDArray[np.float64] = (outer**3 - 4.0 * inner**3) / 6.0
+        if self.periodic:
+            result, beyond = result[..., :-3].copy(), result[..., -3:]
+            result[..., :3] += beyond
         return result
 
     def expression(self, values: Mapping[str, float], equation: str) -> str:
         """The curve by its values at the knots."""
-        knots = self.low + self.step * np.arange(len(self.parameters) - 2)
+        knots = self.low + self.step * np.arange(self.cells if self.periodic else self.cells + 1)
         at = self.basis(knots) @ np.array(list(values.values()))
         shown = ", ".join(f"s({x:.4g}) = {value:.4g}" for x, value in zip(knots, at, strict=True))
         return f"{equation}, {shown}"
@@ -110,6 +123,8 @@ class CurveSpec(FormulaSpec):
         """The function that makes the effect, and its arguments as text."""
         where = [repr(self.slots[0]), repr(self.coordinate), repr(self.low), repr(self.high)]
         items = [*where, repr(list(effect.values))]
+        if self.periodic:
+            items.append("periodic=True")
         if self.name != "curve":
             items.append(f"name={self.name!r}")
         return "curve", items
@@ -140,8 +155,8 @@ def formula(
         Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
         friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
         numbers, ``pi``, and the effect's own parameters; with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``,
-        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``abs`` and ``bspline``, the cardinal cubic
-        B-spline.
+        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``abs``, ``bspline`` (the cardinal cubic
+        B-spline) and the splines of :func:`curve`.
     momentum : {"consistent", "constraint"}, optional
         How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
     name : str
@@ -207,11 +222,12 @@ def written(
 
 def curve(
     slot: str,
-    coordinate: str,
+    coordinate: Expression,
     low: float,
     high: float,
-    coefficients: Sequence[float],
+    coefficients: ArrayLike,
     *,
+    periodic: bool = False,
     momentum: str | None = None,
     name: str = "curve",
 ) -> Effect:
@@ -221,13 +237,15 @@ def curve(
     ----------
     slot : {"torque", "friction", "lateral", "vertical"}
         What the curve adds to; see :func:`formula`.
-    coordinate : str
-        What it is a function of: ``"Omega"``, ``"Y"``, ``"Z"``, ``"beta"``, ``"t"`` or any other that a
-        formula knows.
+    coordinate : str or SymPy expression
+        What it is a function of: ``"Omega"``, ``"Y"``, ``"Z"``, ``"beta"``, ``"t"`` or any formula, such as
+        ``"sqrt(Y^2 + Z^2)"``.
     low, high : float
-        Where it begins and ends. Beyond, it falls to zero within two knots.
-    coefficients : sequence of float
+        Where it begins and ends. Beyond, it keeps its last value.
+    coefficients : array_like, shape (n,)
         At least four; they are the parameters ``c0``, ``c1``, ..., all amplitudes.
+    periodic : bool
+        Whether it begins anew where it ends, as over an angle from 0 to 2 pi.
     momentum : {"consistent", "constraint"}, optional
         How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
     name : str
@@ -245,8 +263,9 @@ def curve(
     Notes
     -----
     The curve is ``sum of c[i] B((x - low)/h + 1 - i)`` with the cardinal cubic B-spline ``B`` and
-    ``h = (high - low)/(n - 3)`` for ``n`` coefficients: every cubic spline with these knots from `low` to
-    `high`. Its second derivative is continuous.
+    ``h = (high - low)/(n - 3)``: every cubic spline with these knots from `low` to `high`. A periodic one has
+    ``h = (high - low)/n`` and begins anew with ``c[0]`` after ``c[n - 1]``. Second derivatives are
+    continuous, but where the curve ends. In formulas it is ``spline(x, low, high, c0, c1, ...)`` and ``periodic(...)``.
 
     Examples
     --------
@@ -261,17 +280,14 @@ def curve(
     if values.ndim != 1 or len(values) < 4:
         raise ModelError("a curve needs a list of at least four coefficients")
     first, last = number("low", low), number("high", high, above=float(low))
-    if not (isinstance(coordinate, str) and coordinate.isidentifier()):
-        raise ModelError(f"the coordinate must be a name such as 'Omega', not {coordinate!r}")
     _slot(slot)
-    unit = _SLOTS[slot][1]
+    x, unit = text_of("the coordinate", coordinate), _SLOTS[slot][1]
     names = [f"c{i}" for i in range(len(values))]
     listed = tuple(_parameter(name, own, unit, True, UNLIMITED) for own in names)
-    per, start = (len(values) - 3) / (last - first), 1.0 - first * (len(values) - 3) / (last - first)
-    text = " + ".join(f"{own}*bspline({per!r}*{coordinate} + {start - i!r})" for i, own in enumerate(names))
-    shown = f"s({coordinate}), a cubic spline from {first:g} to {last:g}"
-    common = _described(slot, name, f"{slot} over {coordinate}", shown, text, listed)
-    spec = CurveSpec(*common, listed, text, coordinate, first, last)
+    text = f"{'periodic' if periodic else 'spline'}({x}, {first!r}, {last!r}, {', '.join(names)})"
+    shown = f"s({x}), a {'periodic ' if periodic else ''}cubic spline from {first:g} to {last:g}"
+    common = _described(slot, name, f"{slot} over {x}", shown, text, listed)
+    spec = CurveSpec(*common, listed, text, x, first, last, bool(periodic))
     return spec.make(momentum=momentum, treatment=None, **dict(zip(names, values.tolist(), strict=True)))
 
 

@@ -68,7 +68,7 @@ def _time_unit(model: Model) -> str:
 
 
 def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
-    slow = 1.0 if isinstance(model, DLE) else 0.25  # as in `udd.lyapunov`
+    slow = model.slow
     defaults = {"t": None, "tol": 2e-3 / slow, "transient": None, "rtol": 1e-8, "atol": 1e-10}
     chosen = _chosen(given, defaults)
     t, skipped = span(chosen["t"], chosen["transient"], longest=1e5 * slow, skip=400.0 * slow)

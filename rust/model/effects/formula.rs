@@ -64,8 +64,11 @@ impl Formula {
         function
             .replace(&[Op::Push(Leaf::State(OMEGA)), Op::Unary(Unary::Abs)], Op::Push(Leaf::State(SPEED)));
         let uses = |leaf| function.ops().contains(&Op::Push(leaf));
+        let in_spline = |i| {
+            function.ops().iter().any(|op| matches!(op, Op::Spline(own) if own.parameters().contains(&i)))
+        };
         for (i, own) in parameters.iter().enumerate() {
-            if !uses(Leaf::Parameter(i)) {
+            if !uses(Leaf::Parameter(i)) && !in_spline(i) {
                 return wrong(format!("does not use its parameter {own}"));
             }
         }
@@ -190,6 +193,11 @@ fn degree(function: &Expression, is_amplitude: &[bool]) -> Degree {
                     Other
                 }
             }
+            Op::Spline(spline) => match (stack.pop(), &is_amplitude[spline.parameters()]) {
+                (Some(Zero), own) if own.iter().all(|&amplitude| amplitude) => One,
+                (Some(Zero), own) if !own.contains(&true) => Zero,
+                _ => Other,
+            },
             Op::Binary(function) => {
                 let right = stack.pop().unwrap_or(Zero);
                 let left = stack.pop().unwrap_or(Zero);
