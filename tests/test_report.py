@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import discovered
 import udd
 from udd import _core
+from udd.discovery.innovations import innovations
 from udd.errors import UddError
-from udd.report import words
+from udd.report import runs, tables, words
 
 _VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -93,10 +97,69 @@ def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:
     assert words.with_error(effect.parameters["b"], effect.errors["b"]) in text
     for h in found.error_before.horizons:
         assert words.length(found.error_after.at(h)[0], "m") in text
-    assert "It could equally be slip c Z" in text
+    else_ = text[text.index("What else it could be") : text.index("What these data cannot say")]
+    assert "Slip c Z" in else_
     assert "film a second drive" in text
     assert "camera turned clockwise" in text
     assert udd.effects.relaxation().title in text
+
+
+def test_the_page_follows_the_reader(pages: dict[str, str]) -> None:
+    """What was measured, how well the model does and where it fails, what was added, what else, how again."""
+    heads = re.findall(r"<h2>(.*?)</h2>", pages["disk"])
+    assert heads == [
+        "What was measured",
+        "The error, before and after",
+        "Where the known model fails",
+        "What was added, and why",
+        "What else it could be",
+        "What these data cannot say",
+        "The numbers",
+        "To do it again",
+    ]
+    text = Page(pages["disk"]).words
+    assert "a disk of radius 8 cm that two wheels lift at 4.2 cm/s (as stated): 999 frames" in text
+    assert f"numpy {np.__version__}" in text
+
+
+def test_whiteness_before_and_after_is_told(pages: dict[str, str]) -> None:
+    found = discovered.disk()
+    before, after = innovations(found.baseline), innovations(found.fit)
+    rows = tables.whiteness([before, after])
+    assert [row["square"] for row in rows[::2]] == [f"{x:.3g}" for x in before.chi2]
+    text = Page(pages["disk"]).words
+    for row in rows:
+        assert f"{row['model']}{row['square']}{row['largest']}" in text  # cell by cell
+
+
+@pytest.mark.parametrize("name", ["disk", "nothing", "pendulum"])
+def test_the_motion_moves(pages: dict[str, str], name: str) -> None:
+    """The moving drawing turns what was measured as it was measured, at half its speed."""
+    results = {"disk": discovered.disk, "nothing": discovered.nothing, "pendulum": discovered.pendulum}
+    found = results[name]()
+    drawn = [i for i in Page(pages[name]).all("img") if (i["alt"] or "").startswith("A moving picture")]
+    assert len(drawn) == 1
+    uri = drawn[0]["src"] or ""
+    drawing = ElementTree.fromstring(base64.b64decode(uri.partition("base64,")[2]))
+    moves = drawing.findall(".//{*}animateTransform")
+    turns = [m for m in moves if m.attrib["type"] == "rotate"]
+    panels = 1 + 1 + bool(found.effects)
+    assert len(turns) == panels
+    times, seen, _ = runs.side_by_side(found, 6.0 if name != "pendulum" else 12.0)
+    assert {m.attrib["dur"] for m in moves} == {f"{2 * (times[-1] - times[0]):g}s"}
+    angle = np.degrees(seen[:, -1] if name != "pendulum" else -seen[:, 0])
+    shown = np.array([float(x) for x in turns[0].attrib["values"].split(";")])
+    there = np.isfinite(angle)
+    np.testing.assert_allclose(shown[there], angle[there], atol=0.06)  # a decimal of a degree
+
+
+def test_the_command_that_does_it_again() -> None:
+    found = discovered.pendulum()
+    assert words.command(found, "my swing.csv") == (
+        "udd discover 'my swing.csv' --pendulum 0.6 --k0 0.01 --report report.html"
+    )
+    assert words.command(discovered.disk(), "a.csv") == "udd discover a.csv --W 0.042 --report report.html"
+    assert words.command(found, None) is None
 
 
 def test_nothing_missing_is_said(pages: dict[str, str]) -> None:

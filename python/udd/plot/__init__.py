@@ -11,9 +11,11 @@ from .evidence import errors, evidence
 from .fan import forecast
 from .fits import misfit, residuals
 from .friction import friction
+from .grid import residual_map
 from .maps import basins, bifurcation
 from .motion import orbit, phase_space, time_series
 from .picture import overlay
+from .whiten import whiteness
 
 __all__ = [
     "basins",
@@ -27,7 +29,9 @@ __all__ = [
     "overlay",
     "phase_space",
     "poincare",
+    "residual_map",
     "residuals",
     "return_map",
     "time_series",
+    "whiteness",
 ]

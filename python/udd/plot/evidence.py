@@ -128,7 +128,10 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     ax.set_xticks(before.horizons, [f"{h:g}" for h in before.horizons])
     ax.minorticks_off()
     ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    low, high = ax.get_ylim()
+    ax.yaxis.set_major_locator(
+        LogLocator(subs=(1.0, 2.0, 5.0) if high > 8 * low else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
+    )
     ax.set_xlabel("time since the model was let go [s]")
     ax.set_ylabel(f"median error [{unit}]")
     ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)

@@ -40,8 +40,8 @@ def residuals(
     equation : str, optional
         The state whose rate it is; by default the one with the clearest pattern.
     against : str, optional
-        ``"t"``, a state, or ``"R"``; by default that of Omega, Y, Z, theta, R along which the pattern is
-        clearest.
+        ``"t"``, a state (beta modulo one turn), or ``"R"``; by default that, but for t, along which the
+        pattern is clearest.
     colour : str
         Of the means.
 
@@ -120,15 +120,15 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
         linewidth=0,
         label="noise, ± 2 s.d.",
     )
-    ax.plot(
-        t,
-        factor * fit.misfit[:, k],
-        ".",
-        color=MEASURED,
-        markersize=2.5,
-        label="measured − fitted",
-        rasterized=len(t) > 3000,
-    )
+    # A few outliers would press all else flat: they are shown on the edge.
+    y, edge = factor * fit.misfit[:, k], 6 * factor * float(np.median(sd[there]))
+    looks: dict[str, Any] = {"color": MEASURED, "linestyle": "none", "rasterized": len(t) > 3000}
+    ax.plot(t, y, marker=".", markersize=2.5, label="measured − fitted", **looks)
+    if np.nanmax(np.abs(y)) > edge:
+        ax.set_ylim(-edge, edge)
+        for sign, marker in ((1, "^"), (-1, "v")):
+            out = sign * y > edge
+            ax.plot(t[out], np.full(int(out.sum()), sign * 0.96 * edge), marker=marker, markersize=4, **looks)
     ax.axhline(0, color="black", linewidth=0.8)
     ax.set_xlabel(label("t"))
     ax.set_ylabel(f"{words}: measured − fitted [{unit}]")
@@ -141,6 +141,8 @@ def coordinates(fit: Any) -> dict[str, Array]:
     """What a residual can be drawn against, at the frame that each flow starts from."""
     columns = dict(zip(fit.model.state_names, fit.states[:-1].T, strict=True))
     result = {"t": fit.record.t[:-1] + fit.record.origin, **columns}
+    if "beta" in columns:
+        result["beta"] = np.mod(columns["beta"], 2 * np.pi)
     if "Z" in columns:
         result["R"] = np.hypot(columns["Y"], columns["Z"])
     return result
@@ -152,7 +154,7 @@ def clearest(fit: Any, equation: str | None = None, against: str | None = None) 
     best, found = -1.0, (names[0], "t")
     for name in [equation] if equation else names:
         for place, x in coordinates(fit).items():
-            if place != against and (against is not None or place in ("t", "beta")):
+            if place != against and (against is not None or place == "t"):
                 continue  # along time, whatever changes slowly looks like a pattern
             share = pattern(x, fit.defect[:, names.index(name)])
             if share > best:
@@ -174,16 +176,40 @@ def pattern(x: Array, y: Array) -> float:
     return float(count @ mean**2) / total - (_BINS - 1) / (n - 1) if total > 0 else 0.0
 
 
-def binned(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Means of `y` along `x` with their standard errors, in bins that hold equally many frames."""
+def binned(x: Array, y: Array, bins: int = _BINS) -> tuple[Array, Array, Array]:
+    """Means of `y` along `x` with their standard errors, in bins that hold equally many frames.
+
+    Neighbouring frames go together. The errors come from the scatter of stretches of frames much longer than
+    `y` remembers; those of white noise would be too small by a half or more.
+    """
     there = np.isfinite(x) & np.isfinite(y)
+    n = int(there.sum())
+    bins = min(bins, max(n // 8, 1))
+    if n < 2:
+        return np.empty(0), np.empty(0), np.empty(0)
+    stretch = np.flatnonzero(there) // min(_remembered(y), max(n // bins // 6, 1))
     x, y = x[there], y[there]
-    order = np.argsort(x, kind="stable")
-    groups = [g for g in np.array_split(order, min(_BINS, max(len(order) // 8, 1))) if len(g) > 1]
-    centre = np.array([x[g].mean() for g in groups])
-    mean = np.array([y[g].mean() for g in groups])
-    error = np.array([y[g].std(ddof=1) / np.sqrt(len(g)) for g in groups])
-    return centre, mean, error
+    number = np.argsort(np.argsort(x, kind="stable"), kind="stable") * bins // n
+    count = np.bincount(number, minlength=bins)
+    centre = np.bincount(number, x, minlength=bins) / count
+    mean = np.bincount(number, y, minlength=bins) / count
+    _, stretch = np.unique(stretch, return_inverse=True)
+    cells = number * (int(stretch.max()) + 1) + stretch
+    size = bins * (int(stretch.max()) + 1)
+    sums = np.bincount(cells, y - mean[number], minlength=size).reshape(bins, -1)
+    used = (np.bincount(cells, minlength=size).reshape(bins, -1) > 0).sum(axis=1)
+    share = used / np.maximum(used - 1, 1)
+    return centre, mean, np.sqrt(share * (sums**2).sum(axis=1)) / count
+
+
+def _remembered(y: Array) -> int:
+    """A stretch of frames three times as long as `y` remembers."""
+    x = np.nan_to_num(y - np.nanmean(y))
+    power = float(x @ x)
+    for lag in range(1, min(len(x) // 4, 400)):
+        if float(x[lag:] @ x[:-lag]) < 0.1 * power:
+            return 3 * lag
+    return max(len(x) // 4, 1)
 
 
 def _check(fit: Any) -> None:

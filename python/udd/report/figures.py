@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd import plot
-from udd.errors import UddError
 from udd.measurement import Measurement
 from udd.plot import fits
 from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
-from . import runs
+from . import movie, runs
 from .loose import loosest
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _FRAMES = 4  # of the film
@@ -27,23 +27,30 @@ _FRAMES = 4  # of the film
 
 @dataclass(frozen=True)
 class Image:
-    """A picture with what it shows in words."""
+    """A picture with what it shows in words, and its width on the page in pixels."""
 
     uri: str
     alt: str
+    width: int
 
 
-def draw(discovery: Any, film: str | os.PathLike[str] | None) -> dict[str, Any]:
+def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[Any]) -> dict[str, Any]:
     """All pictures of a discovery; what cannot be shown is absent."""
+    loose = [loosest(discovery.baseline)]
+    if discovery.effects:
+        loose.append(loosest(discovery.fit))
     result: dict[str, Any] = {
+        "movie": movie.side_by_side(discovery, film),
+        "film": frames(discovery, film) if film is not None else None,
         "orbit": orbits(discovery),
         "forecast": forecast(discovery),
-        "residuals": residuals(discovery),
+        "map": residual_map(loose),
+        "residuals": residuals(loose),
+        "whiteness": whiteness(innovations),
         "evidence": [evidence(discovery, stage) for stage in range(len(discovery.scans))],
         "errors": errors(discovery),
         "friction": friction(discovery.fit),
         "misfit": misfits(discovery.fit),
-        "film": frames(discovery, film) if film is not None else None,
     }
     return result
 
@@ -54,8 +61,8 @@ def orbits(discovery: Any) -> Image:
     if discovery.effects:
         runs_shown.append(("with the added effect", discovery.fit, AFTER))
     n = 1 + len(runs_shown)
-    figure = _figure(3.6 * n, 3.8)
-    axes = figure.subplots(1, n, sharex=True, sharey=True, squeeze=False)[0]
+    figure, grid = _figure(3.5 * n, 3.8, columns=n, top=0.55, shared=True)
+    axes = grid[0]
     pendulum = discovery.measurement.kind == "pendulum"
     if not pendulum:
         plot.orbit(discovery.measurement, axes[0])
@@ -74,7 +81,8 @@ def orbits(discovery: Any) -> Image:
             ax.set_title(f"{words}\n(leaves the wheels after {run.t[-1] - run.t[0]:.3g} s)")
     for ax in axes[1:]:
         ax.set_ylabel("")
-    return _svg(
+        ax.tick_params(labelleft=False)
+    return _png(
         figure,
         "The path of the disk's centre as measured, and free runs of the fitted models for the same time",
     )
@@ -85,8 +93,7 @@ def forecast(discovery: Any) -> Image:
     found = runs.forecast(discovery)
     name = "Z" if discovery.measurement.kind == "disk" else "theta"
     k = discovery.measurement.names.index(name)
-    figure = _figure(9.0, 3.2)
-    ax = figure.subplots()
+    figure, ((ax,),) = _figure(9.0, 3.2, top=0.4)
     ax.plot(found.t_seen, scale(name) * found.seen[:, k], ".", color=MEASURED, markersize=5, label="measured")
     ax.plot(found.t, scale(name) * found.before[:, k], color=BEFORE, linewidth=1.5, label="the known model")
     if discovery.effects:
@@ -108,52 +115,75 @@ def forecast(discovery: Any) -> Image:
     )
 
 
-def residuals(discovery: Any) -> Image:
-    """What each equation leaves over, before and after."""
-    columns = [("the known model", discovery.baseline, BEFORE)]
-    if discovery.effects:
-        columns.append(("with the added effect", discovery.fit, AFTER))
-    columns = [(words, loosest(fit), colour) for words, fit, colour in columns]
-    names = discovery.baseline.model.state_names
-    figure = _figure(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.3 * len(names) + 0.3)
-    axes = figure.subplots(len(names), len(columns), squeeze=False, sharey="row")
-    for row, name in zip(axes, names, strict=True):
-        against = fits.clearest(columns[0][1], name)[1]
-        spread = []
-        for ax, (_, fit, colour) in zip(row, columns, strict=True):
-            plot.residuals(fit, ax, equation=name, against=against, colour=colour)
-            y = EQUATIONS[name][2] * fit.defect[:, names.index(name)]
-            _, mean, error = fits.binned(fits.coordinates(fit)[against], y)
-            spread.append(max(float(np.nanquantile(np.abs(y), 0.9)), float(np.max(np.abs(mean) + 3 * error))))
-        row[0].set_ylim(-1.15 * max(spread), 1.15 * max(spread))
-        for ax in row[1:]:
-            ax.set_ylabel("")
-    for ax, (words, _, _) in zip(axes[0], columns, strict=True):
+def residual_map(loose: list[Any]) -> Image:
+    """What each equation leaves over along each coordinate, before and after."""
+    rows = len(loose[0].model.state_names)
+    figure, ((ax,),) = _figure(9.4, 0.95 * rows + 0.55, left=1.05, bottom=0.5, top=0.05)
+    plot.residual_map(loose[-1], ax, before=loose[0] if len(loose) > 1 else None)
+    return _svg(figure, "Mean residual of every equation along every coordinate, with bands of two errors")
+
+
+def residuals(loose: list[Any]) -> Image:
+    """The clearest of these patterns frame by frame, before and after."""
+    columns = list(zip(("the known model", "with the added effect"), loose, (BEFORE, AFTER), strict=False))
+    equation, against = fits.clearest(loose[0])
+    figure, grid = _figure(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.9, columns=len(columns))
+    spread = []
+    k = loose[0].model.state_names.index(equation)
+    for ax, (words, fit, colour) in zip(grid[0], columns, strict=True):
+        plot.residuals(fit, ax, equation=equation, against=against, colour=colour)
+        y = EQUATIONS[equation][2] * fit.defect[:, k]
+        _, mean, error = fits.binned(fits.coordinates(fit)[against], y)
+        spread.append(max(float(np.nanquantile(np.abs(y), 0.9)), float(np.max(np.abs(mean) + 3 * error))))
         ax.set_title(words)
-    return _svg(
-        figure,
-        "The residual of each equation against the coordinate along which it shows the clearest pattern",
-    )
+    for ax in grid[0]:
+        ax.set_ylim(-1.15 * max(spread), 1.15 * max(spread))
+    for ax in grid[0][1:]:
+        ax.set_ylabel("")
+        ax.tick_params(labelleft=False)
+    return _png(figure, "The residual of one equation, frame by frame, along one coordinate")
 
 
 def evidence(discovery: Any, stage: int) -> Image:
     """The evidence for each candidate at one stage of the search."""
-    figure = _figure(9.0, 1.1 + 0.28 * min(12, len(discovery.scans[stage])))
-    plot.evidence(discovery, figure.subplots(), stage=stage)
+    scan = [s for s in discovery.scans[stage] if not s.absorbed][:12]
+    longest = max((len(s.candidate.title) for s in scan), default=10)
+    figure, ((ax,),) = _figure(9.0, 1.2 + 0.28 * len(scan), left=0.4 + 0.072 * longest, top=0.55)
+    plot.evidence(discovery, ax, stage=stage)
+    ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
     return _svg(figure, "Bars: the evidence for each candidate effect; dashed: what chance hardly reaches")
 
 
 def errors(discovery: Any) -> Image:
     """Held-out errors against the horizon."""
-    figure = _figure(6.0, 3.8)
-    plot.errors(discovery, figure.subplots())
+    figure, ((ax,),) = _figure(6.4, 3.8, top=0.4)
+    plot.errors(discovery, ax)
     return _svg(figure, "Median error on held-out data against the time since the model was let go")
+
+
+def whiteness(found: list[Any]) -> Image:
+    """Autocorrelation of the innovations, before and after."""
+    names = found[0].names
+    figure, grid = _figure(
+        3.1 * len(names) + (0 if len(names) > 1 else 4.0), 2.7, columns=len(names), top=0.4
+    )
+    said = (("the known model", BEFORE), ("with the added effect", AFTER))
+    for ax, name in zip(grid[0], names, strict=True):
+        for each, (words, colour) in zip(found, said, strict=False):
+            plot.whiteness(each, ax, channel=name, colour=colour, name=words)
+        ax.text(0.95, 0.95, CHANNELS[name][0], ha="right", va="top", transform=ax.transAxes)
+        ax.set_ylabel("autocorrelation" if ax is grid[0][0] else "")
+        low = min(float(np.min(line.get_ydata())) for line in ax.lines)
+        ax.set_ylim(-0.5 if low > -0.5 else -1.0, 1.0)
+        ax.tick_params(labelleft=ax is grid[0][0])
+    grid[0][0].legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
+    return _svg(figure, "Autocorrelation of the innovations against the lag, with the band of white noise")
 
 
 def friction(fit: Any) -> Image:
     """The friction that was found."""
-    figure = _figure(6.0, 3.2)
-    plot.friction(fit, figure.subplots())
+    figure, ((ax,),) = _figure(6.4, 3.2)
+    plot.friction(fit, ax)
     return _svg(
         figure, "The fitted friction coefficient against the angular velocity, with its standard error"
     )
@@ -162,32 +192,30 @@ def friction(fit: Any) -> Image:
 def misfits(fit: Any) -> Image:
     """What was seen less what was fitted, per channel."""
     names = fit.measurement.names
-    figure = _figure(9.0, 1.7 * len(names) + 0.4)
-    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, name in zip(axes, names, strict=True):
+    figure, grid = _figure(9.0, 1.55 * len(names) + 0.7, rows=len(names))
+    for (ax,), name in zip(grid, names, strict=True):
         plot.misfit(fit, ax, channel=name)
         ax.set_ylabel("{} [{}]".format(*CHANNELS[name][:2]))
-        if ax is not axes[-1]:
+        if ax is not grid[-1][0]:
             ax.set_xlabel("")
-        if ax is not axes[0]:
-            ax.get_legend().remove()
-    return _svg(figure, "Measured less fitted, over time, with a band for the noise that was found")
+            ax.tick_params(labelbottom=False)
+        legend = ax.get_legend()
+        if ax is not grid[0][0] and legend is not None:
+            legend.remove()
+    return _png(figure, "Measured less fitted, over time, with a band for the noise that was found")
 
 
 def frames(discovery: Any, film: str | os.PathLike[str]) -> Image:
     """Some frames of the film with the fitted disk drawn over them."""
-    from udd.tracking import pictures_at, pixels
+    from udd.tracking import pictures_between, pixels
 
     m = discovery.measurement
-    if "px_per_m" not in m.meta:
-        raise UddError(f"the measurement was not tracked in a film, so {film} cannot be drawn on")
-    rows = discovery.fit.record.row
-    seen = np.flatnonzero(rows >= 0)
-    chosen = rows[seen[(np.linspace(0.05, 0.95, _FRAMES) * (len(seen) - 1)).astype(int)]]
+    # From the stretch that the moving picture shows, so that little of the film is decoded.
+    rows = np.flatnonzero(m.seen & (m.t >= discovery.split))
+    chosen = rows[np.unique(np.linspace(0, min(len(rows) - 1, 60), _FRAMES).astype(int))]
     geometry = pixels(_fitted(discovery.fit))
-    figure = _figure(2.6 * _FRAMES, 3.6)
-    axes = figure.subplots(1, _FRAMES, squeeze=False)[0]
-    for ax, picture, row in zip(axes, pictures_at(film, [int(r) for r in chosen]), chosen, strict=True):
+    figure, grid = _figure(2.6 * _FRAMES, 2.9, columns=_FRAMES, left=0.05, bottom=0.05, between=0.1)
+    for ax, picture, row in zip(grid[0], pictures_between(film, m.t[chosen]), chosen, strict=False):
         plot.overlay(picture, geometry, int(row), ax)
         _look_at(geometry, picture.shape, ax)
         ax.set_axis_off()
@@ -211,23 +239,51 @@ def _fitted(fit: Any) -> Measurement:
     )
 
 
-def _figure(width: float, height: float) -> Figure:
+def _figure(
+    width: float,
+    height: float,
+    *,
+    rows: int = 1,
+    columns: int = 1,
+    left: float = 0.85,
+    bottom: float = 0.6,
+    top: float = 0.3,
+    between: float = 0.25,
+    shared: bool = False,
+) -> tuple[Figure, list[list[Axes]]]:
+    """A figure and its Axes, row by row, with margins in inches: a layout engine takes half of the time."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height))
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=shared or "col", sharey=shared or "row")
+    figure.subplots_adjust(
+        left=left / width,
+        right=1 - 0.1 / width,
+        bottom=bottom / height,
+        top=1 - top / height,
+        wspace=between * columns / max(width - left, 1.0),
+        hspace=between * rows / max(height - bottom, 1.0),
+    )
+    return figure, grid.tolist()
 
 
 def _svg(figure: Figure, alt: str) -> Image:
     return _embedded(figure, "svg", alt, dpi=150)
 
 
+def _png(figure: Figure, alt: str) -> Image:
+    """For thousands of dots."""
+    return _embedded(figure, "png", alt, dpi=170)
+
+
 def _embedded(figure: Figure, kind: str, alt: str, dpi: int) -> Image:
     import matplotlib as mpl
 
     buffer = io.BytesIO()
-    metadata = {"Date": None, "Creator": None} if kind == "svg" else None
+    metadata = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}.get(kind)
     # Without the salt, and with the date, the same result would give another file every time.
     with mpl.rc_context({"svg.hashsalt": "udd"}):
-        figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata, bbox_inches="tight")
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
     mime = "image/svg+xml" if kind == "svg" else f"image/{kind}"
-    return Image(f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode()}", alt)
+    uri = f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode()}"
+    return Image(uri, alt, round(96 * figure.get_figwidth()))

@@ -16,7 +16,7 @@ def loosest(fit: Fit) -> Fit:
     """
     result = fit
     for diffusion in levels(fit.measurement.kind):
-        result = solve(fit.measurement, replace(fit.problem, diffusion=diffusion), fit.point)
+        result = solve(fit.measurements, replace(fit.problem, diffusion=diffusion), fit.point)
         if result.leverage < FOLLOWS:
             break
     return result

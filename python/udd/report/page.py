@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from udd.discovery.innovations import innovations
 from udd.errors import UddError
 from udd.files import write_whole
 
@@ -30,11 +31,12 @@ def write(
     path : path
         Of the page; an older one is replaced once the new one is complete.
     film : path, optional
-        The film that the measurement was tracked in; some of its frames are shown.
+        The film that the measurement was tracked in; a stretch of it is shown beside the models.
     source : path, optional
         The file that the analysis began with, named on the page with its SHA-256; by default the film.
     command : str, optional
-        How the page was made, for those who want to make it again.
+        How the page was made, for those who want to make it again; by default what `udd discover` takes for
+        the same analysis with its usual options.
 
     Raises
     ------
@@ -55,15 +57,19 @@ def write(
     )
     environment.filters["pretty"] = words.pretty
     origin = film if source is None else source
+    fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]
+    surprises = [innovations(fit) for fit in fits]
     page = environment.get_template("page.html").render(
         d=discovery,
         style=environment.loader.get_source(environment, "page.css")[0] if environment.loader else "",
         words=words,
         tables=tables,
-        pictures=figures.draw(discovery, film),
+        pictures=figures.draw(discovery, film, surprises),
+        innovations=surprises,
         numbers=words.headline(discovery),
-        command=command,
-        version=_version(),
+        command=command or words.command(discovery, None if origin is None else Path(origin).name),
+        version=_version("udd"),
+        versions=_versions(),
         source=_identity(origin),
     )
     write_whole(target, page.encode())
@@ -80,8 +86,16 @@ def _identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
         raise UddError(f"{path} cannot be read: {error.strerror}") from None
 
 
-def _version() -> str:
+def _version(name: str) -> str:
     try:
-        return version("udd")
+        return version(name)
     except PackageNotFoundError:
         return "(of unknown version)"
+
+
+def _versions() -> str:
+    """What the numbers may depend on."""
+    import platform
+
+    packages = ", ".join(f"{name} {_version(name)}" for name in ("udd", "numpy", "scipy"))
+    return f"{packages}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"

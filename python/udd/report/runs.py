@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from udd import _core
 from udd.errors import IntegrationError
+from udd.fitting import predicted
 from udd.trajectory import Trajectory, simulate
 
 Array = NDArray[np.float64]
@@ -82,10 +82,26 @@ def forecast(discovery: Any) -> Forecast:
     return Forecast(start, shown.t, seen, times_seen, before[late], after[late])
 
 
+def side_by_side(discovery: Any, seconds: float) -> tuple[Array, Array, list[Array]]:
+    """Times of frames from the first held-out one on, what was measured, and what the models make of it.
+
+    The known model comes first, then the one with the added effects if there are any.
+    """
+    fit = discovery.fit
+    t = fit.record.t
+    first = min(int(np.searchsorted(t, discovery.split - fit.record.origin)), len(t) - 3)
+    last = int(np.searchsorted(t, min(t[first] + seconds, t[-1]), side="right"))
+    frames = slice(first, last)
+    seen = np.where(fit.record.observed[frames], fit.record.seen[frames], np.nan)
+    fits = [discovery.baseline, *([fit] if discovery.effects else [])]
+    times = t[frames]
+    return times + fit.record.origin, seen, [_predicted(each, first, times) for each in fits]
+
+
 def _predicted(fit: Any, first: int, times: Array) -> Array:
     start = fit.record.t[first : first + 1]
     states = fit.states[first : first + 1]
-    result: Array = _core.predict(
-        fit.model, fit.point.camera, fit.point.clock, start, states, times[None, :]
+    result: Array = predicted(
+        fit.models, fit.point.sets, fit.record.film[first : first + 1], start, states, times[None, :]
     )[0]
     return result

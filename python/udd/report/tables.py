@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from udd import _core
+from udd.plot.whiten import shown_lags
 
 from . import words
 
@@ -87,6 +88,51 @@ def units(fit: Any) -> dict[str, str]:
     """The SI unit of every free parameter."""
     known = fit.model.units | dict(_core.camera_parameters(fit.measurement.kind))
     return {name: known.get(name, "") for name in fit.parameters}
+
+
+def measured(discovery: Any) -> Markup:
+    """What was measured, in a few sentences."""
+    m, model = discovery.measurement, discovery.baseline.model
+    usable = int(m.seen.sum())
+    rate = 1.0 / float(np.median(np.diff(m.t)))
+    frames = f"{len(m)} frames" + ("" if usable == len(m) else f", {usable} of them usable,")
+    sd = discovery.fit.noise.sd(discovery.fit.record, discovery.fit.states[:, 0])
+    each = [
+        f"{words.rough(float(np.median(own[np.isfinite(own)])), 'm' if name in ('Y', 'Z') else 'rad')} "
+        f"in {words.pretty(name)}"
+        for name, own in zip(m.names, sd.T, strict=True)
+    ]
+    noise = ", ".join(each[:-1]) + (" and " if len(each) > 1 else "") + each[-1]
+    if m.kind == "disk":
+        what = (
+            f"The centre and the orientation of a disk of radius {100 * model.R:g}\u00a0cm that two wheels "
+            f"lift at {100 * discovery.baseline.problem.models[0].W:.3g}\u00a0cm/s (as stated)"
+        )
+    else:
+        what = f"The angle of a pendulum of {100 * discovery.baseline.problem.models[0].length:.4g}\u00a0cm"
+    return Markup(
+        f"{what}: {frames} over {m.duration:.1f}\u00a0s, {rate:.3g} in a second. "
+        f"A typical frame is good to {noise}."
+    )
+
+
+def whiteness(innovations: list[Any]) -> list[dict[str, str]]:
+    """What remains in the innovations, channel by channel, before and after."""
+    rows = []
+    for k, name in enumerate(innovations[0].names):
+        for found, model in zip(innovations, ("known model", "with the effect"), strict=False):
+            lags = shown_lags(found)
+            rho, _ = found.autocorrelation(lags)
+            rows.append(
+                {
+                    "name": words.pretty(name) if model == "known model" else "",
+                    "model": model,
+                    "square": f"{found.chi2[k]:.3g}",
+                    "largest": f"{rho[int(np.abs(rho[:, k]).argmax()), k]:+.2f}".replace("-", "−"),
+                    "p": words.probability(float(found.ljung_box(lags)[1][k])),
+                }
+            )
+    return rows
 
 
 def noise(fit: Any) -> list[dict[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from dataclasses import dataclass
 from typing import Any
 
@@ -156,14 +157,19 @@ def length(value: float, unit: str) -> str:
     """An error with its unit, in thousandths: mm or mrad."""
     if not math.isfinite(value):
         return "–"
-    return f"{_three(1e3 * value)} {'mm' if unit == 'm' else 'mrad'}"
+    return f"{_digits(1e3 * value, 3)} {'mm' if unit == 'm' else 'mrad'}"
 
 
-def _three(value: float) -> str:
-    """Three significant digits without an exponent."""
+def rough(value: float, unit: str) -> str:
+    """As :func:`length`, with two digits."""
+    return f"{_digits(1e3 * value, 2)} {'mm' if unit == 'm' else 'mrad'}"
+
+
+def _digits(value: float, n: int) -> str:
+    """So many significant digits without an exponent."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
-    decimals = max(0, 2 - math.floor(math.log10(abs(value))))
+    decimals = max(0, n - 1 - math.floor(math.log10(abs(value))))
     return f"{value:.{decimals}f}"
 
 
@@ -215,6 +221,19 @@ def limit(other: Any) -> str:
     )
 
 
+def command(discovery: Any, source: str | None) -> str | None:
+    """What `udd discover` takes to do the same; None where the file is not known."""
+    known = discovery.baseline.problem.models[0]
+    if source is None or known.effects:
+        return None
+    usual = type(known)(*([known.W] if discovery.measurement.kind == "disk" else [known.length]))
+    given = {"disk": ["W"], "pendulum": ["length"]}[discovery.measurement.kind]
+    given += [name for name, value in known.parameters.items() if value != usual.parameters[name]]
+    names = {"length": "pendulum"}
+    options = (f"--{names.get(name, name)} {known.parameters[name]!r}" for name in dict.fromkeys(given))
+    return f"udd discover {shlex.quote(source)} {' '.join(options)} --report report.html"
+
+
 def short_limits(discovery: Any) -> list[str]:
     """What must stand beside the verdict, lest it says too much."""
     same = [a for a in discovery.alternatives if a.likeness > IDENTICAL]
@@ -234,7 +253,7 @@ def limits(discovery: Any) -> list[str]:
             "An effect smaller than this record can show may still be there: nothing missing means nothing "
             "that these data demand."
         )
-    result.append("Only the effects of the library were tried; the tables above name them.")
+    result.append("Only the effects of the library were tried; the table above names the best.")
     if discovery.measurement.kind == "disk":
         result.append(
             "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that "

@@ -4,6 +4,16 @@ from __future__ import annotations
 
 from .decode import Film, TrackError
 from .result import Pixels, pixels
-from .run import Tracking, pictures_at, track, track_in_detail
+from .run import Tracking, pictures_at, pictures_between, track, track_in_detail
 
-__all__ = ["Film", "Pixels", "TrackError", "Tracking", "pictures_at", "pixels", "track", "track_in_detail"]
+__all__ = [
+    "Film",
+    "Pixels",
+    "TrackError",
+    "Tracking",
+    "pictures_at",
+    "pictures_between",
+    "pixels",
+    "track",
+    "track_in_detail",
+]

@@ -82,8 +82,11 @@ class Film:
             raise TrackError(f"{self.path} holds no video")
         return container
 
-    def pictures(self) -> Iterator[Picture]:
-        """All frames that decode, in order of presentation, with increasing times."""
+    def pictures(self, since: float = 0.0) -> Iterator[Picture]:
+        """All frames that decode, in order of presentation, with increasing times.
+
+        Those from the last key frame up to `since` [s] on, where it is above 0; they are numbered from it.
+        """
         import av
 
         self.broken = 0
@@ -91,6 +94,8 @@ class Film:
         with self._open() as container:
             stream = container.streams.video[0]
             origin = stream.start_time or 0
+            if since > 0 and stream.time_base:
+                container.seek(origin + int(since / stream.time_base), stream=stream)
             packets = container.demux(stream)
             while row < MOST_BROKEN:
                 try:

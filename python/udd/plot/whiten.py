@@ -1,0 +1,73 @@
+"""Whether what a model leaves unforeseen is white noise."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd.errors import UddError
+
+from .style import AFTER, CHANNELS, FAINT, new_axes, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SHOWN = 1.0  # s, or 25 frames if that is more
+
+
+def whiteness(
+    innovations: Any,
+    ax: Axes | None = None,
+    *,
+    channel: str | None = None,
+    colour: str = AFTER,
+    name: str = "innovations",
+) -> Axes:
+    """The autocorrelation of a fit's innovations, with the band that white noise keeps to.
+
+    Parameters
+    ----------
+    innovations : Innovations
+    ax : Axes, optional
+        Drawn on again, a second fit's are added.
+    channel : str, optional
+        One of the measurement's columns; by default the first.
+    colour, name : str
+        Of the line, in the legend.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        No such channel, or no innovations.
+    """
+    if not hasattr(innovations, "autocorrelation"):
+        raise UddError(
+            f"innovations (udd.discovery) have an autocorrelation, not {type(innovations).__name__}"
+        )
+    names = innovations.names
+    channel = names[0] if channel is None else channel
+    if channel not in names:
+        raise UddError(f"the measurement has {', '.join(names)}, not {channel}")
+    k, lags = names.index(channel), shown_lags(innovations)
+    rho, sd = innovations.autocorrelation(lags)
+    lag = innovations.dt * np.arange(1, lags + 1)
+    ax = new_axes(ax)
+    if not ax.has_data():
+        band = 1.96 * sd[:, k]
+        ax.fill_between(lag, -band, band, color=FAINT, alpha=0.6, linewidth=0, label="95 % of white noise")
+        ax.axhline(0, color="black", linewidth=0.8)
+    ax.plot(lag, rho[:, k], color=colour, marker=".", markersize=5, linewidth=1.2, label=name)
+    ax.set_xlabel("lag [s]")
+    ax.set_ylabel(f"autocorrelation of {CHANNELS[channel][0]} [1]")
+    tidy(ax)
+    return ax
+
+
+def shown_lags(innovations: Any) -> int:
+    """How many lags are looked at."""
+    return int(min(max(25, round(_SHOWN / innovations.dt)), len(innovations.values) // 4))
