@@ -124,7 +124,7 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
     return models
 
 
-def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
+def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float] | None) -> Fit:
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
     The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
@@ -135,14 +135,14 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     fitted : Fit
     effects : sequence of Effect
         The effects to add.
-    amplitudes : sequence of float
-        Where their amplitudes start, in order.
+    amplitudes : sequence of float or None
+        Where their amplitudes start, in order; None to hold the effects as they are.
     """
-    names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
+    names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes] if amplitudes is not None else []
     line = 0.5 / float(np.ptp(fitted.record.t))
     scanned = [(e, p.name) for e in effects for p in e.spec.parameters if p.role == "frequency"]
     waves = [(f"{e.name}.{name}", e.parameters[name]) for e, name in scanned]
-    starts = dict(zip(names, amplitudes, strict=True))
+    starts = dict(zip(names, amplitudes or (), strict=True))
     models = tuple(
         own.with_effects((*own.effects, *effects)).with_parameters(starts) for own in fitted.models
     )

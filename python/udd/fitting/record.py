@@ -68,7 +68,7 @@ class Record:
     origins: tuple[float, ...]
 
     def part(self, frames: slice | NDArray[Any]) -> Record:
-        """Some frames: a slice, a mask or increasing numbers. Only those that follow one another are linked."""
+        """Frames by a slice, a mask or increasing numbers; only those that follow one another are linked."""
         chosen = np.arange(len(self.t))[frames]
         follow = np.diff(chosen) == 1
         return replace(
