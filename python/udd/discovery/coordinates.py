@@ -28,12 +28,15 @@ class Coordinate:
         ``(states, rates) -> values``: how fast it changes along the motion.
     angle : bool
         Whether it counts modulo a turn.
+    text : str or None
+        What it is called in formulas; None where it cannot be said.
     """
 
     name: str
     of: Callable[[Array, Array], Array]
     rate: Callable[[Array, Array], Array]
-    angle: bool = False
+    angle: bool
+    text: str | None
 
 
 @dataclass(frozen=True)
@@ -67,8 +70,14 @@ class Slot:
 def coordinates(model: Model) -> tuple[Coordinate, ...]:
     """What a model's unknown curves are tried against: its states and what is made of them, and time."""
     own = [
-        _state(k, name, angle=unit == "rad")
-        for k, (name, unit) in enumerate(zip(model.state_names, model.state_units, strict=True))
+        Coordinate(
+            name,
+            lambda _t, x, k=k: x[..., k],  # type: ignore[misc]
+            lambda _x, v, k=k: v[..., k],  # type: ignore[misc]
+            name in model.angles,
+            name,
+        )
+        for k, name in enumerate(model.state_names)
     ]
     if "Omega" in model.state_names:
         k = model.state_names.index("Omega")
@@ -77,14 +86,16 @@ def coordinates(model: Model) -> tuple[Coordinate, ...]:
                 "|Omega|",
                 lambda _t, x, k=k: np.abs(x[..., k]),  # type: ignore[misc]
                 lambda x, v, k=k: np.sign(x[..., k]) * v[..., k],  # type: ignore[misc]
+                False,
+                "abs(Omega)",
             )
         )
     if isinstance(model, Disk):
         own += [
-            Coordinate("R", lambda _t, x: np.hypot(x[..., 1], x[..., 2]), _radial),
-            Coordinate("theta", lambda _t, x: np.arctan2(x[..., 1], x[..., 2]), _azimuthal, angle=True),
+            Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
+            Coordinate("theta", lambda _t, x: np.arctan2(x[..., 1], x[..., 2]), _azimuthal, True, None),
         ]
-    own.append(Coordinate("t", lambda t, _x: t, lambda x, _v: np.ones(x.shape[:-1])))
+    own.append(Coordinate("t", lambda t, _x: t, lambda x, _v: np.ones(x.shape[:-1]), False, "t"))
     return tuple(own)
 
 
@@ -103,8 +114,9 @@ def coordinate(model: Model, name: str) -> Coordinate:
     raise FitError(f"a curve can be a function of {known}, not of {name!r}")
 
 
-def _state(k: int, name: str, angle: bool) -> Coordinate:
-    return Coordinate(name, lambda _t, x: x[..., k], lambda _x, v: v[..., k], angle)
+def _distance(_t: Array, x: Array) -> Array:
+    result: Array = np.hypot(x[..., 1], x[..., 2])
+    return result
 
 
 def _radial(x: Array, v: Array) -> Array:

@@ -116,6 +116,18 @@ def exponents(node: Node) -> set[int]:
     return {part[2][1] for part in parts(node) if part[0] == "^" and part[2][0] == "c"}
 
 
+def amplitudes(node: Node) -> set[int]:
+    """The numbers of constants to which the formula is proportional, taken together; none where it is not."""
+    if node[0] == "c":
+        return {node[1]}
+    if node[0] in "+-":
+        left, right = amplitudes(node[1]), amplitudes(node[2])
+        return left | right if left and right else set()
+    if node[0] == "*":
+        return amplitudes(node[1]) or amplitudes(node[2])
+    return amplitudes(node[1]) if node[0] == "/" else set()
+
+
 def scaled(node: Node, scale: float, values: list[float]) -> Node:
     """The formula of ``x / scale``, every scale a constant; new ones are appended to `values`."""
     if node[0] == "x":

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from .curves import NATS, Curve
 from .expressions import (
     Node,
+    amplitudes,
     constants,
     evaluate,
     exponents,
@@ -35,9 +36,8 @@ _HUGE = 1e6
 _POSITIONS = 160
 _NAMES = "abcdpqrsuvwz"
 _EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 0.5, -1.0)
-#: What a coordinate is called in the grammar; the others are called by their name.
+#: Coordinates that are never negative.
 _POSITIVE = ("|Omega|", "R")
-_VARIABLE = {"|Omega|": "abs(Omega)", "R": "sqrt(Y^2 + Z^2)"}
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,8 @@ class Formula:
         In the grammar of effects, its constants by name.
     parameters : dict of str to float
         The constants' values, SI units.
+    amplitudes : tuple of str
+        Those to which it is proportional, taken together.
     nats : float
         By how much the formula, its length and constants paid for, is more likely than the smooth curve.
     node : tuple
@@ -58,6 +60,7 @@ class Formula:
 
     text: str
     parameters: dict[str, float]
+    amplitudes: tuple[str, ...]
     nats: float
     node: Node
 
@@ -160,8 +163,8 @@ class _Target:
         self.price = math.log(observations) / 2
 
     def takes(self, node: Node) -> bool:
-        """Whether it is a formula with something to fit that would make a law."""
-        return bool(constants(node)) and sensible(node, self.angle)
+        """Whether it would make a law, which is absent where its amplitudes are zero."""
+        return bool(amplitudes(node)) and sensible(node, self.angle)
 
     def fit(self, node: Node, values: list[float]) -> _Fitted | None:
         """The formula with fitted constants; none where it cannot be fitted."""
@@ -211,10 +214,11 @@ def _formula(curve: Curve, fitted: _Fitted) -> Formula:
     numbers = constants(fitted.node)
     order = {number: k for k, number in enumerate(numbers)}
     names = {number: _NAMES[k] for number, k in order.items()}
-    name = curve.coordinates[0].name
-    text = write(fitted.node, _VARIABLE.get(name, name), names)
+    own = curve.coordinates[0]
+    text = write(fitted.node, own.text or own.name, names)
     parameters = {names[number]: fitted.values[number] for number in numbers}
-    return Formula(text, parameters, fitted.nats - curve.evidence, _renumbered(fitted.node, order))
+    linear = tuple(names[number] for number in numbers if number in amplitudes(fitted.node))
+    return Formula(text, parameters, linear, fitted.nats - curve.evidence, _renumbered(fitted.node, order))
 
 
 def _renumbered(node: Node, order: dict[int, int]) -> Node:

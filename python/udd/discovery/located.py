@@ -1,0 +1,171 @@
+"""A located curve in the model, or a formula for it: fitted in full, with everything else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from udd import effects
+from udd.effects import Effect
+from udd.errors import FitError
+from udd.fitting import Fit
+from udd.fitting.parameters import Free
+from udd.fitting.problem import Point, Problem
+from udd.fitting.solve import tighten
+
+from .absorbed import distinct
+from .curves import Curve, refined, rescored
+from .formulas import Formula
+
+_ROUNDS = 6
+_STILL = 0.05  # nats that another round would bring
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A model with a curve, fitted.
+
+    Attributes
+    ----------
+    fit : Fit
+        Its model holds the curve as its last effect.
+    curve : Curve
+        As it came out, its band less what the model's other parameters can do.
+    price : float
+        What the curve's freedom costs, nats: as half a parameter's logarithm of the numbers in the record is
+        by the Bayesian information criterion.
+    """
+
+    fit: Fit
+    curve: Curve
+    price: float
+
+    @property
+    def effect(self) -> Effect:
+        """The curve as an effect."""
+        return self.fit.model.effects[-1]
+
+
+def curve_effect(curve: Curve, name: str = "curve") -> Effect:
+    """A curve of one coordinate as an effect that a model can have.
+
+    Parameters
+    ----------
+    curve : Curve
+    name : str
+        What its parameters are called after.
+
+    Raises
+    ------
+    FitError
+        It is a surface, or no formula says what its coordinate is.
+    """
+    if len(curve.coordinates) != 1:
+        raise FitError("a surface cannot be added to a model, only a curve")
+    spline = curve.splines[0]
+    return effects.curve(
+        curve.slot.name,
+        _text(curve),
+        spline.low,
+        spline.high,
+        curve.coefficients,
+        periodic=spline.periodic,
+        momentum=curve.slot.momentum,
+        name=name,
+    )
+
+
+def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
+    """Add a curve to a fitted model and refit everything.
+
+    In turns the model's parameters and states are fitted with the curve held, and the curve is moved to where
+    it is most likely, everything else following; each turn takes nearly all of what is left.
+
+    Parameters
+    ----------
+    fit : Fit
+        Around which the curve was found, or a looser one of the same data.
+    curve : Curve
+    name : str
+        What the effect's parameters are called after.
+
+    Raises
+    ------
+    FitError
+        The curve cannot be added to a model, or the fit does not converge with it.
+    """
+    curve, start = refined(curve, fit), fit
+    for _ in range(_ROUNDS):
+        effect = curve_effect(curve, name)
+        problem, point = _widened(fit, effect, start)
+        current = tighten(fit.measurements, problem, point, problem.schedule[1:])
+        at = curve.coefficients
+        curve = rescored(curve, current, at)
+        moved = curve.coefficients - at
+        start = current
+        if moved @ curve.score.information @ moved / 2 < _STILL:
+            break
+    c, score = curve.coefficients, curve.score
+    gain = float(score.gradient @ c - c @ score.information @ c / 2)
+    return CurveFit(current, distinct(curve, current), gain - curve.evidence)
+
+
+def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:
+    """A formula for a curve as an effect that a model can have.
+
+    Raises
+    ------
+    FitError
+        No formula says what the curve's coordinate is.
+    """
+    _text(curve)
+    values: dict[str, Any] = dict(formula.parameters)
+    return effects.formula(
+        curve.slot.name,
+        formula.text,
+        momentum=curve.slot.momentum,
+        name=name,
+        title=f"{curve.slot.title} = {formula.text}",
+        amplitudes=formula.amplitudes,
+        **values,
+    )
+
+
+def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula") -> Fit:
+    """Add a formula for a curve to a fitted model and refit everything, all of its constants free.
+
+    The noise stays as it was estimated, so that chi2 compares with that of the curve.
+
+    Raises
+    ------
+    FitError
+        The formula cannot be added to the model, or the fit fails.
+    """
+    problem, point = _widened(fit, formula_effect(curve, formula, name), fit)
+    order = list(problem.models[0].parameters)
+    names = [f"{name}.{p}" for p in formula.parameters]
+    more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
+    problem = replace(problem, free=problem.free + more)
+    return tighten(fit.measurements, problem, point, problem.schedule[1:])
+
+
+def _text(curve: Curve) -> str:
+    """What the curve's coordinate is called in formulas."""
+    own = curve.coordinates[0]
+    if own.text is None:
+        raise FitError(
+            f"nothing over {own.name} can be added to a model: formulas have no word for {own.name}"
+        )
+    return own.text
+
+
+def _widened(fit: Fit, effect: Effect, start: Fit) -> tuple[Problem, Point]:
+    """The problem of a fit with one effect more, and where another fit of the same data ended."""
+    own = len(fit.models[0].parameters)
+    models = tuple(model.with_effects((*model.effects, effect)) for model in fit.models)
+    sets = tuple(
+        ([*values[:own], *effect.values], camera, clock) for values, camera, clock in start.point.sets
+    )
+    return replace(fit.problem, models=models), Point(start.states, sets)
