@@ -7,6 +7,7 @@ results do not already hold, and no global matplotlib setting is changed.
 from __future__ import annotations
 
 from .crossings import poincare, return_map
+from .curves import curve
 from .evidence import errors, evidence
 from .fan import forecast
 from .fits import misfit, residuals
@@ -20,6 +21,7 @@ from .whiten import whiteness
 __all__ = [
     "basins",
     "bifurcation",
+    "curve",
     "errors",
     "evidence",
     "forecast",

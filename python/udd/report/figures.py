@@ -47,6 +47,7 @@ def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[
         "map": residual_map(loose),
         "residuals": residuals(loose),
         "whiteness": whiteness(innovations),
+        "curves": [curve(found.curve) for found in discovery.effects if getattr(found, "curve", None)],
         "evidence": [evidence(discovery, stage) for stage in range(len(discovery.scans))],
         "errors": errors(discovery),
         "friction": friction(discovery.fit),
@@ -142,6 +143,13 @@ def residuals(loose: list[Any]) -> Image:
         ax.set_ylabel("")
         ax.tick_params(labelleft=False)
     return _png(figure, "The residual of one equation, frame by frame, along one coordinate")
+
+
+def curve(found: Any) -> Image:
+    """A curve that was located without a formula."""
+    figure, ((ax,),) = _figure(6.4, 3.4, top=0.45)
+    plot.curve(found, ax)
+    return _svg(figure, f"{found.title}, with its band")
 
 
 def evidence(discovery: Any, stage: int) -> Image:

@@ -15,12 +15,19 @@ from . import words
 
 def parameters(discovery: Any) -> list[dict[str, str]]:
     """The model's free parameters: name, meaning, before, after, unit."""
-    return _rows(discovery, lambda name: name in discovery.fit.model.parameters)
+    hidden = _knots(discovery)
+    return _rows(discovery, lambda name: name in discovery.fit.model.parameters and name not in hidden)
 
 
 def camera(discovery: Any) -> list[dict[str, str]]:
     """What the camera got wrong, likewise."""
     return _rows(discovery, lambda name: name not in discovery.fit.model.parameters, share=("%", 100.0))
+
+
+def _knots(discovery: Any) -> set[str]:
+    """The parameters of curves, which a picture shows better."""
+    curves = [e for e in discovery.fit.model.effects if words.is_curve(e)]
+    return {f"{e.name}.{p}" for e in curves for p in e.parameters}
 
 
 def _rows(discovery: Any, wanted: Any, share: tuple[str, float] = ("", 1.0)) -> list[dict[str, str]]:
@@ -45,7 +52,7 @@ def fixed(discovery: Any) -> list[dict[str, str]]:
     model = discovery.fit.model
     rows = []
     for name, value in model.parameters.items():
-        if name not in discovery.fit.parameters:
+        if name not in discovery.fit.parameters and name not in _knots(discovery):
             unit, factor = model.units[name], 1.0
             rows.append(
                 {
@@ -176,6 +183,15 @@ def errors(discovery: Any) -> list[dict[str, str]]:
 def _interval(e: tuple[float, float, float, float], unit: str) -> str:
     low, high = words.length(e[1], unit).split()[0], words.length(e[2], unit).split()[0]
     return f"{words.length(e[0], unit)} ({low} to {high})"
+
+
+def curves(discovery: Any, stage: int, most: int = 6) -> list[dict[str, str]]:
+    """The best of the curves that were tried."""
+    scans = getattr(discovery, "curves", [])
+    return [
+        {"title": c.title, "evidence": f"{c.evidence:.1f}".replace("-", "−"), "p": words.probability(c.p)}
+        for c in (scans[stage][:most] if stage < len(scans) else [])
+    ]
 
 
 def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str]]:

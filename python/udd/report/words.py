@@ -125,6 +125,11 @@ def _meanings(found: Any, discovery: Any) -> list[str]:
     return list(dict.fromkeys(effect_sentence(e) for e in [found.effect, *same]))
 
 
+def is_curve(effect: Any) -> bool:
+    """Whether an effect is a curve, whose many numbers say nothing to a reader."""
+    return hasattr(effect.spec, "coordinate")
+
+
 def effect_sentence(effect: Any) -> str:
     """What an effect does, as a clause."""
     meaning = str(effect.meaning).rstrip(".")
@@ -253,7 +258,14 @@ def limits(discovery: Any) -> list[str]:
             "An effect smaller than this record can show may still be there: nothing missing means nothing "
             "that these data demand."
         )
-    result.append("Only the effects of the library were tried; the table above names the best.")
+    if getattr(discovery, "curves", []):
+        result.append(
+            "Beside the effects of the library, every equation was searched for a smooth curve along each "
+            "coordinate and pair of coordinates. What depends on more at once, or on what came before, is in "
+            "neither."
+        )
+    else:
+        result.append("Only the effects of the library were tried; the table above names the best.")
     if discovery.measurement.kind == "disk":
         result.append(
             "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that "
