@@ -70,9 +70,14 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.ratio == (1.0, 1.0, 1.0)
 
 
-def test_an_effect_outside_the_library_is_not_denied():
+def test_an_effect_outside_the_library_is_located_and_written_down():
     found = discovered(E.uneven_disk(a=0.03, b=0.0, n=7), seed=4)
-    assert found.verdict == "effect present, form not identified"
+    (effect,) = found.effects
+    assert effect.curve.title == "torque as a function of beta"
+    # Seven waves a turn are in no library; the sign and the phase are the disk's.
+    assert "sin(7 * beta" in effect.expression
+    assert abs(abs(effect.parameters["a"]) - 0.03) < 4 * effect.errors["a"]
+    assert found.error_after.median[2] < 0.4 * found.error_before.median[2]
 
 
 def test_the_clock_may_start_anywhere():

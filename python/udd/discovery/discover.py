@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from udd.effects.own import CurveSpec
 from udd.errors import FitError
 from udd.fitting import Fit, fit_record, record_of
 from udd.measurement import Measurement
@@ -92,28 +93,30 @@ def discover(
     baseline = fit_record(measurement, record, model, free, **options)
     search = Search(record, ~train, tell)
     before = search.errors(base)
-    trained, final, after, accepted, scans = search.run(base, baseline, before)
-    found = [f for step in accepted for f in _describe(step, final)]
-    others = [a for step in accepted for a in step.alternatives]
+    end = search.run(base, baseline, before)
+    found = [f for step in end.accepted for f in _describe(step, end.whole)]
+    others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
     if found:
-        verdict = "effect present, form not identified" if doubtful else "effect identified"
+        unnamed = any(isinstance(f.effect.spec, CurveSpec) for f in found)
+        verdict = "effect present, form not identified" if doubtful or unnamed else "effect identified"
     else:
         unexplained = baseline.scatter > _UNEXPLAINED
         verdict = "effect present, form not identified" if unexplained else "nothing missing"
     return Discovery(
         verdict=verdict,
         baseline=baseline,
-        fit=final,
+        fit=end.whole,
         effects=found,
         alternatives=others,
         error_before=before,
-        error_after=after,
-        ratio=search.improvement(before, after) if found else (1.0, 1.0, 1.0),
-        scans=scans,
+        error_after=end.errors,
+        ratio=search.improvement(before, end.errors) if found else (1.0, 1.0, 1.0),
+        scans=end.scans,
+        curves=end.curves,
         looks=search.looks,
         split=float(record.clock[np.flatnonzero(~train)[0]]),
-        trained=trained,
+        trained=end.part,
     )
 
 
@@ -134,6 +137,7 @@ def _describe(step: Step, final: Fit) -> list[Found]:
                 chi2=step.chi2,
                 p=step.p,
                 ratio=step.ratio,
+                curve=step.curve,
             )
         )
     return result

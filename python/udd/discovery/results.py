@@ -11,6 +11,7 @@ from udd.fitting import Fit
 from udd.measurement import Measurement
 from udd.models import Model
 
+from .curves import Curve
 from .heldout import Errors, comparison_horizon
 from .scan import Scored
 
@@ -33,6 +34,9 @@ class Found:
         Probability of so large a fall by chance, all candidates counted.
     ratio : tuple of float
         Cost of the held-out frames after over before, all parameters held, with its 95 % interval.
+    curve : Curve or None
+        Where it was located without a formula: the curve with its band. The effect is that, or a formula
+        for it.
     """
 
     effect: Effect
@@ -44,6 +48,7 @@ class Found:
     chi2: float
     p: float
     ratio: tuple[float, float, float]
+    curve: Curve | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -117,8 +122,10 @@ class Discovery:
         of a pendulum over the whole held-out part.
     scans : list of list of Scored
         What the score said of every candidate, for each round of the search, the best first.
+    curves : list of list of Curve
+        The same of every curve that an equation may lack, as a function of anything.
     looks : list of int
-        How many candidates each round looked at, every frequency counted.
+        How many candidates and curves each round looked at, every frequency counted.
     split : float
         Time from which the data were held out, s; of the first measurement.
     """
@@ -132,6 +139,7 @@ class Discovery:
     error_after: Errors
     ratio: tuple[float, float, float]
     scans: list[list[Scored]]
+    curves: list[list[Curve]]
     looks: list[int]
     split: float
     trained: Fit = field(repr=False)

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from udd.effects import Effect, formula
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, extend, frame_costs, held, loosened
 
 from .candidates import Candidate, library
+from .curves import Curve, scan_curves
+from .formulas import formulas_for
 from .heldout import (
     Errors,
     comparison_horizon,
@@ -22,6 +25,7 @@ from .heldout import (
     improvement,
     whole_improvement,
 )
+from .located import CurveFit, fit_curve
 from .results import Alternative
 from .scan import Scan, Scored, physical, scan, scan_ripples
 
@@ -34,13 +38,28 @@ _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio excee
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
 _TRIED = 6  # of the best candidates, fitted in full
 _MOST = 3  # effects added
+_CURVES = 2  # of the likeliest, located
+_FORMULAS = 3  # for each, fitted in full
 
 
 @dataclass(frozen=True)
 class Step:
-    """An addition that was accepted: one candidate, or a pair."""
+    """An addition that was accepted: one candidate, a pair, or a curve.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+    curve : Curve or None
+        The curve that was located, where that is what was added or what a formula was found for.
+    chi2, p : float
+        By how much chi2 fell, and the probability of that by chance.
+    ratio : tuple of float
+        Cost of the held-out frames after over before, with its 95 % interval.
+    alternatives : list of Alternative
+    """
 
     candidates: list[Candidate]
+    curve: Curve | None
     chi2: float
     p: float
     ratio: tuple[float, float, float]
@@ -57,49 +76,121 @@ class State:
 
 
 @dataclass(frozen=True)
+class Look:
+    """What the scores around one fit say.
+
+    Attributes
+    ----------
+    fit : Fit
+    library : Scan
+    curves : list of Curve
+        The likeliest first.
+    """
+
+    fit: Fit
+    library: Scan
+    curves: list[Curve]
+
+    def passing(self, looks: int) -> list[Scored]:
+        """The candidates that chance does not explain, the strongest first."""
+        usable = [s for s in self.library.scored if s.physical and not s.absorbed and s.p * looks < ALPHA]
+        return sorted(usable, key=lambda s: -round(s.chi2, 3))
+
+    def nats(self, scored: Scored) -> float:
+        """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
+        return (scored.chi2 - scored.candidate.parameters * _price(self.fit)) / 2
+
+    def strongest(self) -> float:
+        """The gain of the best explanation."""
+        singles = [self.nats(s) for s in self.library.scored if s.physical]
+        return max([c.evidence for c in self.curves] + singles, default=0.0)
+
+
+def _price(fitted: Fit) -> float:
+    """What a parameter costs, in chi2 (BIC)."""
+    return math.log(np.isfinite(fitted.misfit).sum())
+
+
+@dataclass(frozen=True)
 class Trial:
-    """A combination of candidates fitted in full."""
+    """A proposal fitted in full: candidates with free amplitudes, or a located curve."""
 
     candidates: list[Candidate]
     fit: Fit
     compared: Fit
     """The same held as tightly as those that it is compared with."""
+    curve: CurveFit | None = None
 
     @property
     def names(self) -> list[str]:
         """The amplitudes' names among the model's parameters."""
-        return [name for c in self.candidates for name in c.amplitude_names]
+        return [] if self.curve else [name for c in self.candidates for name in c.amplitude_names]
 
     @property
     def amplitudes(self) -> list[float]:
         """The fitted amplitudes."""
         return [self.fit.parameters[name] for name in self.names]
 
+    @property
+    def freedom(self) -> float:
+        """How many numbers were found for it."""
+        return self.curve.curve.df if self.curve else len(self.amplitudes)
+
     def criterion(self, unit: float) -> float:
-        """chi2 in a common unit with the price of a parameter (BIC): the smaller the better."""
-        price = math.log(np.isfinite(self.fit.misfit).sum())
-        return self.compared.chi2 / unit + price * sum(c.parameters for c in self.candidates)
+        """chi2 in a common unit with the price of a parameter (BIC) or a curve: the smaller the better."""
+        if self.curve:
+            return self.compared.chi2 / unit + 2 * self.curve.price
+        return self.compared.chi2 / unit + _price(self.fit) * sum(c.parameters for c in self.candidates)
 
     @property
     def needed(self) -> bool:
         """Whether each of the candidates is needed beside the others."""
+        if self.curve:
+            return True
         names = list(self.fit.parameters)
         for candidate in self.candidates:
             own = [names.index(name) for name in candidate.amplitude_names]
             a = np.array([self.fit.parameters[names[k]] for k in own])
             block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
-            if a @ np.linalg.solve(block, a) < chi2.isf(ALPHA, len(own)):
+            if len(self.candidates) > 1 and a @ np.linalg.solve(block, a) < chi2.isf(ALPHA, len(own)):
                 return False
         return True
 
     @property
     def physical(self) -> bool:
         """Whether all amplitudes lie in their ranges."""
+        if self.curve:
+            return True
         values, errors = self.fit.parameters, self.fit.errors
         return all(
             physical(c, [values[n] for n in c.amplitude_names], [errors[n] for n in c.amplitude_names])
             for c in self.candidates
         )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where a search ended: fits of the first part and of all data, errors, what was done and seen."""
+
+    part: Fit
+    whole: Fit
+    errors: Errors
+    accepted: list[Step]
+    scans: list[list[Scored]]
+    curves: list[list[Curve]]
+
+
+def _formulas(located: Trial, fitted: Fit) -> list[Effect]:
+    """The shortest formulas for a located curve, as effects to be fitted."""
+    assert located.curve is not None
+    curve = located.curve.curve
+    found = formulas_for(curve, int(np.isfinite(fitted.misfit).sum()))
+    slot = curve.slot
+    return [
+        formula(slot.name, f.text, momentum=slot.momentum, title=f"{slot.title} {f.text}", **f.parameters)
+        for f in found.formulas[:_FORMULAS]
+        if f.nats > -NATS
+    ]
 
 
 class Search:
@@ -122,53 +213,70 @@ class Search:
             return whole_improvement(before, after)
         return improvement(before, after, comparison_horizon(before))
 
-    def run(
-        self, base: Fit, whole: Fit, before: Errors
-    ) -> tuple[Fit, Fit, Errors, list[Step], list[list[Scored]]]:
-        """Add effects until none passes; fits of the first part and of all data, errors, what was done."""
+    def run(self, base: Fit, whole: Fit, before: Errors) -> Outcome:
+        """Add effects until none passes."""
         accepted: list[Step] = []
         scans: list[list[Scored]] = []
-        current = State(base, whole, before)
+        curves: list[list[Curve]] = []
+        states = [State(base, whole, before)]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            scanned = self._score(current.part)
-            scans.append(sorted(scanned.scored, key=lambda s: -s.chi2))
-            found = self._single(current, scanned) or self._pair(current, scanned)
+            look = self._look(states[-1].part)
+            scans.append(sorted(look.library.scored, key=lambda s: -s.chi2))
+            curves.append(look.curves)
+            found = self._addition(states[-1], look)
             if found is None:
                 break
-            step, current = found
-            accepted.append(step)
-        return current.part, current.whole, current.errors, accepted, scans
+            accepted.append(found[0])
+            states.append(found[1])
+            if len(accepted) > 1 and found[0].curve is not None:
+                self._replace(accepted, states)
+        end = states[-1]
+        return Outcome(end.part, end.whole, end.errors, accepted, scans, curves)
 
-    def _score(self, fitted: Fit) -> Scan:
-        """Score every candidate around the fit and, where it does not explain the data, around a looser one.
+    def _look(self, fitted: Fit) -> Look:
+        """Score every candidate and curve around the fit and, where it explains little, around a looser one.
 
         A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
-        where it is held tightly. The scan with the stronger candidate counts.
+        where it is held tightly. The scores with the stronger explanation count.
         """
-        scans = []
+        found = []
         looks = 0
         for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
-            scans.append(scan(current, [*library(current.model), *best]))
-            looks += len(scans[-1].scored) + len(rippled)
+            scanned = scan(current, [*library(current.model), *best])
+            curves = scan_curves(current)
+            looks += len(scanned.scored) + len(rippled) + curves.looks
+            found.append(Look(current, scanned, curves.curves))
         self.looks.append(looks)
-        return max(scans, key=lambda s: max((c.chi2 for c in s.scored if c.physical), default=0.0))
+        return max(found, key=Look.strongest)
 
-    def _single(self, current: State, scanned: Scan) -> tuple[Step, State] | None:
-        passing = [
-            s for s in scanned.scored if s.physical and not s.absorbed and s.p * self.looks[-1] < ALPHA
-        ]
-        passing.sort(key=lambda s: -round(s.chi2, 3))
+    def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
+        """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
+
+        The library comes first, but for a curve that is clearly likelier than any effect of it.
+        """
+        passing = look.passing(self.looks[-1])
+        known = max((look.nats(s) for s in passing), default=-math.inf)
+        likely = [c for c in look.curves if c.p * self.looks[-1] < ALPHA][:_CURVES]
+        if likely and likely[0].evidence > known + NATS:
+            return self._curve(current, look, likely) or self._single(current, look, passing)
+        return (
+            self._single(current, look, passing)
+            or self._pair(current, look)
+            or self._curve(current, look, likely)
+        )
+
+    def _single(self, current: State, look: Look, passing: list[Scored]) -> tuple[Step, State] | None:
         trials = []
         for s in passing[:_TRIED]:
             self.tell(f"trying {s.candidate.title}")
             trials.append(self._try(current.part, [s.candidate], list(s.amplitudes)))
-        return self._accept(current, [t for t in trials if t], scanned, self.looks[-1])
+        return self._accept(current, [t for t in trials if t], look, self.looks[-1])
 
-    def _pair(self, current: State, scanned: Scan) -> tuple[Step, State] | None:
-        best = scanned.pairs()
+    def _pair(self, current: State, look: Look) -> tuple[Step, State] | None:
+        best = look.library.pairs()
         trials = []
         for a, b, fall in best[:_TRIED]:
             columns = len(a.amplitudes) + len(b.amplitudes)
@@ -177,18 +285,58 @@ class Search:
                 continue
             self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
             trials.append(self._try(current.part, [a.candidate, b.candidate], [0.0] * columns))
-        return self._accept(current, [t for t in trials if t], scanned, len(best))
+        return self._accept(current, [t for t in trials if t], look, len(best))
+
+    def _curve(self, current: State, look: Look, likely: list[Curve]) -> tuple[Step, State] | None:
+        """The likeliest curve, as a spline or by a short formula."""
+        trials: list[Trial | None] = []
+        for curve in likely:
+            self.tell(f"trying {curve.title}")
+            located = self._locate(current.part, curve)
+            if located is None:
+                continue
+            trials.append(located)
+            for effect in _formulas(located, current.part):
+                self.tell(f"trying {effect.title}")
+                candidate = Candidate(effect, effect.title)
+                start = [effect.parameters[name] for name in effect.amplitudes]
+                trials.append(self._try(current.part, [candidate], start))
+        return self._accept(current, [t for t in trials if t], look, self.looks[-1])
+
+    def _locate(self, current: Fit, curve: Curve) -> Trial | None:
+        try:
+            located = fit_curve(current, curve)
+        except FitError:
+            return None
+        candidate = Candidate(located.effect, curve.title)
+        return Trial([candidate], located.fit, located.fit, located) if located.fit.converged else None
+
+    def _replace(self, accepted: list[Step], states: list[State]) -> None:
+        """Leave out the effect before a curve where the curve alone explains as much for less.
+
+        A wrong form of the library takes up a part of what an effect outside of it does.
+        """
+        last, before = accepted[-1], states[-3]
+        assert last.curve is not None
+        self.tell(f"trying {last.curve.title} instead of {accepted[-2].candidates[0].title}")
+        found = self._curve(before, self._look(before.part), [last.curve])
+        if found is None:
+            return
+        both, alone = self._level(states[-1].part, found[1].part)
+        price = _price(both) * sum(c.parameters for c in accepted[-2].candidates)
+        if alone.chi2 < both.chi2 + price * max(both.scatter, 1.0):
+            accepted[-2:], states[-2:] = [found[0]], [found[1]]
 
     def _try(self, current: Fit, candidates: list[Candidate], start: list[float]) -> Trial | None:
         try:
             fitted = extend(current, [c.effect for c in candidates], start)
-            trial = Trial(candidates, fitted, fitted)
         except FitError:
             return None
+        trial = Trial(candidates, fitted, fitted)
         return trial if trial.physical and trial.fit.converged else None
 
     def _accept(
-        self, current: State, trials: list[Trial], scanned: Scan, looks: int
+        self, current: State, trials: list[Trial], look: Look, looks: int
     ) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
@@ -204,12 +352,12 @@ class Search:
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in trials if t.criterion(unit) - least <= 2 * NATS):
             ratio = self._held_ratio(current.part, trial.fit)
-            whole = self._try(current.whole, trial.candidates, trial.amplitudes) if ratio[2] < 1.0 else None
+            whole = self._again(current.whole, trial) if ratio[2] < 1.0 else None
             if whole is None:
                 continue
             before, after = self._level(current.whole, whole.fit)
             fall = (before.chi2 - after.chi2) / after.inflation(before)
-            p = min(float(chi2.sf(fall, len(trial.amplitudes))) * looks, 1.0)
+            p = min(float(chi2.sf(fall, trial.freedom)) * looks, 1.0)
             if p >= ALPHA:
                 continue
             try:
@@ -217,9 +365,18 @@ class Search:
             except FitError:
                 continue
             if not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, scanned, unit)
-                return Step(trial.candidates, fall, p, ratio, others), State(trial.fit, whole.fit, errors)
+                others = self._alternatives(trial, trials, look.library, unit)
+                located = [t.curve.curve for t in trials if t.curve]
+                curve = located[0] if located else None
+                step = Step(trial.candidates, curve, fall, p, ratio, others)
+                return step, State(trial.fit, whole.fit, errors)
         return None
+
+    def _again(self, whole: Fit, trial: Trial) -> Trial | None:
+        """The same proposal fitted to all data."""
+        if trial.curve:
+            return self._locate(whole, trial.curve.curve)
+        return self._try(whole, trial.candidates, trial.amplitudes)
 
     def _level(self, one: Fit, other: Fit) -> tuple[Fit, Fit]:
         """Two fits of the same data, held equally tightly."""
@@ -245,7 +402,12 @@ class Search:
         result = []
         for trial in trials:
             nats = (trial.criterion(unit) - best) / 2
-            if trial is chosen or nats > NATS or len(trial.candidates) != len(chosen.candidates):
+            if (
+                trial is chosen
+                or nats > NATS
+                or len(trial.candidates) != len(chosen.candidates)
+                or trial.curve
+            ):
                 continue
             for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
                 if mine.effect == other.effect:
