@@ -150,6 +150,29 @@ def test_a_gap_before_the_start_is_not_filtered_across(swing: tuple[udd.Measurem
         udd.forecast(holes, fitted, 2.0, start=19.8, members=20)
 
 
+def test_a_joint_fit_forecasts_each_of_its_films() -> None:
+    """Two films of one pendulum by cameras that lean by different angles."""
+    t, lean = np.arange(0, 30, 0.05), (0.03, -0.05)
+    rng = np.random.default_rng(8)
+    true = [udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, a]).state[:, 1] for a in (0.5, 0.9)]
+    films = [
+        udd.Measurement(t, {"theta": theta + by + 1e-3 * rng.standard_normal(len(t))})
+        for theta, by in zip(true, lean, strict=True)
+    ]
+    joint = udd.fit(films, udd.Pendulum(1.0, k0=0.03))
+    for k, film in enumerate(films):
+        found = udd.forecast(film, joint, [0.0, 2.0], start=20.0, members=20)
+        # Where the first camera's lean taken for the second's would be wrong by 0.08.
+        np.testing.assert_allclose(found.median[:, 0], (true[k] + lean[k])[[400, 440]], atol=3e-3)
+    cut = films[1].slice(0, 20.01)
+    with pytest.raises(FitError, match="which of them"):
+        udd.forecast(cut, joint, 1.0)
+    again = udd.forecast(cut, joint, [0.0, 2.0], members=20, film=1)
+    np.testing.assert_array_equal(again.members, found.members)
+    with pytest.raises(UddError, match="film must be a whole number from 0 to 1"):
+        udd.forecast(cut, joint, 1.0, film=2)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -136,6 +136,7 @@ def forecast(
     members: int = 200,
     level: float = 0.95,
     error: float | None = None,
+    film: int | None = None,
     process: bool = True,
     seed: int = 0,
 ) -> Forecast:
@@ -166,6 +167,9 @@ def forecast(
     error : float, optional
         The error until which the forecast counts as valid: by default 5 mm of the disk's centre, 0.05 rad of
         a pendulum.
+    film : int, optional
+        For a fit of several measurements: which of them has the camera and the drive of this one. By default
+        the one that it is.
     process : bool
         Whether the members are kicked. Without, the model's equations are taken as exact.
     seed : int
@@ -217,13 +221,14 @@ def forecast(
             raise FitError(f"the fit is that of a {fitted.measurement.kind}, the measurement of a {kind}")
     else:
         fitted = fit(known, model)
-    part, origin = _window(fitted, record, length)
+    film = _film(fitted, measurement, film)
+    part, origin = _window(fitted, film, record, length)
     rng = np.random.default_rng(seed)
 
     scale = max(fitted.scatter, 1.0) ** 0.5
-    models, cameras, states = _starts(fitted, part, asked, scale, rng)
+    models, cameras, states = _starts(fitted, film, part, asked, scale, rng)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
-    clock_error = fitted.point.sets[0][2]
+    clock_error = fitted.point.sets[film][2]
     pace = 1.0 + clock_error
     t_model = part.t[-1] + times
     runs = _runs(models, states, pace * t_model, kicks, rng)
@@ -247,7 +252,7 @@ def forecast(
         valid_time=float(valid_time),
         valid_low=float(shortest),
         valid_high=float(longest),
-        lyapunov_time=_growth(fitted, states),
+        lyapunov_time=_growth(fitted.models[film], states),
         measured_valid_time=_compared(measurement, clock, median, large),
         fit=fitted,
         measurement=measurement,
@@ -276,7 +281,20 @@ def _options(members: int, level: float) -> tuple[int, float]:
     return int(members), share
 
 
-def _window(fitted: Fit, record: Record, length: float) -> tuple[Record, float]:
+def _film(fitted: Fit, measurement: Measurement, film: int | None) -> int:
+    """The number of the measurement whose camera and drive count."""
+    several = len(fitted.measurements)
+    if film is not None:
+        if isinstance(film, bool) or not isinstance(film, (int, np.integer)) or not 0 <= film < several:
+            raise ModelError(f"film must be a whole number from 0 to {several - 1}, not {film!r}")
+        return int(film)
+    own = [k for k, each in enumerate(fitted.measurements) if each is measurement]
+    if several > 1 and not own:
+        raise FitError(f"the fit is that of {several} measurements: say by film= which of them this one is")
+    return own[0] if own else 0
+
+
+def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Record, float]:
     """The last frames, from which the state is filtered, on the fit's clock, and that clock's zero."""
     t, last = record.t, len(record.t) - 1
     breaks = np.flatnonzero(~record.linked)
@@ -289,27 +307,31 @@ def _window(fitted: Fit, record: Record, length: float) -> tuple[Record, float]:
             f"a state takes at least {_FEWEST}"
         )
     # The model's time counts from the first row that was fitted.
-    origin = fitted.record.origin
+    origin = fitted.record.origins[film]
     return replace(part, t=part.t + (record.origin - origin)), origin
 
 
 def _starts(
-    fitted: Fit, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
+    fitted: Fit, film: int, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
     data = data_of(part, replace(fitted.noise, weight=np.ones(len(part.t))), part.states[:, 0])
-    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[0], list(fitted.problem.diffusion)
+    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], list(fitted.problem.diffusion)
+    own = fitted.models[film]
+    order = list(own.parameters)
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []
     for draw in _draws(fitted, asked[0], scale, rng):
         camera = list(camera_of_fit)
         values: dict[str, float] = {}
         for free in fitted.problem.free:
+            if free.film not in (None, film):
+                continue
             if free.role == "model":
-                values[free.name] = draw[free.name]
+                values[order[free.index]] = draw[free.name]
             elif free.role == "camera":
                 camera[free.index] = draw[free.name]
-        model = fitted.model.with_parameters(values)
+        model = own.with_parameters(values)
         try:
             sets = [(list(model.parameters.values()), camera, clock)]
             _first, last, spread = _core.filter(model, data, (part.states, sets), diffusion, window)
@@ -435,9 +457,8 @@ def _compared(measurement: Measurement, clock: Array, median: Array, error: floa
     return when if np.isfinite(when) else math.nan
 
 
-def _growth(fitted: Fit, states: Array) -> float:
+def _growth(model: Model, states: Array) -> float:
     """The Lyapunov time of the fitted model, s; of its equations, wherever their attractor goes."""
-    model = fitted.model
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a percent is enough for a unit of time
         try:

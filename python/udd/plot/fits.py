@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
-from .inputs import is_fit
+from .inputs import first_film, is_fit
 from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, label, new_axes, scale, tidy
 
 if TYPE_CHECKING:
@@ -99,8 +99,13 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     Returns
     -------
     Axes
+
+    Notes
+    -----
+    Of several measurements that were fitted together the first is drawn.
     """
     _check(fit)
+    fit = first_film(fit)
     names = fit.measurement.names
     channel = names[0] if channel is None else channel
     if channel not in names:
@@ -140,7 +145,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
 def coordinates(fit: Any) -> dict[str, Array]:
     """What a residual can be drawn against, at the frame that each flow starts from."""
     columns = dict(zip(fit.model.state_names, fit.states[:-1].T, strict=True))
-    result = {"t": fit.record.t[:-1] + fit.record.origin, **columns}
+    result = {"t": fit.record.clock[:-1], **columns}
     if "beta" in columns:
         result["beta"] = np.mod(columns["beta"], 2 * np.pi)
     if "Z" in columns:

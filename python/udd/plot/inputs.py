@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,8 +57,29 @@ def is_fit(result: Any) -> bool:
     return hasattr(result, "misfit") and hasattr(result, "record")
 
 
+def first_film(fit: Any) -> Any:
+    """What a fit of several measurements says of the first, as if it were alone; another fit as it is."""
+    if len(fit.measurements) == 1:
+        return fit
+    n = int((fit.record.film == 0).sum())
+    record = replace(fit.record.part(slice(0, n)), origins=fit.record.origins[:1])
+    return replace(
+        fit,
+        models=fit.models[:1],
+        measurements=fit.measurements[:1],
+        record=record,
+        states=fit.states[:n],
+        state_covariance=fit.state_covariance[:n],
+        misfit=fit.misfit[:n],
+        misfit_variance=fit.misfit_variance[:n],
+        defect=fit.defect[: n - 1],
+        noise=replace(fit.noise, weight=fit.noise.weight[:n]),
+        point=replace(fit.point, states=fit.point.states[:n], sets=fit.point.sets[:1]),
+    )
+
+
 def motions(result: Any) -> list[Motion]:
-    """The motions that a trajectory, a measurement or a fit (measured, then fitted) holds.
+    """The motions that a trajectory, a measurement or a fit (measured, then fitted; of the first film) holds.
 
     Raises
     ------
@@ -66,6 +87,7 @@ def motions(result: Any) -> list[Motion]:
         The result holds none.
     """
     if is_fit(result):
+        result = first_film(result)
         return [measured(result.measurement, result.model), fitted(result)]
     if hasattr(result, "state") and hasattr(result, "t"):
         state = np.asarray(result.state, dtype=np.float64)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from udd import plot
 from udd.measurement import Measurement
 from udd.plot import fits
+from udd.plot.inputs import first_film
 from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
 from . import movie, runs
@@ -36,14 +37,16 @@ class Image:
 
 def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[Any]) -> dict[str, Any]:
     """All pictures of a discovery; what cannot be shown is absent."""
+    # Motions are shown of the first film, where several were fitted together.
+    one = replace(discovery, baseline=first_film(discovery.baseline), fit=first_film(discovery.fit))
     loose = [loosest(discovery.baseline)]
     if discovery.effects:
         loose.append(loosest(discovery.fit))
     result: dict[str, Any] = {
-        "movie": movie.side_by_side(discovery, film),
-        "film": frames(discovery, film) if film is not None else None,
-        "orbit": orbits(discovery),
-        "forecast": forecast(discovery),
+        "movie": movie.side_by_side(one, film),
+        "film": frames(one, film) if film is not None else None,
+        "orbit": orbits(one),
+        "forecast": forecast(one),
         "map": residual_map(loose),
         "residuals": residuals(loose),
         "whiteness": whiteness(innovations),
@@ -51,7 +54,7 @@ def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[
         "evidence": [evidence(discovery, stage) for stage in range(len(discovery.scans))],
         "errors": errors(discovery),
         "friction": friction(discovery.fit),
-        "misfit": misfits(discovery.fit),
+        "misfit": misfits(one.fit),
     }
     return result
 

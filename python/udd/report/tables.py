@@ -15,13 +15,25 @@ from . import words
 
 def parameters(discovery: Any) -> list[dict[str, str]]:
     """The model's free parameters: name, meaning, before, after, unit."""
-    hidden = _knots(discovery)
-    return _rows(discovery, lambda name: name in discovery.fit.model.parameters and name not in hidden)
+    hidden, own = _knots(discovery), discovery.fit.model.parameters
+    return _rows(discovery, lambda name: _base(name) in own and _base(name) not in hidden)
 
 
 def camera(discovery: Any) -> list[dict[str, str]]:
     """What the camera got wrong, likewise."""
-    return _rows(discovery, lambda name: name not in discovery.fit.model.parameters, share=("%", 100.0))
+    own = discovery.fit.model.parameters
+    return _rows(discovery, lambda name: _base(name) not in own, share=("%", 100.0))
+
+
+def _base(name: str) -> str:
+    """A parameter's name without the number of the film that it belongs to."""
+    return name.partition("[")[0]
+
+
+def _of_film(name: str) -> str:
+    """Which film it belongs to, where there are several."""
+    film = name.partition("[")[2].rstrip("]")
+    return f" (film {int(film) + 1})" if film else ""
 
 
 def _knots(discovery: Any) -> set[str]:
@@ -37,8 +49,8 @@ def _rows(discovery: Any, wanted: Any, share: tuple[str, float] = ("", 1.0)) -> 
         unit, factor = _shown(known[name]) if known[name] else share
         rows.append(
             {
-                "name": words.pretty(name.split(".")[-1]),
-                "meaning": _meaning(name, discovery),
+                "name": words.pretty(_base(name).split(".")[-1]),
+                "meaning": _meaning(_base(name), discovery) + _of_film(name),
                 "before": _value(discovery.baseline, name, factor),
                 "after": _value(discovery.fit, name, factor),
                 "unit": words.pretty(unit),
@@ -52,7 +64,7 @@ def fixed(discovery: Any) -> list[dict[str, str]]:
     model = discovery.fit.model
     rows = []
     for name, value in model.parameters.items():
-        if name not in discovery.fit.parameters and name not in _knots(discovery):
+        if name not in {_base(n) for n in discovery.fit.parameters} | _knots(discovery):
             unit, factor = model.units[name], 1.0
             rows.append(
                 {
@@ -94,12 +106,13 @@ def _meaning(name: str, discovery: Any) -> str:
 def units(fit: Any) -> dict[str, str]:
     """The SI unit of every free parameter."""
     known = fit.model.units | dict(_core.camera_parameters(fit.measurement.kind))
-    return {name: known.get(name, "") for name in fit.parameters}
+    return {name: known.get(_base(name), "") for name in fit.parameters}
 
 
 def measured(discovery: Any) -> Markup:
     """What was measured, in a few sentences."""
     m, model = discovery.measurement, discovery.baseline.model
+    several = len(discovery.fit.measurements)
     usable = int(m.seen.sum())
     rate = 1.0 / float(np.median(np.diff(m.t)))
     frames = f"{len(m)} frames" + ("" if usable == len(m) else f", {usable} of them usable,")
@@ -117,6 +130,8 @@ def measured(discovery: Any) -> Markup:
         )
     else:
         what = f"The angle of a pendulum of {100 * discovery.baseline.problem.models[0].length:.4g}\u00a0cm"
+    if several > 1:
+        what = f"{several} records, fitted together; the pictures of the motion show the first. {what}"
     return Markup(
         f"{what}: {frames} over {m.duration:.1f}\u00a0s, {rate:.3g} in a second. "
         f"A typical frame is good to {noise}."

@@ -229,7 +229,7 @@ def limit(other: Any) -> str:
 def command(discovery: Any, source: str | None) -> str | None:
     """What `udd discover` takes to do the same; None where the file is not known."""
     known = discovery.baseline.problem.models[0]
-    if source is None or known.effects:
+    if source is None or known.effects or len(discovery.fit.measurements) > 1:
         return None
     usual = type(known)(*([known.W] if discovery.measurement.kind == "disk" else [known.length]))
     given = {"disk": ["W"], "pendulum": ["length"]}[discovery.measurement.kind]
