@@ -16,10 +16,12 @@ from udd.discovery.coordinates import coordinate, coordinates, slots
 from udd.discovery.curves import refined, scan_curves
 from udd.discovery.expressions import evaluate, read, sensible, simplify, write
 from udd.discovery.forcing import Score, responses, score_forcings
-from udd.discovery.formulas import formulas_for
+from udd.discovery.formulas import Formula, formulas_for
+from udd.discovery.located import curve_effect, fit_curve, fit_formula
 from udd.discovery.smoothing import chance, smooth
 from udd.discovery.splines import Spline, along, product, rough_product
 from udd.errors import FitError, UddError
+from udd.fitting import loosened
 from udd.plot.curves import curve as draw
 
 E = udd.effects
@@ -334,3 +336,54 @@ def test_a_curve_is_drawn(null):
     with pytest.raises(UddError, match="a curve of a scan"):
         draw(null)
     plt.close(ax.figure)
+
+
+def test_a_located_curve_is_fitted_in_full():
+    """A strong law, around which nothing is linear: curve and formula explain what is missing."""
+    case = unmodelled.CASES[0]
+    base = udd.fit(unmodelled.record(case.law, 1), udd.Disk(W))
+    plain = udd.fit(unmodelled.record(None, 1), udd.Disk(W))
+    assert base.scatter > 3
+    found = fit_curve(base, scan_curves(loosened(base, 3.0)).curves[0])
+    assert found.fit.converged
+    assert found.fit.scatter < 1.1 * plain.scatter
+    assert 5 < found.curve.df < 20
+    x = np.quantile(found.curve.places[0], np.linspace(0.01, 0.99, 99))
+    off = found.curve.values(x) - found.curve.beside(case.curve(x), x)
+    assert np.mean(np.abs(off) < 1.96 * found.curve.errors(x)) > 0.8
+    # The effect is the curve.
+    made = found.fit.model.rates(0.0, np.column_stack([0 * x, 0 * x, x, 0 * x]))[:, 2] - found.fit.model.W
+    np.testing.assert_allclose(made, found.curve.values(x), atol=1e-12)
+    best = formulas_for(found.curve, 4500).formulas[0]
+    fitted = fit_formula(base, found.curve, best)
+    assert fitted.converged
+    # All its constants were free, and it explains the data as well, for less.
+    assert {f"formula.{p}" for p in best.parameters} <= set(fitted.parameters)
+    assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < found.fit.chi2 / 2 + found.price
+
+
+def test_a_broken_power_can_be_fitted():
+    case = unmodelled.CASES[1]
+    base = udd.fit(unmodelled.record(case.law, 1), udd.Disk(W))
+    curve = scan_curves(loosened(base, 3.0)).curves[0]
+    assert curve.name == ("friction", "|Omega|")
+    root = Formula(
+        "a * abs(Omega)^0.5", {"a": 1.5e-3}, ("a",), 0.0, ("*", ("c", 0), ("^", ("x",), ("n", 0.5)))
+    )
+    fitted = fit_formula(base, curve, root)
+    assert fitted.converged
+    assert fitted.parameters["formula.a"] == pytest.approx(1.5e-3, abs=4 * fitted.errors["formula.a"])
+    assert fitted.parameters["k0"] == pytest.approx(unmodelled.K0, abs=4 * fitted.errors["k0"])
+
+
+def test_what_cannot_be_added_is_said(null):
+    only = scan_curves(null, only=lambda slot, own: slot.name == "torque" and own[0].name == "theta")
+    with pytest.raises(FitError, match="no word for theta"):
+        curve_effect(only.curves[0])
+    surface = scan_curves(
+        null,
+        pairs=True,
+        only=lambda slot, own: slot.name == "torque" and len(own) == 2 and own[0].name == "Y",
+    )
+    with pytest.raises(FitError, match="a surface cannot be added"):
+        curve_effect(surface.curves[0])

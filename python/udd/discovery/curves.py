@@ -220,9 +220,12 @@ def score_groups(
 
 
 def refined(curve: Curve, fit: Fit) -> Curve:
-    """The curve on finer knots, so that the smoothness prior alone says how much it may bend."""
+    """The curve around a fit on finer knots, so that the smoothness prior alone says how much it bends.
+
+    It reaches as far as the fit's data.
+    """
     found = responses(fit)
-    finer = tuple(replace(s, intervals=_FINER * s.intervals) for s in curve.splines)
+    finer = tuple(replace(s, intervals=_FINER * s.intervals) for s in _splines(found, curve.coordinates))
     (score,) = score_groups(found, [(curve.slot, curve.coordinates)], [finer])
     return _curve(found, curve.slot, curve.coordinates, finer, score)
 

@@ -163,6 +163,16 @@ def without_sign(node: Node) -> Node:
     return (node[0], *(without_sign(part) for part in node[1:]))
 
 
+def softened(node: Node, width: float) -> Node:
+    """The formula with broken powers rounded off within a width of zero, where their slope has no end."""
+    if node[0] in ("x", "n", "c"):
+        return node
+    if node[0] == "^" and not (node[2][0] == "n" and float(node[2][1]).is_integer()):
+        base = node[1][1] if node[1][0] == "abs" else node[1]
+        return ("^", ("sqrt", ("+", ("^", softened(base, width), ("n", 2.0)), ("n", width**2))), node[2])
+    return (node[0], *(softened(part, width) for part in node[1:]))
+
+
 def put(node: Node, number: int, value: float) -> Node:
     """The formula with a literal instead of a constant."""
     if node[0] == "c":

@@ -17,9 +17,11 @@ from udd.fitting.solve import tighten
 
 from .absorbed import distinct
 from .curves import Curve, refined, rescored
+from .expressions import softened, write
 from .formulas import Formula
 
 _ROUNDS = 6
+_SOFT = 1e-3
 _STILL = 0.05  # nats that another round would bring
 
 
@@ -98,33 +100,35 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     """
     curve, start = refined(curve, fit), fit
     for _ in range(_ROUNDS):
-        effect = curve_effect(curve, name)
+        effect, at = curve_effect(curve, name), curve.coefficients
         problem, point = _widened(fit, effect, start)
         current = tighten(fit.measurements, problem, point, problem.schedule[1:])
-        at = curve.coefficients
-        curve = rescored(curve, current, at)
+        curve, start = rescored(curve, current, at), current
         moved = curve.coefficients - at
-        start = current
         if moved @ curve.score.information @ moved / 2 < _STILL:
             break
-    c, score = curve.coefficients, curve.score
-    gain = float(score.gradient @ c - c @ score.information @ c / 2)
+    # What the model holds; the next move would be within the last one.
+    curve, score = replace(curve, coefficients=at), curve.score
+    gain = float(score.gradient @ at - at @ score.information @ at / 2)
     return CurveFit(current, distinct(curve, current), gain - curve.evidence)
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:
     """A formula for a curve as an effect that a model can have.
 
+    Broken powers, whose slope at zero has no end, are rounded off within a thousandth of the curve's range.
+
     Raises
     ------
     FitError
         No formula says what the curve's coordinate is.
     """
-    _text(curve)
+    variable = _text(curve)
     values: dict[str, Any] = dict(formula.parameters)
+    node = softened(formula.node, _SOFT * float(np.ptp(curve.places[0])))
     return effects.formula(
         curve.slot.name,
-        formula.text,
+        write(node, variable, dict(enumerate(values))),
         momentum=curve.slot.momentum,
         name=name,
         title=f"{curve.slot.title} = {formula.text}",
