@@ -253,3 +253,18 @@ def test_small_chances() -> None:
     assert words.probability(0.25) == "0.25"
     assert words.probability(3e-7) == "below 10<sup>−6</sup>"
     assert words.probability(0.0) == "below 10<sup>−300</sup>"
+
+
+def test_what_no_library_holds_is_told_by_its_curve(tmp_path: Path) -> None:
+    """A torque with five waves per turn: the page says along what, and shows the curve."""
+    from unmodelled import CASES, record
+
+    case = next(c for c in CASES if c.name == "five waves")
+    found = udd.discover(record(case.law, 1, 40.0), udd.Disk(0.045))
+    assert found.effects and found.effects[0].curve is not None
+    found.report(tmp_path / "page.html")
+    page = Page((tmp_path / "page.html").read_text(encoding="utf-8"))
+    assert "depending on the orientation β" in page.words
+    assert "torque as a function of beta, with its band" in [image["alt"] for image in page.all("img")]
+    assert "Table of the best curves" in page.words
+    assert "effects of the library were tried; " not in page.words  # more than these

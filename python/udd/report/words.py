@@ -27,7 +27,8 @@ _SYMBOLS = (
     (r"\+-", "±"),
     (r"(?<![\w.])-(?=[\w(|.])", "−"),
     (r" - ", " − "),
-    (r"(?<=\w) \* (?=\w)", " "),
+    (r" \* ", " "),
+    (r"(?<=[\w)])\*(?=[\w(])", " "),
 )
 
 #: Parameters in words.
@@ -122,7 +123,34 @@ def _meanings(found: Any, discovery: Any) -> list[str]:
         for a in discovery.alternatives
         if a.likeness > IDENTICAL and a.instead_of == found.effect.name
     ]
-    return list(dict.fromkeys(effect_sentence(e) for e in [found.effect, *same]))
+    sentences = [effect_sentence(e) for e in [found.effect, *same]]
+    if getattr(found, "curve", None) is not None:  # the meaning says where, the curve says with what
+        sentences[0] += f", depending on {' and '.join(along(c.name) for c in found.curve.coordinates)}"
+    return list(dict.fromkeys(sentences))
+
+
+def along(name: str) -> str:
+    """A coordinate in a sentence."""
+    return {
+        "Y": "the sideways place Y of the disk's centre",
+        "Z": "the height Z of the disk's centre",
+        "R": "the distance R of the disk's centre from the contact",
+        "theta": "the direction θ",
+        "beta": "the orientation β",
+        "Omega": "the angular velocity Ω",
+        "|Omega|": "the speed |Ω| of the rotation",
+        "t": "time",
+    }.get(name, name)
+
+
+def values_of(found: Any, units: dict[str, str]) -> Markup:
+    """An effect's numbers in a sentence."""
+    texts = []
+    for name, value in found.parameters.items():
+        unit = unit_words(units.get(f"{found.effect.name}.{name}", ""))
+        number = Markup("<b>{} = {}</b>").format(pretty(name), with_error(value, found.errors.get(name)))
+        texts.append(number + Markup(" ") + unit if unit else number)
+    return Markup(", ").join(texts)
 
 
 def is_curve(effect: Any) -> bool:
