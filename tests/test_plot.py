@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 import discovered
 import udd
 from udd.errors import UddError
+from udd.plot import fits
 from udd.plot.fits import pattern
 from udd.plot.friction import coefficient
 
@@ -189,3 +190,23 @@ def test_a_frame_with_the_disk_on_it() -> None:
 def test_what_cannot_be_drawn_is_said(draw: Callable[[], Axes], said: str) -> None:
     with pytest.raises(UddError, match=said):
         draw()
+
+
+def test_the_map_frames_the_cell_that_the_effect_is_in() -> None:
+    """Of the hidden relaxation -b W Z: dZ/dT against Z is framed for the known model, nothing after it."""
+    from udd.plot.grid import _cells, beyond_chance
+    from udd.report.loose import loosest
+
+    before, after = loosest(discovered.disk().baseline), loosest(discovered.disk().fit)
+    names, places = before.model.state_names, list(fits.coordinates(before))
+    cell = names.index("Z"), places.index("Z")
+    n = len(names) * len(places)
+    assert beyond_chance(_cells(before)[cell[0]][cell[1]], n)
+    # A chance of 0.1 % over all cells, of which neighbours share their frames.
+    assert sum(beyond_chance(each, n) for row in _cells(after) for each in row) == 0
+    ax = udd.plot.residual_map(after, before=before)
+    framed = [patch for patch in ax.patches if patch.get_linewidth() > 1.2]
+    corners = {(round(p.get_x() - 0.01), round(p.get_y() - 0.02)) for p in framed}
+    assert (cell[1], len(names) - 1 - cell[0]) in corners
+    with pytest.raises(UddError, match="a fit leaves residuals"):
+        udd.plot.residual_map(run())
