@@ -164,9 +164,7 @@ def score(
 def score_ripples(
     model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], frequencies: list[float]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
-def responses(
-    model: Model, data: _Data, start: _Start
-) -> tuple[_Floats, _Floats, _Floats]: ...
+def responses(model: Model, data: _Data, start: _Start) -> tuple[_Floats, _Floats, _Floats]: ...
 def score_columns(
     model: Model,
     data: _Data,

@@ -222,7 +222,8 @@ def poincare(
         (``"z"``, ``"omega = y"``), their rates (``"z'"``), the time ``t``, the parameters and numbers, with
         ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tanh``, ``abs`` and ``pi``. Or a name:
         ``"maxima of z"``, ``"minima of z"``, ``"turning points of z"`` of any component, ``"reversal"``
-        (the angular velocity is zero). By default z = 0 of the DLE, Z = 0 of a disk, theta = 0 of a pendulum.
+        (the angular velocity is zero). By default z = 0 of the DLE, Z = 0 of a disk, theta = 0 of a
+        pendulum, and the maxima of the first state of a user's own model.
     n : int
         How many crossings are wanted.
     state0 : array_like, shape (..., dim), optional
@@ -341,9 +342,7 @@ def surfaces_of(
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """The expressions, and the signs of the directions in which they are crossed."""
     if section is None:
-        if model.kind not in _DEFAULT:
-            raise ModelError("where orbits of a model of your own are cut is yours to say: give section")
-        section = _DEFAULT[model.kind]
+        section = _DEFAULT.get(model.kind, f"maxima of {model.state_names[0]}")
     texts = [section] if isinstance(section, str) else section
     if not isinstance(texts, Sequence) or not texts or not all(isinstance(text, str) for text in texts):
         raise ModelError(f"section must be an expression such as 'z', or a list of them, not {section!r}")

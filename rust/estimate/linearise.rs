@@ -58,7 +58,7 @@ where
     fn misfit(&self, i: usize, expected: &[f64; M]) -> SVector<f64, M> {
         SVector::from_fn(|m, _| {
             let difference = self.record.seen[i][m] - expected[m];
-            if C::ANGLE[m] { wrap(difference) } else { difference }
+            if self.sensor.is_angle(m) { wrap(difference) } else { difference }
         })
     }
 

@@ -33,7 +33,7 @@ pub use linearise::{Linear, Sight};
 pub use record::{Free, Point, Record, Role, Set};
 pub use rows::Rows;
 pub use score::{Candidate, Score};
-pub use sensor::{AngleSensor, DiskCamera, Sensor};
+pub use sensor::{AngleSensor, Direct, DiskCamera, Sensor};
 pub use waves::Probe;
 
 use crate::integrate::{Failure, Tolerance};

@@ -6,8 +6,9 @@ use crate::scalar::Scalar;
 pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
     /// The camera's parameters with their units.
     const PARAMETERS: &'static [(&'static str, &'static str)];
-    /// The channels that are angles: what was seen of them counts modulo a turn.
-    const ANGLE: [bool; M];
+
+    /// Whether a channel is an angle: what was seen of it counts modulo a turn.
+    fn is_angle(&self, channel: usize) -> bool;
 
     /// What is seen of state `x`, which changes at the given rate.
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; D], rate: &[S; D]) -> [S; M];
@@ -38,7 +39,10 @@ impl Sensor<4, 3> for DiskCamera {
         ("lag", "s"),
         ("row", "s/m"),
     ];
-    const ANGLE: [bool; 3] = [false, false, true];
+
+    fn is_angle(&self, channel: usize) -> bool {
+        channel == 2
+    }
 
     #[inline]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
@@ -62,10 +66,34 @@ pub struct AngleSensor;
 
 impl Sensor<2, 1> for AngleSensor {
     const PARAMETERS: &'static [(&'static str, &'static str)] = &[("theta0", "rad")];
-    const ANGLE: [bool; 1] = [true];
+
+    fn is_angle(&self, _channel: usize) -> bool {
+        true
+    }
 
     #[inline]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 2], _rate: &[S; 2]) -> [S; 1] {
         [x[1] + camera[0]]
+    }
+}
+
+/// A sensor that sees the components of the state as they are; those that it does not see have no
+/// information.
+#[derive(Clone, Copy, Debug)]
+pub struct Direct<const D: usize> {
+    /// The components that are angles.
+    pub angles: [bool; D],
+}
+
+impl<const D: usize> Sensor<D, D> for Direct<D> {
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[];
+
+    fn is_angle(&self, channel: usize) -> bool {
+        self.angles[channel]
+    }
+
+    #[inline]
+    fn observe<S: Scalar>(&self, _camera: &[S], x: &[S; D], _rate: &[S; D]) -> [S; D] {
+        *x
     }
 }

@@ -250,7 +250,7 @@ impl Parser<'_> {
             })
             .collect();
         let in_order = places.windows(2).all(|pair| pair[1] == pair[0] + 1);
-        if places.len() < 4 || places.len() != coefficients.len() || !in_order || !(low < high) {
+        if places.len() < 4 || places.len() != coefficients.len() || !in_order || low >= high {
             return usage();
         }
         let spline = Spline::new(places[0], places.len(), (low, high), name == "periodic");

@@ -10,12 +10,12 @@ use super::errors::FitError;
 use super::interrupt;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, Candidate, Columns, DiskCamera, EstimateError, Estimator, Free, Options, PLACES_PER_LINK,
-    Point, Probe, Record, Role, Rows, Sensor, Set,
+    AngleSensor, Candidate, Columns, Direct, DiskCamera, EstimateError, Estimator, Free, Options,
+    PLACES_PER_LINK, Point, Probe, Record, Role, Rows, Sensor, Set,
 };
 use crate::integrate::Tolerance;
 use crate::model::effects::Kind;
-use crate::model::{Effect, Family};
+use crate::model::{Effect, Family, OwnFamily};
 
 /// Frame by frame: time, what was seen, its information, whether the next frame is linked, which film it
 /// belongs to; and how much of the noise each channel remembers.
@@ -161,9 +161,30 @@ macro_rules! each_family {
         match $model {
             AnyModel::Disk(family, values) => $call((family, values, DiskCamera), $($argument),*),
             AnyModel::Pendulum(family, values) => $call((family, values, AngleSensor), $($argument),*),
-            _ => Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
+            AnyModel::Own1(family, values) => $call(seen_as_it_is(family, values), $($argument),*),
+            AnyModel::Own2(family, values) => $call(seen_as_it_is(family, values), $($argument),*),
+            AnyModel::Own3(family, values) => $call(seen_as_it_is(family, values), $($argument),*),
+            AnyModel::Own4(family, values) => $call(seen_as_it_is(family, values), $($argument),*),
+            other => Err(unseen(&other)),
         }
     };
+}
+
+/// A user's own model with what sees its states.
+fn seen_as_it_is<const D: usize>(
+    family: OwnFamily<D>,
+    values: Vec<f64>,
+) -> (OwnFamily<D>, Vec<f64>, Direct<D>) {
+    let states = family.states();
+    (family, values, Direct { angles: std::array::from_fn(|n| states[n].1) })
+}
+
+/// Why a model cannot be compared with measurements.
+fn unseen(model: &AnyModel) -> PyErr {
+    PyValueError::new_err(match model {
+        AnyModel::Own5(..) | AnyModel::Own6(..) => "a model that is fitted has at most 4 states",
+        _ => "a camera sees a disk or a pendulum",
+    })
 }
 
 /// Minimises the cost; see `rust/estimate`.
@@ -207,6 +228,8 @@ fn solve<'py>(
     each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
 }
 
+/// A candidate's family, its values, and where the amplitudes stand among them.
+type Group<F> = (F, Vec<f64>, Vec<usize>);
 /// Three arrays.
 type Three<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
@@ -228,11 +251,11 @@ fn score<'py>(
         (data, start): (&Data<'py>, &Start<'py>),
         free: &[FreeTuple],
         diffusion: &[f64],
-        groups: Vec<(F, Vec<f64>, Vec<usize>)>,
+        groups: Vec<Group<F>>,
     ) -> PyResult<Three<'py>> {
         let own = model.1.len();
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
-        let candidate = |(family, values, indices): (F, Vec<f64>, Vec<usize>)| {
+        let candidate = |(family, values, indices): Group<F>| {
             if values.len() < own || indices.iter().any(|&index| index >= values.len()) {
                 return Err(PyValueError::new_err("a candidate has no parameter of that number"));
             }
@@ -252,7 +275,7 @@ fn score<'py>(
     fn groups<F>(
         candidates: Vec<(Bound<'_, PyAny>, Vec<usize>)>,
         own: impl Fn(AnyModel) -> Option<(F, Vec<f64>)>,
-    ) -> PyResult<Vec<(F, Vec<f64>, Vec<usize>)>> {
+    ) -> PyResult<Vec<Group<F>>> {
         let one = |(model, indices): (Bound<'_, PyAny>, Vec<usize>)| {
             let (family, values) = own(AnyModel::to_fit(&model)?)
                 .ok_or_else(|| PyValueError::new_err("a candidate is a model of another kind"))?;
@@ -260,22 +283,23 @@ fn score<'py>(
         };
         candidates.into_iter().map(one).collect()
     }
+    macro_rules! scored {
+        ($Kind:ident, $model:expr) => {{
+            let groups = groups(candidates, |m| match m {
+                AnyModel::$Kind(family, values) => Some((family, values)),
+                _ => None,
+            })?;
+            run($model, py, (&data, &start), &free, &diffusion, groups)
+        }};
+    }
     match AnyModel::to_fit(model)? {
-        AnyModel::Disk(family, values) => {
-            let groups = groups(candidates, |m| match m {
-                AnyModel::Disk(family, values) => Some((family, values)),
-                _ => None,
-            })?;
-            run((family, values, DiskCamera), py, (&data, &start), &free, &diffusion, groups)
-        }
-        AnyModel::Pendulum(family, values) => {
-            let groups = groups(candidates, |m| match m {
-                AnyModel::Pendulum(family, values) => Some((family, values)),
-                _ => None,
-            })?;
-            run((family, values, AngleSensor), py, (&data, &start), &free, &diffusion, groups)
-        }
-        _ => Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
+        AnyModel::Disk(family, values) => scored!(Disk, (family, values, DiskCamera)),
+        AnyModel::Pendulum(family, values) => scored!(Pendulum, (family, values, AngleSensor)),
+        AnyModel::Own1(family, values) => scored!(Own1, seen_as_it_is(family, values)),
+        AnyModel::Own2(family, values) => scored!(Own2, seen_as_it_is(family, values)),
+        AnyModel::Own3(family, values) => scored!(Own3, seen_as_it_is(family, values)),
+        AnyModel::Own4(family, values) => scored!(Own4, seen_as_it_is(family, values)),
+        other => Err(unseen(&other)),
     }
 }
 
@@ -481,6 +505,7 @@ fn camera_parameters(kind: &str) -> PyResult<Vec<(&'static str, &'static str)>> 
     match kind {
         "disk" => Ok(DiskCamera::PARAMETERS.to_vec()),
         "pendulum" => Ok(AngleSensor::PARAMETERS.to_vec()),
+        "own" => Ok(Vec::new()),
         other => Err(PyValueError::new_err(format!("no camera sees a {other:?}"))),
     }
 }

@@ -265,7 +265,8 @@ def curve(
     The curve is ``sum of c[i] B((x - low)/h + 1 - i)`` with the cardinal cubic B-spline ``B`` and
     ``h = (high - low)/(n - 3)``: every cubic spline with these knots from `low` to `high`. A periodic one has
     ``h = (high - low)/n`` and begins anew with ``c[0]`` after ``c[n - 1]``. Second derivatives are
-    continuous, but where the curve ends. In formulas it is ``spline(x, low, high, c0, c1, ...)`` and ``periodic(...)``.
+    continuous, but where the curve ends. In formulas it is ``spline(x, low, high, c0, c1, ...)`` and
+    ``periodic(...)``.
 
     Examples
     --------

@@ -12,8 +12,10 @@ from udd.effects import Effect
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model
+from udd.own_models import OwnModel
 
 from .noise import estimated, stated
+from .own import levels_of
 from .parameters import Free, free_parameters
 from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
@@ -42,14 +44,14 @@ def fit(
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
-        Of the disk (``Y, Z, beta``) or of a pendulum (``theta``). Several are fitted jointly: they share the
-        device's parameters.
-    model : Disk or Pendulum, or a sequence of them
+        Of the disk (``Y, Z, beta``) or of a pendulum (``theta``), or of states of a user's own model, by
+        their names. Several are fitted jointly: they share the device's parameters.
+    model : Disk, Pendulum or a user's own Model, or a sequence of them
         Its parameters are the start and the priors' means. For several measurements one each, alike but for
         their parameters' values, or one for all.
     free : iterable of str, optional
         Names of the model's free parameters; by default ``k0, k1, k2, W`` (with a prior of 5 %) of a disk,
-        ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects.
+        ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects; all of a user's own model.
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``clock``), or which of them.
@@ -80,7 +82,7 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
-    record = record_of(measurement)
+    record = record_of(measurement, model)
     return fit_record(measurement, record, model, free, camera=camera, priors=priors, each=each)
 
 
@@ -100,7 +102,10 @@ def fit_record(
     kind = models[0].kind
     parameters = free_parameters(models, free, camera, priors, each)
     cameras = [0.0] * len(_core.camera_parameters(kind))
-    schedule = levels(kind)
+    if isinstance(models[0], OwnModel):
+        schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
+    else:
+        schedule = levels(kind)
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0])
     sets = tuple((list(own.parameters.values()), list(cameras), 0.0) for own in models)
     return _anneal(measurements, problem, Point(record.states, sets))
@@ -112,7 +117,7 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
     if len(models) != len(measurements):
         raise FitError(f"there are {len(measurements)} measurements but {len(models)} models")
     for own, measurement in zip(models, measurements, strict=True):
-        if measurement.kind != getattr(own, "kind", None):
+        if not isinstance(own, OwnModel) and measurement.kind != getattr(own, "kind", None):
             raise FitError(
                 f"the measurement has columns {', '.join(measurement.names)}, "
                 f"which {type(own).__name__} does not explain"
@@ -183,6 +188,8 @@ def _estimate_noise(
         result = solve(measurements, problem, point)
         point, before = result.point, problem.noise
         omega = point.states[:, 0]
+        if isinstance(problem.models[0], OwnModel):
+            omega = np.zeros(len(omega))  # a user's state need not be a speed that blurs
         if result.leverage > FOLLOWS:
             return False, problem, point
         noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)

@@ -61,7 +61,7 @@ class Noise:
         """Whether any channel is noisier than stated by more than a factor, in the median."""
         sd, seen = self.sd(record, omega), record.observed
         ratios = [sd[use, m] / record.sigma[use, m] for m, use in enumerate(seen.T)]
-        return any(float(np.median(ratio)) > factor for ratio in ratios)
+        return any(float(np.median(ratio)) > factor for ratio in ratios if len(ratio))
 
     def like(self, other: Noise, record: Record, omega: Array) -> bool:
         """Whether two noises agree to 3 % in the median."""
@@ -105,6 +105,8 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
         use = seen[:, m] & (weight == 1.0)
+        if not use.any():
+            continue  # a state that is not seen
         # A fit follows its data: each squared misfit is smaller than the noise's by the fit's leverage.
         leverage = seen_variance[use, m] / before.sd(record, omega)[use, m] ** 2
         power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)

@@ -13,6 +13,10 @@ from scipy.ndimage import maximum_filter1d
 
 from udd.errors import FitError
 from udd.measurement import Measurement
+from udd.models import Model
+from udd.own_models import OwnModel
+
+from .own import guessed, slope, typical_noise
 
 Array = NDArray[np.float64]
 
@@ -109,8 +113,13 @@ class Record:
         return np.isfinite(self.sigma)
 
 
-def record_of(measurement: Measurement | Sequence[Measurement]) -> Record:
+def record_of(
+    measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model] | None = None
+) -> Record:
     """Lay a measurement out for the estimator, or several one after the other.
+
+    The channels are the measurement's columns; for a model of the user's own they are the model's states, of
+    which the measurement may see but some.
 
     Raises
     ------
@@ -119,38 +128,57 @@ def record_of(measurement: Measurement | Sequence[Measurement]) -> Record:
     """
     if not isinstance(measurement, Measurement):
         if isinstance(measurement, Sequence) and not isinstance(measurement, str) and len(measurement):
-            return _joined([record_of(own) for own in measurement])
+            models = model if isinstance(model, Sequence) else [model] * len(measurement)
+            return _joined([record_of(*pair) for pair in zip(measurement, models, strict=True)])
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+    if isinstance(model, Sequence):
+        (model,) = model
+    own = model if isinstance(model, OwnModel) else None
+    if own and not set(measurement.names) <= set(own.state_names):
+        columns, states = ", ".join(measurement.names), ", ".join(own.state_names)
+        raise FitError(f"the measurement has columns {columns}, but the model's states are {states}")
+    if not own and measurement.kind == "own":
+        columns = ", ".join(measurement.names)
+        raise FitError(f"the measurement has columns {columns}, which are neither a disk's nor a pendulum's")
     values, seen = measurement.values, measurement.seen
     if seen.sum() < 10:
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")
     origin = float(measurement.t[0])
     times = measurement.t[seen] - origin
     step = float(np.median(np.diff(times)))
-    longest = max(0.5, 3.5 * step)
+    longest = 3.5 * step if own else max(0.5, 3.5 * step)
     t, row, linked = _fill(times, np.flatnonzero(seen), step, longest)
 
-    channels = values.shape[1]
-    there = row >= 0
-    full = np.zeros((len(t), channels))
-    full[there] = values[row[there]]
-    sigma = np.full((len(t), channels), np.inf)
-    rho = np.tile(np.eye(channels), (len(t), 1, 1))
+    columns = measurement.names
+    names = own.state_names if own else columns
+    places, there = [names.index(name) for name in columns], np.flatnonzero(row >= 0)
+    full = np.zeros((len(t), len(names)))
+    full[np.ix_(there, places)] = values[row[there]]
+    sigma = np.full((len(t), len(names)), np.inf)
+    rho = np.tile(np.eye(len(names)), (len(t), 1, 1))
     if measurement.sigma is None:
-        sigma[there] = _SIGMA[measurement.kind]
+        known_sigma = typical_noise(values[row[there]]) if own else np.array(_SIGMA[measurement.kind])
+        sigma[np.ix_(there, places)] = known_sigma
     else:
-        sigma[there] = measurement.sigma[row[there]]
+        own_sigma = measurement.sigma[row[there]]
+        sigma[np.ix_(there, places)] = own_sigma
         covariance = measurement.covariance()[row[there]]
-        rho[there] = covariance / (sigma[there][:, :, None] * sigma[there][:, None, :])
-    known = full[there].copy()
-    if np.ptp(known[:, -1]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
-        known[:, -1] = np.unwrap(known[:, -1])
-    guess = np.column_stack([np.interp(t, t[there], known[:, m]) for m in range(channels)])
-    odd = _odd(guess, np.median(sigma[there], axis=0), linked)
+        rho[np.ix_(there, places, places)] = covariance / (own_sigma[:, :, None] * own_sigma[:, None, :])
+    known = values[row[there]].copy()
+    angles = [columns.index(name) for name in own.angles if name in columns] if own else [len(columns) - 1]
+    for k in angles:
+        if np.ptp(known[:, k]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
+            known[:, k] = np.unwrap(known[:, k])
+    guess = np.column_stack([np.interp(t, t[there], column) for column in known.T])
+    odd = _odd(guess, np.median(sigma[np.ix_(there, places)], axis=0), linked)
     for channel in guess.T:
         channel[odd] = _between(odd, channel)
     film = np.zeros(len(t), dtype=np.int64)
-    return Record(t, full, sigma, rho, linked, _states(t, guess, linked), odd, row, film, (origin,))
+    if own:
+        states = guessed(own, t, dict(zip(columns, guess.T, strict=True)), linked)
+    else:
+        states = _states(t, guess, linked)
+    return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
 
 
 def _joined(records: Sequence[Record]) -> Record:
@@ -221,8 +249,4 @@ def _states(t: Array, guess: Array, linked: NDArray[np.bool_]) -> Array:
 
     It only starts the estimator, which never differentiates data.
     """
-    omega = np.zeros(len(t))
-    for run in np.split(np.arange(len(t)), np.flatnonzero(~linked) + 1):
-        if len(run) > 1:
-            omega[run] = np.gradient(guess[run, -1], t[run])
-    return np.column_stack([omega, guess])
+    return np.column_stack([slope(t, guess[:, -1], linked), guess])

@@ -52,6 +52,7 @@ class Table:
 def read_measurement(
     path: str | os.PathLike[str],
     columns: str | Sequence[str] | None = None,
+    states: Sequence[str] | None = None,
     **meta: Any,
 ) -> Measurement:
     r"""Read a measured motion of a disk or of a pendulum.
@@ -67,6 +68,8 @@ def read_measurement(
     columns : str or sequence of str, optional
         The columns' names in order, for a file without a (usable) header: ``"t,theta,_"``. An
         underscore is a column to pass over.
+    states : sequence of str, optional
+        The columns that are wanted, where they are states of a user's own :class:`udd.Model`.
     **meta
         Entries that win over those of the file, such as ``W=0.039``; None is ignored.
 
@@ -97,6 +100,7 @@ def read_measurement(
             table,
             source,
             {key: value for key, value in meta.items() if value is not None},
+            states,
         )
     except MeasurementError as error:
         raise MeasurementError(f"{source}: {error}") from None
@@ -232,12 +236,14 @@ def _parquet(path: Path) -> Table:
     return Table(_named(table.column_names), rows, list(range(1, len(rows) + 1)), meta)
 
 
-def _measurement(table: Table, path: Path, meta: dict[str, Any]) -> Measurement:
+def _measurement(
+    table: Table, path: Path, meta: dict[str, Any], states: Sequence[str] | None = None
+) -> Measurement:
     have = set(table.names)
-    twice = next(
-        (n for n in table.names if n != "_" and table.names.count(n) > 1 and n in _WANTED),
-        None,
-    )
+    if isinstance(states, str):
+        raise MeasurementError(f"states is a list of columns, not {states!r}")
+    wanted = _WANTED | set(states or ())
+    twice = next((n for n in table.names if n != "_" and table.names.count(n) > 1 and n in wanted), None)
     if twice is not None:
         raise MeasurementError(f"two columns are called {twice}")
 
@@ -246,7 +252,9 @@ def _measurement(table: Table, path: Path, meta: dict[str, Any]) -> Measurement:
             raise MeasurementError(f"no column {name}: found {', '.join(n for n in table.names if n != '_')}")
         return _column(table, name)
 
-    names = DISK if have & {"Y", "Z", "beta"} else PENDULUM
+    names: tuple[str, ...] = DISK if have & {"Y", "Z", "beta"} else PENDULUM
+    if states is not None:
+        names = tuple(states)
     t = need("t")
     if not len(t):
         raise MeasurementError("the file holds no rows")
@@ -261,8 +269,8 @@ def _measurement(table: Table, path: Path, meta: dict[str, Any]) -> Measurement:
     if "flag" in have:
         k = table.names.index("flag")
         flag = np.array([row[k] if k < len(row) else "" for row in table.rows], dtype=np.str_)
-    angle = next(k for k, name in enumerate(names) if name in ANGLES)
-    values[:, angle] = unwrap(values[:, angle])
+    for k in (k for k, name in enumerate(names) if name in ANGLES):
+        values[:, k] = unwrap(values[:, k])
     sigma = rho = None
     if any(f"sigma_{name}" in have for name in names):
         sigma = np.column_stack([need(f"sigma_{name}") for name in names])

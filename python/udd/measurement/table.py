@@ -25,7 +25,7 @@ class MeasurementError(UddError):
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """The motion of a disk or a pendulum as a camera saw it.
+    """A measured motion: of a disk or a pendulum as a camera saw it, or of a user's own model.
 
     Parameters
     ----------
@@ -33,7 +33,8 @@ class Measurement:
         Times [s], strictly increasing.
     values : array_like, shape (n, m), or mapping of name to shape (n,)
         One column per name. A disk has ``Y, Z`` [m] and ``beta`` [rad, unwrapped]; a pendulum has
-        ``theta`` [rad, 0 hanging]. NaN where a frame did not show it.
+        ``theta`` [rad, 0 hanging]; others are states of a user's own :class:`udd.Model`. NaN where a frame
+        did not show it.
     sigma : array_like or mapping, optional
         Standard errors in the layout and units of `values`.
     rho : array_like, shape (n, m (m - 1) / 2), optional
@@ -83,8 +84,10 @@ class Measurement:
         table = _columns(values, names)
         if not names:
             names = {3: DISK, 1: PENDULUM}.get(table.shape[1], ())
-        if names not in (DISK, PENDULUM):
-            raise MeasurementError(f"columns must be {DISK} or {PENDULUM}, not {names}")
+        if not names or len(set(names)) < len(names):
+            raise MeasurementError(
+                f"columns must be {DISK}, {PENDULUM} or states by their names, not {names}"
+            )
         n, m = table.shape
         flags = np.full(n, "") if flag is None else np.array(flag, dtype=np.str_)
         put = object.__setattr__
@@ -112,8 +115,8 @@ class Measurement:
 
     @property
     def kind(self) -> str:
-        """``"disk"`` or ``"pendulum"``."""
-        return "disk" if self.names == DISK else "pendulum"
+        """``"disk"`` or ``"pendulum"``; ``"own"`` where the columns are states of a user's own model."""
+        return {DISK: "disk", PENDULUM: "pendulum"}.get(self.names, "own")
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:

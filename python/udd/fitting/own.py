@@ -1,0 +1,79 @@
+"""What a fit needs to know of a user's own model: first guesses, and sizes taken from the record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.own_models import OwnModel
+
+Array = NDArray[np.float64]
+
+#: The model's assumed error over a frame, from loose to tight, in units of the loosest. That is, as for disk
+#: and pendulum, a share of the noise of a state that is seen, but not less than a small share of what it
+#: changes by from frame to frame; of a state that is not seen it is a larger share of that.
+_LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
+_OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
+
+
+def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
+    """The rate of what was seen, from neighbouring frames; zero where a frame has none."""
+    rate = np.zeros(len(t))
+    for run in np.split(np.arange(len(t)), np.flatnonzero(~linked) + 1):
+        if len(run) > 1:
+            rate[run] = np.gradient(x[run], t[run])
+    return rate
+
+
+def guessed(model: OwnModel, t: Array, seen: Mapping[str, Array], linked: NDArray[np.bool_]) -> Array:
+    """A first guess of all states: as seen, or the rate of one that is seen, or else zero."""
+    rates = {text.strip(): name for name, text in model.equations.items() if name in seen}
+    columns = []
+    for name in model.state_names:
+        if name in seen:
+            columns.append(seen[name])
+        elif name in rates:
+            columns.append(slope(t, seen[rates[name]], linked))
+        else:
+            columns.append(np.zeros(len(t)))
+    return np.column_stack(columns)
+
+
+def typical_noise(values: Array) -> Array:
+    """A measurement's noise as its roughness shows it, where it does not say.
+
+    The third differences of a smooth motion are small, those of noise have 20 times its variance.
+    """
+    rough = np.median(np.abs(np.diff(values, 3, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
+    result: Array = np.maximum(rough, 1e-6 * np.ptp(values, axis=0) + 1e-300)
+    return result
+
+
+def levels_of(
+    model: OwnModel, t: Array, states: Array, sigma: Array, linked: NDArray[np.bool_]
+) -> tuple[tuple[float, ...], ...]:
+    """The model's assumed error, loose to tight, per square root of the unit of time.
+
+    Parameters
+    ----------
+    model : OwnModel
+    t, states : ndarray (n,), (n, d)
+        A first guess.
+    sigma : ndarray (n, d)
+        The noise of what was seen; infinite where it was not.
+    linked : ndarray of bool (n - 1,)
+    """
+    dt = np.diff(t)[linked]
+    step = float(np.median(dt)) if len(dt) else 1.0
+    change = np.sqrt((np.diff(states, axis=0)[linked] ** 2).sum(axis=0) / max(len(dt), 1))
+    # What is unknown altogether moves as the model says.
+    rates = np.median(np.abs(model.rates(t, states)), axis=0) * step
+    change = np.where(change > 0, change, rates)
+    change = np.where(change > 0, change, float(change.max()) or 1.0)
+    seen = np.isfinite(sigma).any(axis=0)
+    noise = np.median(np.where(seen, sigma, 0.0), axis=0)
+    # Held by less than its noise a state that is seen would follow every frame.
+    loosest = np.where(seen, np.clip(_OF_NOISE * noise, _OF_CHANGE * change, change), _UNSEEN * change)
+    return tuple(tuple((level * loosest / np.sqrt(step)).tolist()) for level in _LEVELS)
