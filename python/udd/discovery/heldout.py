@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 #: Horizons of the free runs, s; those longer than a third of the held-out part are left out.
 HORIZONS = {"disk": (0.2, 0.4, 1.0, 2.0, 4.0), "pendulum": (0.5, 1.0, 4.0, 10.0, 20.0)}
 _FILTER = {"disk": 1.0, "pendulum": 4.0}  # s of data before each start, from which its state is filtered
+_FILTER_LEVEL = {"disk": 1, "pendulum": 3}  # how tightly, by the place in the schedule, whatever the model
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
@@ -202,9 +203,8 @@ def _windows(
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
     """States at the windows' first and last frames."""
-    schedule = fit.problem.schedule
-    middle = schedule[max(len(schedule) - 2, 0)]
-    first, last, _covariance = filtered(fit, record, windows, middle)
+    diffusion = fit.problem.schedule[_FILTER_LEVEL[fit.measurement.kind]]
+    first, last, _covariance = filtered(fit, record, windows, diffusion)
     return first, last
 
 

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from udd.effects import Effect, formula
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, extend, frame_costs, held, loosened
 
 from .candidates import Candidate, library
 from .curves import Curve, scan_curves
-from .formulas import formulas_for
+from .formulas import Formula, formulas_for
 from .heldout import (
     Errors,
     comparison_horizon,
@@ -25,7 +24,7 @@ from .heldout import (
     improvement,
     whole_improvement,
 )
-from .located import CurveFit, fit_curve
+from .located import fit_curve, fit_formula
 from .results import Alternative
 from .scan import Scan, Scored, physical, scan, scan_ripples
 
@@ -113,59 +112,125 @@ def _price(fitted: Fit) -> float:
 
 @dataclass(frozen=True)
 class Trial:
-    """A proposal fitted in full: candidates with free amplitudes, or a located curve."""
+    """A proposal fitted in full: candidates with free amplitudes, a located curve, or a formula for one.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        The effects, as they were proposed.
+    fit, compared : Fit
+        The fit, and the same held as tightly as those that it is compared with.
+    names : list of str
+        The parameters that came in with it.
+    price : float
+        What its freedom costs, in chi2 (BIC).
+    freedom : float
+        How many numbers were found for it.
+    curve : Curve or None
+        What was located.
+    formula : Formula or None
+        What the curve is written as.
+    """
 
     candidates: list[Candidate]
     fit: Fit
     compared: Fit
-    """The same held as tightly as those that it is compared with."""
-    curve: CurveFit | None = None
-
-    @property
-    def names(self) -> list[str]:
-        """The amplitudes' names among the model's parameters."""
-        return [] if self.curve else [name for c in self.candidates for name in c.amplitude_names]
+    names: list[str]
+    price: float
+    freedom: float
+    curve: Curve | None = None
+    formula: Formula | None = None
 
     @property
     def amplitudes(self) -> list[float]:
-        """The fitted amplitudes."""
+        """The fitted values of these parameters."""
         return [self.fit.parameters[name] for name in self.names]
 
     @property
-    def freedom(self) -> float:
-        """How many numbers were found for it."""
-        return self.curve.curve.df if self.curve else len(self.amplitudes)
+    def is_curve(self) -> bool:
+        """Whether it is a curve without a formula."""
+        return self.curve is not None and self.formula is None
 
     def criterion(self, unit: float) -> float:
-        """chi2 in a common unit with the price of a parameter (BIC) or a curve: the smaller the better."""
-        if self.curve:
-            return self.compared.chi2 / unit + 2 * self.curve.price
-        return self.compared.chi2 / unit + _price(self.fit) * sum(c.parameters for c in self.candidates)
+        """chi2 in a common unit with the price of the freedom: the smaller the better."""
+        return self.compared.chi2 / unit + self.price
 
     @property
     def needed(self) -> bool:
-        """Whether each of the candidates is needed beside the others."""
-        if self.curve:
+        """Whether each of several candidates is needed beside the others."""
+        if len(self.candidates) < 2:
             return True
         names = list(self.fit.parameters)
         for candidate in self.candidates:
             own = [names.index(name) for name in candidate.amplitude_names]
             a = np.array([self.fit.parameters[names[k]] for k in own])
             block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
-            if len(self.candidates) > 1 and a @ np.linalg.solve(block, a) < chi2.isf(ALPHA, len(own)):
+            if a @ np.linalg.solve(block, a) < chi2.isf(ALPHA, len(own)):
                 return False
         return True
 
     @property
     def physical(self) -> bool:
         """Whether all amplitudes lie in their ranges."""
-        if self.curve:
+        if self.curve is not None:
             return True
         values, errors = self.fit.parameters, self.fit.errors
         return all(
             physical(c, [values[n] for n in c.amplitude_names], [errors[n] for n in c.amplitude_names])
             for c in self.candidates
         )
+
+
+def _of_library(current: Fit, candidates: list[Candidate], start: list[float]) -> Trial | None:
+    """Effects of the library with free amplitudes."""
+    try:
+        fitted = extend(current, [c.effect for c in candidates], start)
+    except FitError:
+        return None
+    names = [name for c in candidates for name in c.amplitude_names]
+    price = _price(fitted) * sum(c.parameters for c in candidates)
+    trial = Trial(candidates, fitted, fitted, names, price, len(names))
+    return trial if trial.physical and fitted.converged else None
+
+
+def _of_curve(current: Fit, curve: Curve) -> Trial | None:
+    """A curve, located in full."""
+    try:
+        located = fit_curve(current, curve, _unused(current, "curve"))
+    except FitError:
+        return None
+    if not located.fit.converged:
+        return None
+    candidate = Candidate(located.effect, curve.title)
+    return Trial(
+        [candidate], located.fit, located.fit, [], 2 * located.price, located.curve.df, located.curve
+    )
+
+
+def _of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
+    """A formula for a curve, all its constants free."""
+    name = _unused(current, "formula")
+    try:
+        fitted = fit_formula(current, curve, written, name)
+    except FitError:
+        return None
+    effect = fitted.model.effects[-1]
+    names = [f"{name}.{p}" for p in effect.parameters]
+    price, free = _price(fitted) * len(names), len(names)
+    trial = Trial([Candidate(effect, effect.title)], fitted, fitted, names, price, free, curve, written)
+    return trial if fitted.converged else None
+
+
+def _states_first(curves: list[Curve]) -> list[Curve]:
+    """The likeliest first, but curves over time, which take up anything slow, after those as likely."""
+    late = 2 * NATS
+    return sorted(curves, key=lambda c: -c.evidence + (late if c.coordinates[0].name == "t" else 0.0))
+
+
+def _unused(current: Fit, name: str) -> str:
+    """A name that no effect of the model has yet."""
+    taken = {effect.name for effect in current.model.effects}
+    return next(n for n in (name, *(f"{name}{k}" for k in range(2, 9))) if n not in taken)
 
 
 @dataclass(frozen=True)
@@ -178,19 +243,6 @@ class Outcome:
     accepted: list[Step]
     scans: list[list[Scored]]
     curves: list[list[Curve]]
-
-
-def _formulas(located: Trial, fitted: Fit) -> list[Effect]:
-    """The shortest formulas for a located curve, as effects to be fitted."""
-    assert located.curve is not None
-    curve = located.curve.curve
-    found = formulas_for(curve, int(np.isfinite(fitted.misfit).sum()))
-    slot = curve.slot
-    return [
-        formula(slot.name, f.text, momentum=slot.momentum, title=f"{slot.title} {f.text}", **f.parameters)
-        for f in found.formulas[:_FORMULAS]
-        if f.nats > -NATS
-    ]
 
 
 class Search:
@@ -259,7 +311,7 @@ class Search:
         """
         passing = look.passing(self.looks[-1])
         known = max((look.nats(s) for s in passing), default=-math.inf)
-        likely = [c for c in look.curves if c.p * self.looks[-1] < ALPHA][:_CURVES]
+        likely = _states_first([c for c in look.curves if c.p * self.looks[-1] < ALPHA])[:_CURVES]
         if likely and likely[0].evidence > known + NATS:
             return self._curve(current, look, likely) or self._single(current, look, passing)
         return (
@@ -272,7 +324,7 @@ class Search:
         trials = []
         for s in passing[:_TRIED]:
             self.tell(f"trying {s.candidate.title}")
-            trials.append(self._try(current.part, [s.candidate], list(s.amplitudes)))
+            trials.append(_of_library(current.part, [s.candidate], list(s.amplitudes)))
         return self._accept(current, [t for t in trials if t], look, self.looks[-1])
 
     def _pair(self, current: State, look: Look) -> tuple[Step, State] | None:
@@ -284,32 +336,23 @@ class Search:
             if same or chi2.sf(fall, columns) * len(best) >= ALPHA:
                 continue
             self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
-            trials.append(self._try(current.part, [a.candidate, b.candidate], [0.0] * columns))
+            trials.append(_of_library(current.part, [a.candidate, b.candidate], [0.0] * columns))
         return self._accept(current, [t for t in trials if t], look, len(best))
 
     def _curve(self, current: State, look: Look, likely: list[Curve]) -> tuple[Step, State] | None:
-        """The likeliest curve, as a spline or by a short formula."""
+        """The likeliest curves, as splines and by short formulas."""
         trials: list[Trial | None] = []
         for curve in likely:
             self.tell(f"trying {curve.title}")
-            located = self._locate(current.part, curve)
-            if located is None:
+            located = _of_curve(current.part, curve)
+            if located is None or located.curve is None:
                 continue
             trials.append(located)
-            for effect in _formulas(located, current.part):
-                self.tell(f"trying {effect.title}")
-                candidate = Candidate(effect, effect.title)
-                start = [effect.parameters[name] for name in effect.amplitudes]
-                trials.append(self._try(current.part, [candidate], start))
+            found = formulas_for(located.curve, int(np.isfinite(current.part.misfit).sum()))
+            for written in found.formulas[:_FORMULAS]:
+                self.tell(f"trying {written.text}")
+                trials.append(_of_formula(current.part, located.curve, written))
         return self._accept(current, [t for t in trials if t], look, self.looks[-1])
-
-    def _locate(self, current: Fit, curve: Curve) -> Trial | None:
-        try:
-            located = fit_curve(current, curve)
-        except FitError:
-            return None
-        candidate = Candidate(located.effect, curve.title)
-        return Trial([candidate], located.fit, located.fit, located) if located.fit.converged else None
 
     def _replace(self, accepted: list[Step], states: list[State]) -> None:
         """Leave out the effect before a curve where the curve alone explains as much for less.
@@ -326,14 +369,6 @@ class Search:
         price = _price(both) * sum(c.parameters for c in accepted[-2].candidates)
         if alone.chi2 < both.chi2 + price * max(both.scatter, 1.0):
             accepted[-2:], states[-2:] = [found[0]], [found[1]]
-
-    def _try(self, current: Fit, candidates: list[Candidate], start: list[float]) -> Trial | None:
-        try:
-            fitted = extend(current, [c.effect for c in candidates], start)
-        except FitError:
-            return None
-        trial = Trial(candidates, fitted, fitted)
-        return trial if trial.physical and trial.fit.converged else None
 
     def _accept(
         self, current: State, trials: list[Trial], look: Look, looks: int
@@ -366,17 +401,17 @@ class Search:
                 continue
             if not self._worse(current.errors, errors):
                 others = self._alternatives(trial, trials, look.library, unit)
-                located = [t.curve.curve for t in trials if t.curve]
-                curve = located[0] if located else None
-                step = Step(trial.candidates, curve, fall, p, ratio, others)
+                step = Step(trial.candidates, trial.curve, fall, p, ratio, others)
                 return step, State(trial.fit, whole.fit, errors)
         return None
 
     def _again(self, whole: Fit, trial: Trial) -> Trial | None:
         """The same proposal fitted to all data."""
-        if trial.curve:
-            return self._locate(whole, trial.curve.curve)
-        return self._try(whole, trial.candidates, trial.amplitudes)
+        if trial.curve is None:
+            return _of_library(whole, trial.candidates, trial.amplitudes)
+        if trial.formula is None:
+            return _of_curve(whole, trial.curve)
+        return _of_formula(whole, trial.curve, trial.formula)
 
     def _level(self, one: Fit, other: Fit) -> tuple[Fit, Fit]:
         """Two fits of the same data, held equally tightly."""
@@ -406,7 +441,7 @@ class Search:
                 trial is chosen
                 or nats > NATS
                 or len(trial.candidates) != len(chosen.candidates)
-                or trial.curve
+                or trial.is_curve
             ):
                 continue
             for mine, other in zip(chosen.candidates, trial.candidates, strict=True):

@@ -19,13 +19,15 @@ Array = NDArray[np.float64]
 
 #: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]``
 #: in rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data,
-#: which is where the noise is estimated; at the tight end small effects show. A disk of LEGO is not held
-#: tighter than 10 um a frame: below that no film is without faults of its own.
+#: which is where the noise is estimated; at the tight end small effects show. How tight is right the evidence
+#: says: below some 10 um a frame a film's own faults begin to count as the model's.
 SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
     "disk": (
         (0.1, 1e-4, 1e-4, 1e-3),
         (0.02, 3e-5, 3e-5, 3e-4),
         (3e-3, 1e-5, 1e-5, 1e-4),
+        (1e-3, 3e-6, 3e-6, 3e-5),
+        (3e-4, 1e-6, 1e-6, 1e-5),
     ),
     "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5), (1e-4, 3e-6), (1e-5, 3e-7)),
 }
