@@ -54,7 +54,7 @@ def test_a_state_that_is_not_seen_is_found() -> None:
     error = (found.states - truth)[:, 2] / np.sqrt(found.state_covariance[:, 2, 2])
     # Errors in units of their own: neighbours share theirs, so that the mean of their squares varies.
     assert 0.3 < np.sqrt((error**2).mean()) < 2.0
-    assert np.isnan(found.misfit[:, 2]).all()
+    assert np.isnan(found.misfit[:, 2]).all() and found.to_dict()["noise"].keys() == {"x", "y", "z"}
 
 
 def test_an_angle_counts_modulo_a_turn() -> None:

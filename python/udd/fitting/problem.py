@@ -164,6 +164,11 @@ class Fit:
         return self.measurements[0]
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """What `misfit` is of: the measurement's columns, or all states of a user's own model."""
+        return self.model.state_names if self.model.kind == "own" else self.measurement.names
+
+    @property
     def residuals(self) -> Array:
         """What was seen less what was fitted, for every row of the measurement; NaN where not seen.
 
@@ -211,7 +216,7 @@ class Fit:
             "converged": self.converged,
             "noise": {
                 name: {"factor": float(f), "per_rad_per_s": float(b)}
-                for name, f, b in zip(self.measurement.names, self.noise.factor, self.noise.blur, strict=True)
+                for name, f, b in zip(self.channels, self.noise.factor, self.noise.blur, strict=True)
             },
         }
 
