@@ -25,7 +25,7 @@ def default_start(model: Model) -> list[float]:
     elif isinstance(model, Pendulum):
         start = [0.0, 1.0]
     else:
-        raise ModelError("where orbits of a model of your own start is yours to say: give state0")
+        raise ModelError("where orbits of a model of your own start is yours to say: give an initial state")
     return start + [0.0] * (len(model.state_names) - len(start))  # bristles are at rest
 
 

@@ -170,6 +170,8 @@ def _starts(
     """The axes of the grid, and its states (jobs, dim), the last axis first to vary."""
     if not isinstance(grid, Mapping) or not 1 <= len(grid) <= 3:
         raise ModelError("grid must name one to three components of the state with their values")
+    if state0 is None and isinstance(model, Model) and set(model.state_names) <= set(grid):
+        state0 = np.zeros(len(model.state_names))  # the grid says everything
     base = start_states(model, state0)
     if len(base) != 1:
         raise ModelError("state0 must be one state")

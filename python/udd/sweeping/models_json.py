@@ -8,6 +8,7 @@ from typing import Any
 from udd.effects import Effect, as_json, library
 from udd.errors import ModelError
 from udd.models import DLE, Disk, Model, Pendulum
+from udd.own_models import OwnModel
 
 _KINDS: dict[str, type[Model]] = {cls.kind: cls for cls in (DLE, Disk, Pendulum)}
 
@@ -20,6 +21,14 @@ def model_to_dict(model: Model) -> dict[str, Any]:
     ModelError
         It would not come back the same.
     """
+    if isinstance(model, OwnModel):
+        return {
+            "kind": model.kind,
+            "states": list(model.state_names),
+            "equations": model.equations,
+            "parameters": [list(pair) for pair in model.values],  # in order, which a table need not keep
+            "angles": list(model.angles),
+        }
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
     if _KINDS.get(cls.kind) is cls:
@@ -42,8 +51,16 @@ def model_from_dict(data: object) -> Model:
     """
     given = _mapping("the model", data)
     kind = given.pop("kind", None)
+    if kind == OwnModel.kind:
+        try:
+            return OwnModel(**given | {"parameters": dict(given.get("parameters", {}))})
+        except (TypeError, ValueError):
+            known = "states, equations, parameters and angles"
+            raise ModelError(f"a model of your own has {known}, not {', '.join(given)}") from None
     if kind not in _KINDS:
-        raise ModelError(f"the model's kind must be one of {', '.join(_KINDS)}, not {kind!r}")
+        raise ModelError(
+            f"the model's kind must be one of {', '.join((*_KINDS, OwnModel.kind))}, not {kind!r}"
+        )
     if "effects" in given:
         if not isinstance(given["effects"], list):
             raise ModelError(f"the model's effects must be a list, not {given['effects']!r}")
