@@ -181,3 +181,32 @@ def test_an_effect_that_cannot_be_used_is_named(make: Callable[[], object], name
         make()
     message = str(caught.value)
     assert named in message and "\n" not in message and len(message) < 400
+
+
+def test_a_fit_finds_a_formulas_numbers_as_the_librarys_effects() -> None:
+    t = np.arange(0.0, 20.0, 0.05)
+    truth = udd.Pendulum(1.0, k0=0.01, effects=effects.quadratic_drag(c=0.05))
+    theta = udd.simulate(truth, t, [0.0, 1.5]).state[:, 1]
+    seen = udd.Measurement(t, theta + 1e-3 * np.random.default_rng(1).standard_normal(len(t)))
+    free = ["k0"]
+    library, own = (
+        udd.fit(seen, udd.Pendulum(1.0, k0=0.01, effects=effect), free=[*free, f"{effect.name}.c"])
+        for effect in (effects.quadratic_drag(), formula("torque", "-c*abs(Omega)*Omega", name="own", c=0.0))
+    )
+    # The same problem, solved to a part in 1e6 of the errors or so.
+    for a, b in zip(library.parameters.values(), own.parameters.values(), strict=True):
+        assert a == pytest.approx(b, rel=1e-5)
+    assert abs(own.parameters["own.c"] - 0.05) < 4.0 * own.errors["own.c"]
+    # A curve over the speed takes the place of both frictions.
+    bend = curve("torque", "Omega", -4.5, 4.5, np.zeros(8))
+    found = udd.fit(seen, udd.Pendulum(1.0, effects=bend), free=[f"curve.{c}" for c in bend.amplitudes])
+    speed = np.linspace(-3.0, 3.0, 7)
+    basis = bend.spec.basis(speed)  # type: ignore[attr-defined]
+    order = list(found.parameters)
+    coefficients = np.array(list(found.parameters.values()))
+    places = [order.index(f"curve.{c}") for c in bend.amplitudes]
+    covariance = found.covariance[np.ix_(places, places)]
+    error = np.sqrt(np.einsum("ki,ij,kj->k", basis, covariance, basis))
+    wanted = -0.01 * speed - 0.05 * np.abs(speed) * speed
+    # That a spline bends where the drag's curvature jumps is less than the error.
+    assert (np.abs(basis @ coefficients[places] - wanted) < 4.0 * error).all() and (error < 0.01).all()
