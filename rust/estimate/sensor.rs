@@ -14,15 +14,19 @@ pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; D], rate: &[S; D]) -> [S; M];
 }
 
+/// The distance at which `lens` is told, m.
+const ARM: f64 = 0.1;
+
 /// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
 ///
 /// ```text
-/// (Y, Z)_seen = (1 + scale) Rot(tilt) [(Y, Z) + Rot(beta) (right, up)] + (y0, z0)
+/// (Y, Z)_seen = (1 + scale + lens r^2/A^2) Rot(tilt) [(Y, Z) + Rot(beta) (right, up)] + (y0, z0)
 /// beta_seen = beta + tilt - lag Omega
 /// ```
 ///
 /// `y0, z0` is where the pivot really is in the measurement's coordinates, `tilt` turns the picture
-/// clockwise, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
+/// clockwise, `lens` is how much larger than in the middle a lens shows what lies at the distance A = 0.1 m
+/// from there, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
 /// (marks are glued by hand), `lag` is how much later than the position the orientation is seen, and with a rolling
 /// shutter a point at height `Z` is exposed at `t - row Z`.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +42,7 @@ impl Sensor<4, 3> for DiskCamera {
         ("up", "m"),
         ("lag", "s"),
         ("row", "s/m"),
+        ("lens", ""),
     ];
 
     fn is_angle(&self, channel: usize) -> bool {
@@ -46,8 +51,8 @@ impl Sensor<4, 3> for DiskCamera {
 
     #[inline]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
-        let &[y0, z0, tilt, scale, right, up, lag, row] =
-            camera.first_chunk().expect("eight camera parameters");
+        let &[y0, z0, tilt, scale, right, up, lag, row, lens] =
+            camera.first_chunk().expect("nine camera parameters");
         let late = -(row * x[2]);
         let beta = x[3] + late * rate[3];
         let (sin, cos) = (beta.sin(), beta.cos());
@@ -55,17 +60,24 @@ impl Sensor<4, 3> for DiskCamera {
         let z = x[2] + late * rate[2] + up * cos - right * sin;
         let beta = beta - lag * rate[3];
         let (sin, cos) = (tilt.sin(), tilt.cos());
-        let size = S::one() + scale;
+        let size = S::one() + scale + lens * (y.square() + z.square()).scale(1.0 / (ARM * ARM));
         [size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0, beta + tilt]
     }
 }
 
-/// A sensor that sees a pendulum's angle, with an unknown zero.
+/// A sensor that sees a pendulum's angle, with an unknown zero, from a pivot that is a little off:
+///
+/// ```text
+/// theta_seen = theta + theta0 - right cos(theta) + up sin(theta)
+/// ```
+///
+/// The pivot that the angle was measured from lies `right` and `up` of the true one, in lengths of the pendulum.
 #[derive(Clone, Copy, Debug)]
 pub struct AngleSensor;
 
 impl Sensor<2, 1> for AngleSensor {
-    const PARAMETERS: &'static [(&'static str, &'static str)] = &[("theta0", "rad")];
+    const PARAMETERS: &'static [(&'static str, &'static str)] =
+        &[("theta0", "rad"), ("right", ""), ("up", "")];
 
     fn is_angle(&self, _channel: usize) -> bool {
         true
@@ -73,7 +85,9 @@ impl Sensor<2, 1> for AngleSensor {
 
     #[inline]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 2], _rate: &[S; 2]) -> [S; 1] {
-        [x[1] + camera[0]]
+        let &[theta0, right, up] = camera.first_chunk().expect("three camera parameters");
+        let (sin, cos) = x[1].sin_cos();
+        [x[1] + theta0 - right * cos + up * sin]
     }
 }
 

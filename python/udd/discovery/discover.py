@@ -9,7 +9,7 @@ import numpy as np
 
 from udd.effects.own import CurveSpec
 from udd.errors import FitError
-from udd.fitting import Fit, fit_record, record_of
+from udd.fitting import Fit, fit_record, record_of, refit
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -86,7 +86,7 @@ def discover(
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
     train = record.first(TRAIN)
-    options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each}
+    options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each, "search": True}
 
     tell("fitting the known model")
     base = fit_record(measurement, record.part(train), model, free, **options)
@@ -94,7 +94,9 @@ def discover(
     search = Search(record, ~train, tell)
     before = search.errors(base)
     end = search.run(base, baseline, before)
-    found = [f for step in end.accepted for f in _describe(step, end.whole)]
+    tell("fitting the model as found")
+    final = refit(end.whole)
+    found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
     if found:
@@ -106,7 +108,7 @@ def discover(
     return Discovery(
         verdict=verdict,
         baseline=baseline,
-        fit=end.whole,
+        fit=final,
         effects=found,
         alternatives=others,
         error_before=before,

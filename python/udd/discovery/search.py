@@ -156,6 +156,11 @@ class Trial:
         return self.compared.chi2 / unit + self.price
 
     @property
+    def handicap(self) -> float:
+        """By how much chi2 must be better than that of an effect of the library."""
+        return 0.0 if self.curve is None else 3 * NATS if self.formula is None else 2 * NATS
+
+    @property
     def needed(self) -> bool:
         """Whether each of several candidates is needed beside the others."""
         if len(self.candidates) < 2:
@@ -305,27 +310,29 @@ class Search:
         return max(found, key=Look.strongest)
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
+        """The best thing to add that passes: an effect of the library, a curve, or a pair of effects.
 
-        The library comes first, but for a curve that is clearly likelier than any effect of it.
+        A curve is tried beside the library where it is clearly likelier than any effect of it.
         """
-        passing = look.passing(self.looks[-1])
+        looks = self.looks[-1]
+        passing = look.passing(looks)
         known = max((look.nats(s) for s in passing), default=-math.inf)
-        likely = _states_first([c for c in look.curves if c.p * self.looks[-1] < ALPHA])[:_CURVES]
+        likely = _states_first([c for c in look.curves if c.p * looks < ALPHA])[:_CURVES]
+        singles = self._singles(current, passing)
         if likely and likely[0].evidence > known + NATS:
-            return self._curve(current, look, likely) or self._single(current, look, passing)
+            return self._accept(current, singles + self._curves(current, likely), look, looks)
         return (
-            self._single(current, look, passing)
+            self._accept(current, singles, look, looks)
             or self._pair(current, look)
-            or self._curve(current, look, likely)
+            or self._accept(current, self._curves(current, likely), look, looks)
         )
 
-    def _single(self, current: State, look: Look, passing: list[Scored]) -> tuple[Step, State] | None:
+    def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
         trials = []
         for s in passing[:_TRIED]:
             self.tell(f"trying {s.candidate.title}")
             trials.append(_of_library(current.part, [s.candidate], list(s.amplitudes)))
-        return self._accept(current, [t for t in trials if t], look, self.looks[-1])
+        return [t for t in trials if t]
 
     def _pair(self, current: State, look: Look) -> tuple[Step, State] | None:
         best = look.library.pairs()
@@ -339,7 +346,7 @@ class Search:
             trials.append(_of_library(current.part, [a.candidate, b.candidate], [0.0] * columns))
         return self._accept(current, [t for t in trials if t], look, len(best))
 
-    def _curve(self, current: State, look: Look, likely: list[Curve]) -> tuple[Step, State] | None:
+    def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
         trials: list[Trial | None] = []
         for curve in likely:
@@ -352,7 +359,7 @@ class Search:
             for written in found.formulas[:_FORMULAS]:
                 self.tell(f"trying {written.text}")
                 trials.append(_of_formula(current.part, located.curve, written))
-        return self._accept(current, [t for t in trials if t], look, self.looks[-1])
+        return [t for t in trials if t]
 
     def _replace(self, accepted: list[Step], states: list[State]) -> None:
         """Leave out the effect before a curve where the curve alone explains as much for less.
@@ -362,7 +369,9 @@ class Search:
         last, before = accepted[-1], states[-3]
         assert last.curve is not None
         self.tell(f"trying {last.curve.title} instead of {accepted[-2].candidates[0].title}")
-        found = self._curve(before, self._look(before.part), [last.curve])
+        found = self._accept(
+            before, self._curves(before, [last.curve]), self._look(before.part), self.looks[-1]
+        )
         if found is None:
             return
         both, alone = self._level(states[-1].part, found[1].part)
@@ -381,11 +390,12 @@ class Search:
         level = min(t.fit.level for t in trials)
         trials = [replace(t, compared=at_level(t.fit, level)) for t in trials]
         unit = min(trials, key=lambda t: t.compared.chi2).compared.inflation(at_level(current.part, level))
-        # Equal ones, like a slip and a relaxation at one drive, come in the library's order.
-        trials = sorted(trials, key=lambda t: round(t.criterion(unit), 3))
-        least = trials[0].criterion(unit)
+        # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
+        # knows comes before a formula, and a formula before a curve, that fit about as well.
+        trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
+        least = trials[0].criterion(unit) + trials[0].handicap
         # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in trials if t.criterion(unit) - least <= 2 * NATS):
+        for trial in (t for t in trials if t.criterion(unit) + t.handicap - least <= 2 * NATS):
             ratio = self._held_ratio(current.part, trial.fit)
             whole = self._again(current.whole, trial) if ratio[2] < 1.0 else None
             if whole is None:

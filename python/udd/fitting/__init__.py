@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .fit import extend, fit, fit_record
+from .fit import extend, fit, fit_record, refit
 from .problem import Fit, data_of
 from .record import Record, record_of
 from .solve import at_level, filtered, frame_costs, held, loosened, predicted
@@ -21,4 +21,5 @@ __all__ = [
     "loosened",
     "predicted",
     "record_of",
+    "refit",
 ]

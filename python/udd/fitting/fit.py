@@ -17,7 +17,7 @@ from udd.own_models import OwnModel
 from .noise import estimated, stated
 from .own import levels_of
 from .parameters import Free, free_parameters
-from .problem import FOLLOWS, Fit, Point, Problem, levels
+from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .solve import solve, tighten
 
@@ -95,8 +95,12 @@ def fit_record(
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
+    search: bool = False,
 ) -> Fit:
-    """As :func:`fit`, of some of the measurement's frames."""
+    """As :func:`fit`, of some of the measurement's frames.
+
+    For a search the model is held as tightly as it can be, within what a film allows.
+    """
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
     kind = models[0].kind
@@ -105,8 +109,8 @@ def fit_record(
     if isinstance(models[0], OwnModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
     else:
-        schedule = levels(kind)
-    problem = Problem(models, record, parameters, stated(record), schedule, schedule[0])
+        schedule = levels(kind)[: SEARCHED.get(kind) if search else None]
+    problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
     sets = tuple((list(own.parameters.values()), list(cameras), 0.0) for own in models)
     return _anneal(measurements, problem, Point(record.states, sets))
 
@@ -160,6 +164,21 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float] |
         for own, (_model, camera, clock) in zip(models, fitted.point.sets, strict=True)
     )
     return tighten(fitted.measurements, problem, Point(fitted.states, sets), problem.schedule[1:])
+
+
+def refit(fitted: Fit) -> Fit:
+    """The same model fitted again, the noise estimated anew, and held as tightly as is likeliest.
+
+    In a search the noise stays as the first model showed it, so that chi2 compares.
+    """
+    own = isinstance(fitted.model, OwnModel)
+    schedule = fitted.problem.schedule if own else levels(fitted.model.kind)
+    problem = replace(fitted.problem, schedule=schedule, likeliest=True)
+    shown, problem, point = _estimate_noise(fitted.measurements, problem, fitted.point)
+    if not shown:
+        problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
+    result = tighten(fitted.measurements, problem, point, problem.schedule[fitted.level :])
+    return result if result.converged else fitted
 
 
 def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Fit:

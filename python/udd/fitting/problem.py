@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 #: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]``
 #: in rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data,
-#: which is where the noise is estimated; at the tight end small effects show. How tight is right the evidence
-#: says: below some 10 um a frame a film's own faults begin to count as the model's.
+#: which is where the noise is estimated; at the tight end small effects show. How tight is right for a fit
+#: the evidence says.
 SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
     "disk": (
         (0.1, 1e-4, 1e-4, 1e-3),
@@ -34,6 +34,10 @@ SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
 _FRAME = 0.04
 #: A fit whose leverage is larger follows each frame.
 FOLLOWS = 0.7
+
+
+#: How many of these levels effects are sought at: below some 10 um a frame a film's faults look like them.
+SEARCHED = {"disk": 3}
 
 
 def levels(kind: str) -> tuple[tuple[float, ...], ...]:
@@ -55,6 +59,8 @@ class Problem:
     ----------
     models : tuple of Model
         One per film, alike but for their parameters' values.
+    likeliest : bool
+        Whether the model is held as tightly as is likeliest; else as tightly as it can be.
     """
 
     models: tuple[Model, ...]
@@ -63,6 +69,7 @@ class Problem:
     noise: Noise
     schedule: tuple[tuple[float, ...], ...]
     diffusion: tuple[float, ...]
+    likeliest: bool = True
 
     def arguments(
         self, point: Point

@@ -124,16 +124,17 @@ def tighten(
     point: Point,
     schedule: Sequence[tuple[float, ...]],
 ) -> Fit:
-    """Solve for ever smaller errors of the model, as far as the record calls for.
+    """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
 
-    A wrong model gets stuck; and where the model's real error is larger than the assumed one the evidence
-    falls.
+    Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
     """
     best: Fit | None = None
     for diffusion in schedule:
         problem = replace(problem, diffusion=diffusion)
         result = solve(measurements, problem, point, _STEPS)
-        if best is not None and not (result.converged and result.evidence > best.evidence - _LESS):
+        if best is not None and not result.converged:
+            break
+        if best is not None and problem.likeliest and result.evidence < best.evidence - _LESS:
             break
         best, point = result, result.point
     if best is None:
