@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 ALPHA = 1e-3
 _FAR = -6.0  # terms that better the criterion by so much by going do so several at a time
 _EQUAL = 1e-3  # in the criterion
+_LOOSE = 1  # place in the schedule of a fit that a wrong model has not bent
 _TRIED = 4  # of the terms left out, put back in turn to see whether another can go instead
 _ROUNDS = 8  # of such exchanges
 
@@ -139,7 +140,9 @@ def prune(
             raise FitError(f"spread must be above 0 and finite, not {spread!r}")
         priors = dict.fromkeys(names, (0.0, spread)) | dict(priors or {})
     full = fit_record(measurement, record, model, free, priors=priors, search=True)
-    price = float(chi2_distribution.isf(alpha / max(len(names), 1), 1))
+    # Among n terms about one is expected to be needed, or each is priced against chance.
+    n = max(len(names), 1)
+    price = 2 * math.log(n) if spread is not None else float(chi2_distribution.isf(alpha / n, 1))
     pruning = _Pruning(names, price, spread, full, tell)
     end = pruning.run()
     kept = [name for name in names if name in end.parameters]
@@ -158,13 +161,21 @@ class _Pruning:
         self.unit = max(full.scatter, 1.0)
 
     def run(self) -> Fit:
-        """Leave out, hold the rest more tightly, exchange."""
-        current, level = self.full, -1
-        # Where a model with all its terms cannot be held tightly one with fewer can.
-        while current.level > level:
-            level = current.level
-            current = self._tightened(self._without(current, gently=True))
-        current = self._tightened(self._without(current))
+        """Leave out, hold the rest more tightly, exchange; from a tight fit and from a loose one.
+
+        The two leave terms out in another order, and where two sets of terms do nearly the same the order
+        decides.
+        """
+        ends = []
+        for level in dict.fromkeys((self.full.level, min(self.full.level, _LOOSE))):
+            current, last = at_level(self.full, level), -1
+            # Where a model with all its terms cannot be held tightly one with fewer can.
+            while current.level > last:
+                last = current.level
+                current = self._tightened(self._without(current, gently=True))
+            ends.append(self._tightened(self._without(current)))
+        level = min(end.level for end in ends)
+        current = min(ends, key=lambda end: self.criterion(at_level(end, level)))
         for _ in range(_ROUNDS):
             better = self._exchanged(current)
             if better is None:
@@ -183,7 +194,7 @@ class _Pruning:
     def criterion(self, fitted: Fit) -> float:
         """The smaller the better: chi2 with the price of the terms, or minus twice the evidence."""
         if self.spread is not None:
-            return -2.0 * fitted.evidence
+            return -2.0 * fitted.evidence + self.price * len(fitted.parameters)
         return fitted.chi2 / self.unit + self.price * len(fitted.parameters)
 
     def _change(self, fitted: Fit, gone: list[int]) -> float:
@@ -193,7 +204,7 @@ class _Pruning:
         rise = float(a @ np.linalg.solve(block, a))
         if self.spread is None:
             return rise / self.unit - self.price * len(gone)
-        return rise + float(np.linalg.slogdet(block)[1]) - len(gone) * math.log(self.spread**2)
+        return rise + float(np.linalg.slogdet(block)[1]) - len(gone) * (math.log(self.spread**2) + self.price)
 
     def _tightened(self, fitted: Fit) -> Fit:
         schedule = fitted.problem.schedule[fitted.level :]
@@ -272,7 +283,9 @@ class _Pruning:
 
     def _exchanged(self, current: Fit) -> Fit | None:
         """A better set of terms, found by putting one back and leaving out others."""
-        held = [f for f in self.full.problem.free if f.name in self.names and f.name not in current.parameters]
+        held = [
+            f for f in self.full.problem.free if f.name in self.names and f.name not in current.parameters
+        ]
         if not held:
             return None
         gradient, information, _alone = _core.score(
