@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from udd.effects import Effect
@@ -13,6 +14,7 @@ from udd.models import Model
 
 from .curves import Curve
 from .heldout import Errors, comparison_horizon
+from .hint import Hint, hints
 from .scan import Scored
 
 
@@ -158,6 +160,16 @@ class Discovery:
     def model(self) -> Model:
         """The refitted model with the effects."""
         return self.fit.model
+
+    @cached_property
+    def hints(self) -> list[Hint]:
+        """What could be filmed to part the forms in doubt, the best first; worked out when asked for."""
+        return hints(self)
+
+    @property
+    def hint(self) -> Hint | None:
+        """The best of them; None where nothing is in doubt."""
+        return self.hints[0] if self.hints else None
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
