@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NoReturn, Self
+from typing import Any, ClassVar, Self
 
 from udd import _core
 from udd._expressions import Expression, text_of
@@ -16,6 +17,7 @@ from udd.models import Model
 __all__ = ["OwnModel"]
 
 _MOST_STATES = 6
+_POINT = "__"
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -32,17 +34,20 @@ class OwnModel(Model):
         The parameters.
     angles : tuple of str
         The states that are angles.
+    effects : tuple of Effect
+        What was added to its equations: formulas and curves whose slot is a rate, as in ``"v'"``.
     """
 
     kind: ClassVar[str] = "own"
     slow: ClassVar[float] = 1.0
     _plain: ClassVar[tuple[str, ...]] = ()
-    _options: ClassVar[tuple[str, ...]] = ("states", "equations", "parameters", "angles")
+    _options: ClassVar[tuple[str, ...]] = ("states", "equations", "parameters", "angles", "effects")
 
     state_names: tuple[str, ...]  # type: ignore[misc]
     texts: tuple[str, ...]
     values: tuple[tuple[str, float], ...]
     angles: tuple[str, ...]  # type: ignore[misc]
+    effects: tuple[Effect, ...]
 
     def __new__(cls, *_arguments: Any, **_options: Any) -> OwnModel:
         """Leave everything to the initialisation, which a copy or a pickle does not need."""
@@ -55,6 +60,7 @@ class OwnModel(Model):
         parameters: Mapping[str, float] | None = None,
         *,
         angles: Iterable[str] = (),
+        effects: Iterable[Effect] = (),
     ) -> None:
         names = _names("states", states)
         if not 1 <= len(names) <= _MOST_STATES:
@@ -72,6 +78,10 @@ class OwnModel(Model):
                 raise ModelError(f"the angle {name!r} is no state; there are {', '.join(names)}")
         self._set(names, _equations(names, equations), values, turning)
         _core.model_parameters(self)  # which parses the equations
+        added = self._effects(effects)
+        if added:
+            self._set(names, self.texts, values, turning, added)
+            _core.model_parameters(self)
 
     def _set(
         self,
@@ -79,11 +89,13 @@ class OwnModel(Model):
         texts: tuple[str, ...],
         values: tuple[tuple[str, float], ...],
         angles: tuple[str, ...],
+        effects: tuple[Effect, ...] = (),
     ) -> None:
         object.__setattr__(self, "state_names", names)
         object.__setattr__(self, "texts", texts)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "angles", angles)
+        object.__setattr__(self, "effects", effects)
 
     @property
     def state_units(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -91,24 +103,36 @@ class OwnModel(Model):
         return ("",) * len(self.state_names)
 
     @property
-    def effects(self) -> tuple[Effect, ...]:  # type: ignore[override]
-        """None: its equations say everything."""
-        return ()
-
-    @property
     def equations(self) -> dict[str, str]:
-        """Each state's rate, as text."""
+        """Each state's rate as it was given, as text, without the effects that were added."""
         return dict(zip(self.state_names, self.texts, strict=True))
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Name and value of every parameter, in order."""
-        return dict(self.values)
+        """Name and value of every parameter, in order; an effect's are called ``effect.name``."""
+        added = {f"{e.name}.{name}": value for e in self.effects for name, value in e.parameters.items()}
+        return dict(self.values) | added
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The parameters' units, which are the user's."""
+        return dict.fromkeys(self.parameters, "")
+
+    @property
+    def _spec(self) -> tuple[str, list[float], list[Any], bool]:
+        """What the core needs to know; to it, effects are a part of the equations."""
+        return self.kind, list(self.parameters.values()), [], False
 
     @property
     def _own(self) -> tuple[list[str], list[str], list[str], list[str]]:
         """What the core needs to know beside the values."""
-        return list(self.state_names), list(self.texts), list(self.parameters), list(self.angles)
+        texts = dict(self.equations)
+        for effect in self.effects:
+            state = effect.slots[0].removesuffix("'")
+            texts[state] = f"{texts[state]} + ({_written(effect)})"
+        # A point is no part of a name there.
+        names = [name.replace(".", _POINT) for name in self.parameters]
+        return list(self.state_names), list(texts.values()), names, list(self.angles)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """The model with other values of some parameters.
@@ -122,9 +146,13 @@ class OwnModel(Model):
         for name in values:
             if name not in known:
                 raise ModelError(f"the model has no parameter {name!r}; it has {', '.join(known) or 'none'}")
-        new = {n: number(f"the parameter {n}", values[n]) if n in values else v for n, v in known.items()}
+        new = [(n, number(f"the parameter {n}", values.get(n, v))) for n, v in self.values]
+        effects = []
+        for effect in self.effects:
+            own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
+            effects.append(effect.replace(**own) if own else effect)
         changed = object.__new__(type(self))
-        changed._set(self.state_names, self.texts, tuple(new.items()), self.angles)
+        changed._set(self.state_names, self.texts, tuple(new), self.angles, tuple(effects))
         return changed
 
     def with_term(self, equation: str, term: Expression, **amplitude: float) -> OwnModel:
@@ -167,15 +195,48 @@ class OwnModel(Model):
         return OwnModel(
             self.state_names,
             self.equations | {equation: text},
-            self.parameters | amplitude,
+            dict(self.values) | amplitude,
             angles=self.angles,
+            effects=self.effects,
         )
 
-    def with_effects(self, effects: Iterable[Effect]) -> NoReturn:
-        """Effects act on a disk or a pendulum; see :meth:`with_term`."""
-        raise ModelError(
-            "effects act on a udd.Disk or a udd.Pendulum; a model of your own takes a term: with_term"
-        )
+    def with_effects(self, effects: Iterable[Effect]) -> Self:
+        """The model with these effects instead of those added before.
+
+        Parameters
+        ----------
+        effects : iterable of Effect
+            Formulas and curves whose slot is the rate of a state, as in
+            ``udd.effects.formula("v'", "c*abs(v)*v", c=-0.1)``; see also :meth:`with_term`.
+
+        Raises
+        ------
+        ModelError
+            An effect of disk or pendulum, one given twice, or one that names what the model does not have.
+        """
+        changed = object.__new__(type(self))
+        changed._set(self.state_names, self.texts, self.values, self.angles, self._effects(effects))
+        _core.model_parameters(changed)
+        return changed
+
+    def _effects(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+        given = (effects,) if isinstance(effects, Effect) else tuple(effects)
+        for effect in given:
+            if isinstance(effect, Effect) and self.kind not in effect.spec.bodies:
+                raise ModelError(
+                    f"{effect.name} acts on a udd.Disk or a udd.Pendulum; a model of your own takes a term: "
+                    "with_term, or udd.effects.formula with the rate of a state for its slot"
+                )
+        result = super()._effects(given)
+        for effect in result:
+            slot = effect.slots[0]
+            if slot.removesuffix("'") not in self.state_names:
+                known = ", ".join(f"{name}'" for name in self.state_names)
+                raise ModelError(f"{effect.name} adds to {slot}, but the model's rates are {known}")
+            for name in effect.parameters:
+                if name in self.state_names:
+                    raise ModelError(f"{effect.name} has a parameter {name!r}, which is the name of a state")
+        return result
 
     def replace(self, **changes: Any) -> OwnModel:
         """The model with other arguments of its constructor or other parameters.
@@ -188,8 +249,9 @@ class OwnModel(Model):
         arguments: dict[str, Any] = {
             "states": self.state_names,
             "equations": self.equations,
-            "parameters": self.parameters,
+            "parameters": dict(self.values),
             "angles": self.angles,
+            "effects": self.effects,
         }
         own = {name: changes.pop(name) for name in list(changes) if name in self.parameters}
         for name in changes:
@@ -201,7 +263,15 @@ class OwnModel(Model):
 
     def __repr__(self) -> str:
         angles = f", angles={list(self.angles)!r}" if self.angles else ""
-        return f"Model({list(self.state_names)!r}, {self.equations!r}, {self.parameters!r}{angles})"
+        text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{angles})"
+        return f"{text}.with_effects({list(self.effects)!r})" if self.effects else text
+
+
+def _written(effect: Effect) -> str:
+    """An effect's formula with its parameters as the core calls them."""
+    assert effect.spec.own is not None
+    names = "|".join(map(re.escape, effect.parameters))
+    return re.sub(rf"(?<![\w.])(?:{names})(?!\w)", rf"{effect.name}{_POINT}\g<0>", effect.spec.own[1])
 
 
 def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:

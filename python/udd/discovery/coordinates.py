@@ -46,7 +46,7 @@ class Slot:
     Attributes
     ----------
     name : str
-        ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``, or the state whose rate it adds to.
+        ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``, or the rate of a state: ``"v'"``.
     momentum : str or None
         For the contact's velocities: whether the momentum follows. See :class:`udd.effects.Spec`.
     equation : str
@@ -146,7 +146,7 @@ def slots(model: Model) -> tuple[Slot, ...]:
         return turning + moving
     if isinstance(model, Pendulum):
         return (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
-    return tuple(Slot(name, None, name, _direct(k)) for k, name in enumerate(model.state_names))
+    return tuple(Slot(f"{name}'", None, name, _direct(k)) for k, name in enumerate(model.state_names))
 
 
 def _inertia(model: Model, x: Array) -> Array | float:

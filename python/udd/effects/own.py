@@ -148,9 +148,10 @@ def formula(
 
     Parameters
     ----------
-    slot : {"torque", "friction", "lateral", "vertical"}
+    slot : {"torque", "friction", "lateral", "vertical"} or the rate of a state
         What the formula adds to: the torque [m^2/s^2], the friction coefficient k [m^2/s], the contact's
-        lateral velocity u or its vertical velocity W_c [m/s].
+        lateral velocity u or its vertical velocity W_c [m/s]. Of a user's own model, the rate of a state:
+        ``"v'"``; its formula may use the model's states and parameters.
     expression : str or SymPy expression
         Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
         friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
@@ -282,7 +283,7 @@ def curve(
         raise ModelError("a curve needs a list of at least four coefficients")
     first, last = number("low", low), number("high", high, above=float(low))
     _slot(slot)
-    x, unit = text_of("the coordinate", coordinate), _SLOTS[slot][1]
+    x, unit = text_of("the coordinate", coordinate), _SLOTS[slot][1] if slot in _SLOTS else ""
     names = [f"c{i}" for i in range(len(values))]
     listed = tuple(_parameter(name, own, unit, True, UNLIMITED) for own in names)
     text = f"{'periodic' if periodic else 'spline'}({x}, {first!r}, {last!r}, {', '.join(names)})"
@@ -301,16 +302,21 @@ def _described(
         raise ModelError(f"an effect's name must be a single word, not {name!r}")
     if name in _specs():
         raise ModelError(f"the library has an effect called {name!r} already: give the formula another name")
-    left, _unit, meaning = _SLOTS[slot]
+    left, _unit, meaning = _SLOTS.get(slot, (f"{slot} = ... + ", "", f"{slot} changes"))
     names = [p.name for p in parameters]
     linear = [p.name for p in parameters if p.role == "amplitude"]
-    bodies = tuple(_core.formula_bodies(name, (slot, text, names, linear)))
+    # Of a user's own model only the model knows the states.
+    bodies = tuple(_core.formula_bodies(name, (slot, text, names, linear))) if slot in _SLOTS else ("own",)
     return name, title, left + shown, meaning, bodies, (slot,), _MOMENTA.get(slot, ()), ()
 
 
 def _slot(slot: str) -> None:
-    if slot not in _SLOTS:
-        raise ModelError(f"the slot must be one of {', '.join(_SLOTS)}, not {slot!r}")
+    rate = isinstance(slot, str) and slot.endswith("'") and slot[:-1].isidentifier()
+    if slot not in _SLOTS and not rate:
+        raise ModelError(
+            f"the slot must be one of {', '.join(_SLOTS)}, or for a model of your own the rate of a state as "
+            f'in "v\'", not {slot!r}'
+        )
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

@@ -150,7 +150,7 @@ def _spread(model: Model) -> dict[str, float]:
         return {n: s if s > 0 else np.inf for n, s in known.items()}
     if isinstance(model, Pendulum):
         return {n: s * abs(values[n]) if np.isfinite(s) else np.inf for n, s in PENDULUM.items()}
-    return dict.fromkeys(values, np.inf)
+    return {name: np.inf for name in values if name not in _amplitudes(model)}
 
 
 def _with_priors(free: list[Free], given: dict[str, tuple[float, float]]) -> tuple[Free, ...]:

@@ -28,6 +28,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "equations": model.equations,
             "parameters": [list(pair) for pair in model.values],  # in order, which a table need not keep
             "angles": list(model.angles),
+            "effects": [_effect_to_dict(effect) for effect in model.effects],
         }
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
@@ -52,10 +53,12 @@ def model_from_dict(data: object) -> Model:
     given = _mapping("the model", data)
     kind = given.pop("kind", None)
     if kind == OwnModel.kind:
+        if isinstance(given.get("effects"), list):
+            given["effects"] = [_effect_from_dict(effect) for effect in given["effects"]]
         try:
             return OwnModel(**given | {"parameters": dict(given.get("parameters", {}))})
         except (TypeError, ValueError):
-            known = "states, equations, parameters and angles"
+            known = "states, equations, parameters, angles and effects"
             raise ModelError(f"a model of your own has {known}, not {', '.join(given)}") from None
     if kind not in _KINDS:
         raise ModelError(
