@@ -44,6 +44,7 @@ def run(args: argparse.Namespace) -> Answer:
             command = shlex.join(["udd", *sys.argv[1:]])
             found.report(args.report, film=film, source=args.file, command=command)
     text, data = describe(found), {"file": args.file, **found.to_dict()}
+    data["hints"] = [hint.to_dict() for hint in found.hints]
     if args.report is not None:
         text += f"\nreport: {args.report}"
         data["report"] = args.report
@@ -74,6 +75,8 @@ def describe(found: Discovery) -> str:
     lines.append(f"  noise floor after {at}: {numbers.floor}")
     for other in found.alternatives:
         lines.append(f"  could equally be {other.title}: {other.effect.expression}. {words.limit(other)}")
+    if found.hint is not None:
+        lines.append(f"  to tell: {found.hint.text}")
     return "\n".join(lines)
 
 

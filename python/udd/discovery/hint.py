@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from udd.errors import UddError
 from udd.fitting import Fit, Record
 from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
-from udd.models import Disk, Model
+from udd.models import Disk, Model, Pendulum
 from udd.trajectory import simulate
 
 from .candidates import Candidate
@@ -62,6 +62,10 @@ class Hint:
         """Titles of the alternatives that part from what was chosen."""
         return [title for title, nats in self.each.items() if nats >= PARTED]
 
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {"design": self.design, "nats": self.nats, "each": self.each, "text": self.text}
+
 
 @dataclass(frozen=True)
 class Film:
@@ -87,11 +91,11 @@ def hints(found: Discovery) -> list[Hint]:
     """What could be filmed to part the forms that the data cannot tell apart, the best first.
 
     Each film is simulated with the model as found and added to the part of the record that the forms were
-    compared on; drive and camera of a new film are as unknown as those of the first. Where a form that acts
-    with ``a`` on the data is fitted by another, chi2 rises by ``a (S - C T^-1 C') a``: ``S`` and ``T`` are the
-    information on the amplitudes of the two with everything else refitted, ``C`` what they share. Half the
-    rise, of the two forms the lesser, is what the film is expected to tell; it is counted from what the
-    present data say already.
+    compared on; drive and camera of a new film are as unknown as those of the first. Where a form with the
+    amplitudes ``a`` is true and another is fitted, chi2 rises by ``a (S - C T^-1 C') a``: ``S`` and ``T`` are
+    the information on the amplitudes of the two with everything else refitted, ``C`` what they share. Half
+    the rise, of the two forms the lesser, is what the data are expected to tell; to what the present data
+    say already the film adds by how much that grows.
 
     Parameters
     ----------
@@ -125,7 +129,7 @@ def hints(found: Discovery) -> list[Hint]:
         each: dict[str, float] = {}
         for pair, before in zip(pairs, now, strict=True):
             told = pair.other.nats + max(pair.nats((film, filmed)) - before, 0.0)
-            each[pair.other.title] = min(told, each.get(pair.other.title, np.inf))
+            each[pair.other.title] = float(min(told, each.get(pair.other.title, np.inf)))
         designs.append((film.design, each))
     return _ranked(designs)
 
@@ -163,7 +167,7 @@ def _films(fit: Fit) -> Iterator[Film]:
                 text = f"the disk again with {times:g} times the drive (W = {drive:.3g} m/s)"
                 yield Film(text, model.with_parameters({"W": drive}), places)
         yield Film("the disk again, from another start", model, places[1:])
-    else:
+    elif isinstance(model, Pendulum):
         for times in _SWINGS:
             start = states[own][:1] * times
             if abs(start[0, 1]) < _UPRIGHT:
@@ -268,9 +272,7 @@ def _amplitudes(effect: Effect) -> Array:
     return np.array([effect.parameters[name] for name in effect.amplitudes])
 
 
-def _rise(
-    information: Array, true: NDArray[np.int64], fitted: NDArray[np.int64], amplitudes: Array
-) -> float:
+def _rise(information: Array, true: NDArray[np.int64], fitted: NDArray[np.int64], amplitudes: Array) -> float:
     """By how much chi2 is larger where one form is true and the other is fitted."""
     shared = information[np.ix_(true, fitted)]
     taken = shared @ np.linalg.pinv(information[np.ix_(fitted, fitted)], hermitian=True) @ shared.T
