@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from udd import effects
 from udd.models import Disk, Model
+from udd.own_models import OwnModel
 
 
 @dataclass(frozen=True)
@@ -47,11 +49,18 @@ class Candidate:
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]
 
 
-def library(model: Model) -> list[Candidate]:
+def library(model: Model, given: Sequence[Candidate] = ()) -> list[Candidate]:
     """Every effect that can be added to a model, in each of its variants, but for scanned frequencies.
 
-    Terms that the free parameters absorb are not sorted out here: that shows in the data.
+    Those of a user's own model are made of its states, see :func:`udd.discovery.terms.terms`; those given
+    come first. Terms that the free parameters absorb are not sorted out here: that shows in the data.
     """
+    if isinstance(model, OwnModel):
+        from .terms import terms
+
+        there = {effect.name for effect in model.effects}
+        own = {c.effect.name: c for c in (*given, *terms(model)) if c.effect.name not in there}
+        return list(own.values())
     result = []
     for spec in effects.library():
         if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:

@@ -7,14 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from udd._expressions import Expression
 from udd.effects.own import CurveSpec
 from udd.errors import FitError
 from udd.fitting import Fit, fit_record, record_of, refit
 from udd.measurement import Measurement
 from udd.models import Model
+from udd.own_models import OwnModel
 
+from .candidates import Candidate
+from .heldout import pace
 from .results import Discovery, Found
 from .search import Search, Step
+from .terms import given_terms
 
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
@@ -33,6 +38,7 @@ def discover(
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
+    candidates: Iterable[tuple[str, Expression]] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Discovery:
     """Find the effect that a model lacks.
@@ -50,10 +56,13 @@ def discover(
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
-    model : Disk or Pendulum, or a sequence of them
+    model : Disk, Pendulum or a user's own Model, or a sequence of them
         The known model; its parameters are the start and the priors' means.
     free, camera, priors, each
         As for :func:`udd.fit`.
+    candidates : iterable of (str, formula)
+        Terms to try in a user's own model beside those made of its states: the state in whose equation it
+        stands and the term, as in ``("v", "abs(v)*v")``.
     progress : callable, optional
         Told in a few words what is being done.
 
@@ -81,7 +90,9 @@ def discover(
     """
     tell = progress or (lambda _text: None)
     free = None if free is None else list(free)
-    record = record_of(measurement)
+    record = record_of(measurement, model)
+    one = model if isinstance(model, Model) else next(iter(model))
+    given = _given(one, candidates)
     n = len(record.t)
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
@@ -91,7 +102,7 @@ def discover(
     tell("fitting the known model")
     base = fit_record(measurement, record.part(train), model, free, **options)
     baseline = fit_record(measurement, record, model, free, **options)
-    search = Search(record, ~train, tell)
+    search = Search(record, ~train, tell, pace(base), given)
     before = search.errors(base)
     end = search.run(base, baseline, before)
     tell("fitting the model as found")
@@ -120,6 +131,18 @@ def discover(
         split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=end.part,
     )
+
+
+def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:
+    """The user's own candidates."""
+    listed = list(candidates)
+    if isinstance(model, OwnModel):
+        return given_terms(model, listed)
+    if listed:
+        raise FitError(
+            "candidates can be given for a model of your own; a disk's and a pendulum's are the library's"
+        )
+    return []
 
 
 def _describe(step: Step, final: Fit) -> list[Found]:

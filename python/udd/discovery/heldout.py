@@ -15,10 +15,16 @@ from udd.fitting import Fit, Record, filtered, predicted
 
 Array = NDArray[np.float64]
 
-#: Horizons of the free runs, s; those longer than a third of the held-out part are left out.
-HORIZONS = {"disk": (0.2, 0.4, 1.0, 2.0, 4.0), "pendulum": (0.5, 1.0, 4.0, 10.0, 20.0)}
-_FILTER = {"disk": 1.0, "pendulum": 4.0}  # s of data before each start, from which its state is filtered
-_FILTER_LEVEL = {"disk": 1, "pendulum": 3}  # how tightly, by the place in the schedule, whatever the model
+#: Horizons of the free runs, s; those longer than a third of the held-out part are left out. Of a user's own
+#: model all times here count in units of its motion's pace, see :func:`pace`.
+HORIZONS = {
+    "disk": (0.2, 0.4, 1.0, 2.0, 4.0),
+    "pendulum": (0.5, 1.0, 4.0, 10.0, 20.0),
+    "own": (0.2, 0.4, 1.0, 2.0, 4.0),
+}
+# s of data before each start, from which its state is filtered
+_FILTER = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
+_FILTER_LEVEL = {"disk": 1, "pendulum": 3, "own": 2}  # how tightly, by the place in the schedule
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
@@ -31,7 +37,8 @@ class Errors:
     Attributes
     ----------
     unit : str
-        ``"m"`` of the disk's centre, ``"rad"`` of a pendulum's angle.
+        ``"m"`` of the disk's centre, ``"rad"`` of a pendulum's angle, ``"spread"`` of a user's own model: the
+        root mean square over the states that are seen, each in units of its standard deviation.
     horizons : tuple of float
         Length of the free runs, s.
     median : ndarray (h,)
@@ -82,7 +89,24 @@ class Errors:
         return {"unit": self.unit, "starts": len(self.samples), "errors": rows, "whole_run_rms": self.whole}
 
 
-def held_out_errors(fit: Fit, record: Record, held: NDArray[np.bool_], seed: int = 0) -> Errors:
+def pace(fit: Fit) -> float:
+    """The unit of the times of this module: a second, or four times what a user's own motion takes to change.
+
+    As on the disk, where that is a quarter of a second. It is the least over the states of the standard
+    deviation over the root mean square rate.
+    """
+    if fit.model.kind != "own":
+        return 1.0
+    linked, dt = fit.record.linked, np.diff(fit.record.t)
+    rates = (np.diff(fit.states, axis=0)[linked]) / dt[linked, None]
+    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
+    moving = (rate > 0) & (spread > 0)
+    return 4.0 * float((spread[moving] / rate[moving]).min()) if moving.any() else float(np.median(dt))
+
+
+def held_out_errors(
+    fit: Fit, record: Record, held: NDArray[np.bool_], seed: int = 0, unit: float = 1.0
+) -> Errors:
     """Errors of a fitted model on the frames of `record` that are held out.
 
     Each free run starts from a state that is filtered from the second of data before it; absolute time is
@@ -96,25 +120,28 @@ def held_out_errors(fit: Fit, record: Record, held: NDArray[np.bool_], seed: int
         The whole measurement's frames.
     held : ndarray of bool (n,)
         Which frames are held out: the last ones of each measurement.
+    unit : float
+        See :func:`pace`.
     """
-    kind = fit.measurement.kind
-    windows, ends, horizons = _windows(record, held, HORIZONS[kind], _FILTER[kind])
+    kind = fit.model.kind
+    wanted = tuple(h * unit for h in HORIZONS[kind])
+    windows, ends, horizons = _windows(record, held, wanted, _FILTER[kind] * unit, _EVERY * unit)
     firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
     seen = record.seen[ends]
-    there = record.observed[ends].all(axis=2)
+    there = _there(record)[ends]
     found = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
-    samples = np.where(there, _distance(kind, found, seen), np.nan)
+    samples = np.where(there, _distance(fit, record, found, seen), np.nan)
 
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    blocks = _blocks(record, _BLOCK)[starts]
+    blocks = _blocks(record, _BLOCK * unit)[starts]
     columns = [samples[:, k : k + 1] for k in range(len(horizons))]
     low, high = np.array([_interval(blocks, column, _median, rng) for column in columns]).T
     return Errors(
-        unit="m" if kind == "disk" else "rad",
+        unit={"disk": "m", "pendulum": "rad", "own": "spread"}[kind],
         horizons=horizons,
         median=np.nanmedian(samples, axis=0),
         low=low,
@@ -123,7 +150,7 @@ def held_out_errors(fit: Fit, record: Record, held: NDArray[np.bool_], seed: int
         samples=samples,
         blocks=blocks,
         run=_run(fit, record, held),
-        run_blocks=_blocks(record, _BLOCK)[held],
+        run_blocks=_blocks(record, _BLOCK * unit)[held],
     )
 
 
@@ -135,7 +162,12 @@ def _blocks(record: Record, length: float) -> NDArray[np.int64]:
 
 
 def comparison_horizon(errors: Errors) -> float:
-    """The horizon at which a disk's models are compared: a second, or the nearest below that there is, s."""
+    """The horizon at which models are compared: a second of the disk, or the nearest below that there is, s.
+
+    Of a user's own model it is the third that there is.
+    """
+    if errors.unit == "spread":
+        return errors.horizons[:3][-1]
     return max((h for h in errors.horizons if h <= 1.0), default=errors.horizons[0])
 
 
@@ -152,7 +184,7 @@ def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> tuple[flo
 
 
 def cost_improvement(
-    before: Array, after: Array, record: Record, seed: int = 0
+    before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0
 ) -> tuple[float, float, float]:
     """The ratio of two fits' costs on a record that neither saw, with its 95 % interval from paired blocks.
 
@@ -160,7 +192,7 @@ def cost_improvement(
     their forecasts are still equally good.
     """
     costs = np.column_stack([after, before])
-    return _ratio(_blocks(record, _COST_BLOCK), costs, _sum, seed)
+    return _ratio(_blocks(record, _COST_BLOCK * unit), costs, _sum, seed)
 
 
 def _ratio(
@@ -173,7 +205,7 @@ def _ratio(
 
 
 def _windows(
-    record: Record, held: NDArray[np.bool_], wanted: tuple[float, ...], window: float
+    record: Record, held: NDArray[np.bool_], wanted: tuple[float, ...], window: float, often: float = _EVERY
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
     """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
     spans = [np.flatnonzero(held & (record.film == film)) for film in range(len(record.origins))]
@@ -187,7 +219,7 @@ def _windows(
     for own in spans:
         # Every measurement has a frame rate of its own.
         step = float(np.median(np.diff(record.t[own])))
-        back, every = max(round(window / step), 6), max(round(_EVERY / step), 1)
+        back, every = max(round(window / step), 6), max(round(often / step), 1)
         ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
         for start in range(int(own[0]) + back, int(own[-1]) + 1 - int(ahead[-1]), every):
             if run[start - back] == run[start + ahead[-1]]:
@@ -203,7 +235,7 @@ def _windows(
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
     """States at the windows' first and last frames."""
-    diffusion = fit.problem.schedule[_FILTER_LEVEL[fit.measurement.kind]]
+    diffusion = fit.problem.schedule[_FILTER_LEVEL[fit.model.kind]]
     first, last, _covariance = filtered(fit, record, windows, diffusion)
     return first, last
 
@@ -218,8 +250,8 @@ def _run(fit: Fit, record: Record, held: NDArray[np.bool_]) -> Array:
         found = predicted(
             fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
         )[0]
-        errors[own] = _distance(fit.measurement.kind, found, record.seen[own])
-    result: Array = np.where(record.observed.all(axis=1), errors, np.nan)[held]
+        errors[own] = _distance(fit, record, found, record.seen[own])
+    result: Array = np.where(_there(record), errors, np.nan)[held]
     return result
 
 
@@ -258,20 +290,40 @@ def _floor(
     starts = length * np.arange(n)
     _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
     runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
-    there = record.observed[ends].all(axis=2)
-    errors = np.where(there, _distance(fit.measurement.kind, runs, made[:, length:]), np.nan)
+    there = _there(record)[ends]
+    errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
     result: Array = np.nanmedian(errors, axis=0)
     return result
 
 
-def _distance(kind: str, a: Array, b: Array) -> Array:
-    """Distance of the disk's centres, or of a pendulum's angles."""
+def _there(record: Record) -> NDArray[np.bool_]:
+    """The frames in which everything was seen that the record sees at all, (n,)."""
+    result: NDArray[np.bool_] = record.observed[:, record.observed.any(axis=0)].all(axis=1)
+    return result
+
+
+def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
+    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread."""
     difference = a - b
     result: Array
-    if kind == "disk":
-        result = np.hypot(difference[..., 0], difference[..., 1])
-    else:
-        result = np.abs((difference[..., 0] + np.pi) % (2 * np.pi) - np.pi)
+    if fit.model.kind == "disk":
+        return np.hypot(difference[..., 0], difference[..., 1])
+    if fit.model.kind == "pendulum":
+        result = np.abs(_turned(difference[..., 0]))
+        return result
+    squares = []
+    for k in np.flatnonzero(record.observed.any(axis=0)):
+        spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
+        angle = fit.model.state_names[k] in fit.model.angles
+        own = _turned(difference[..., k]) if angle else difference[..., k]
+        squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
+    result = np.sqrt(np.mean(squares, axis=0))
+    return result
+
+
+def _turned(angle: Array) -> Array:
+    """The same angle within half a turn of zero."""
+    result: Array = (angle + np.pi) % (2 * np.pi) - np.pi
     return result
 
 

@@ -154,7 +154,7 @@ class Discovery:
     @property
     def horizon(self) -> float | None:
         """The horizon that `ratio` is taken at, s; None for the whole held-out part."""
-        return comparison_horizon(self.error_before) if self.error_before.unit == "m" else None
+        return comparison_horizon(self.error_before) if self.error_before.unit != "rad" else None
 
     @property
     def model(self) -> Model:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -253,13 +253,21 @@ class Outcome:
 class Search:
     """The search on the first part of a record, tested on the rest."""
 
-    def __init__(self, record: Record, held: NDArray[np.bool_], tell: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        record: Record,
+        held: NDArray[np.bool_],
+        tell: Callable[[str], None],
+        unit: float = 1.0,
+        given: Sequence[Candidate] = (),
+    ) -> None:
         self.record, self.held, self.tell = record, held, tell
+        self.unit, self.given = unit, given
         self.looks: list[int] = []
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
-        return held_out_errors(fitted, self.record, self.held)
+        return held_out_errors(fitted, self.record, self.held, unit=self.unit)
 
     def improvement(self, before: Errors, after: Errors) -> tuple[float, float, float]:
         """Held-out error after over before.
@@ -302,7 +310,7 @@ class Search:
         for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
-            scanned = scan(current, [*library(current.model), *best])
+            scanned = scan(current, [*library(current.model, self.given), *best])
             curves = scan_curves(current)
             looks += len(scanned.scored) + len(rippled) + curves.looks
             found.append(Look(current, scanned, curves.curves))
@@ -433,11 +441,13 @@ class Search:
         record = self.record.part(self.held)
         level = min(before.level, after.level)
         costs = self._level(held(before, record, level), held(after, record, level))
-        return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), record)
+        return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), record, unit=self.unit)
 
     def _worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
-        return before.unit == "m" and any(improvement(before, after, h)[1] > _WORSE for h in before.horizons)
+        return before.unit != "rad" and any(
+            improvement(before, after, h)[1] > _WORSE for h in before.horizons
+        )
 
     def _alternatives(
         self, chosen: Trial, trials: list[Trial], scanned: Scan, unit: float
