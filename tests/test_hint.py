@@ -22,7 +22,7 @@ RELAXED = udd.Disk(DRIVE, effects=[udd.effects.relaxation(b=1.5)])
 
 @functools.cache
 def relaxed():
-    """A film of a disk whose constraint is relaxed a little, and the verdict: at one drive it may be a slip."""
+    """A film of a disk whose constraint is relaxed a little, and the verdict: it may be a slip."""
     measured, _ = film(RELAXED, np.random.default_rng(5), 40.0)
     return measured, udd.discover(measured, udd.Disk(DRIVE))
 
