@@ -49,6 +49,14 @@ def test_an_undeclared_effect_is_named(effect):
     amplitudes = {n: v for n, v in effect.parameters.items() if n in effect.amplitudes}
     if chosen.effect.name == "slip":
         amplitudes = {"c": effect.parameters["b"] * 0.045}
+    if chosen.effect.name == "drive_ripple":
+        # Its phase counts from the first frame, which is half a frame after the run's start.
+        turn = 2 * np.pi * effect.parameters["f"] * 0.02
+        a, b = amplitudes["a"], amplitudes["b"]
+        amplitudes = {
+            "a": a * np.cos(turn) + b * np.sin(turn),
+            "b": b * np.cos(turn) - a * np.sin(turn),
+        }
     for name, value in amplitudes.items():
         # The drive is known to a part in 300 only, which goes into b as well.
         error = np.hypot(chosen.errors[name], 0.004 * abs(value))
@@ -144,7 +152,7 @@ def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most
     measured = udd.read_measurement(shared / f"data/real/string_pendulum_{name}.txt")
     found = udd.discover(measured, udd.Pendulum(length, k0=0.01 * length**2))
     assert [f.effect.name for f in found.effects] == ["quadratic_drag"]
-    assert {a.effect.name for a in found.alternatives} <= {"cubic_drag"}
+    assert {a.effect.name for a in found.alternatives} <= {"cubic_drag", "formula"}
     assert found.ratio[2] < 1.0
     assert found.ratio[0] < most
     drag = found.effects[0].parameters["c"] / found.model.parameters["inertia"] / length

@@ -90,6 +90,7 @@ def _seen(
         "up": (np.sin(beta), np.cos(beta), zero),
         "lag": (zero, zero, -omega),
         "row": tuple(-z * r for r in rate.T[1:]),
+        "lens": (y * (y**2 + z**2) / 0.01, z * (y**2 + z**2) / 0.01, zero),
     }
     known = assumed.camera
     camera_columns = [np.column_stack(moves[name]) for name in known]

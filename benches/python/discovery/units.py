@@ -12,15 +12,15 @@ from udd.discovery.discover import TRAIN
 from udd.discovery.search import ALPHA
 from udd.fitting.parameters import CAMERA, CLOCK
 from udd.fitting.parameters import DISK as SPREAD
-from udd.fitting.problem import levels
+from udd.fitting.problem import SEARCHED, levels
 
 __all__ = ["TRAIN", "assumed", "threshold"]
 
 
 def assumed(model: udd.Disk) -> Assumed:
-    """What a fit of the model assumes at its tightest."""
+    """What a search assumes of the model at its tightest."""
     device = {name: SPREAD[name] * model.parameters[name] for name in DEVICE}
-    return Assumed(levels("disk")[-1], {**device, "clock": CLOCK}, dict(CAMERA["disk"]))
+    return Assumed(levels("disk")[SEARCHED["disk"] - 1], {**device, "clock": CLOCK}, dict(CAMERA["disk"]))
 
 
 def threshold(model: udd.Disk, t: np.ndarray, amplitudes: int) -> float:

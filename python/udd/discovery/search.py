@@ -34,7 +34,9 @@ ALPHA = 1e-3
 NATS = 10.0
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
+_EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
+_DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
 _TRIED = 6  # of the best candidates, fitted in full
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
@@ -232,6 +234,12 @@ def _states_first(curves: list[Curve]) -> list[Curve]:
     return sorted(curves, key=lambda c: -c.evidence + (late if c.coordinates[0].name == "t" else 0.0))
 
 
+def _same(one: Fit, other: Fit) -> bool:
+    """Whether two models make the same motion: one law in other words."""
+    sd = one.noise.sd(one.record, one.states[:, 0])
+    return bool(np.nanmax(np.abs(one.misfit - other.misfit) / sd) < _DIFFERENT)
+
+
 def _unused(current: Fit, name: str) -> str:
     """A name that no effect of the model has yet."""
     taken = {effect.name for effect in current.model.effects}
@@ -294,8 +302,7 @@ class Search:
                 break
             accepted.append(found[0])
             states.append(found[1])
-            if len(accepted) > 1 and found[0].curve is not None:
-                self._replace(accepted, states)
+            self._prune(accepted, states)
         end = states[-1]
         return Outcome(end.part, end.whole, end.errors, accepted, scans, curves)
 
@@ -318,22 +325,35 @@ class Search:
         return max(found, key=Look.strongest)
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, a curve, or a pair of effects.
+        """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
 
-        A curve is tried beside the library where it is clearly likelier than any effect of it.
+        What physics knows comes first: as long as something else is missing too, a curve bends to explain a
+        part of that. Once effects of the library explain the data, formulas compete with them.
         """
         looks = self.looks[-1]
         passing = look.passing(looks)
-        known = max((look.nats(s) for s in passing), default=-math.inf)
-        likely = _states_first([c for c in look.curves if c.p * looks < ALPHA])[:_CURVES]
         singles = self._singles(current, passing)
-        if likely and likely[0].evidence > known + NATS:
-            return self._accept(current, singles + self._curves(current, likely), look, looks)
+        if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
+            singles += self._rivals(current, look, max(look.nats(s) for s in passing))
+        likely = _states_first([c for c in look.curves if c.p * looks < ALPHA])[:_CURVES]
         return (
             self._accept(current, singles, look, looks)
             or self._pair(current, look)
             or self._accept(current, self._curves(current, likely), look, looks)
         )
+
+    def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
+        """Formulas that may explain the data as well as what the library has."""
+        trials: list[Trial | None] = []
+        for curve in look.curves[:1]:
+            for written in self._formulas(current, curve):
+                if curve.evidence + written.nats > known - NATS:
+                    self.tell(f"trying {written.text}")
+                    trials.append(_of_formula(current.part, curve, written))
+        return [t for t in trials if t]
+
+    def _formulas(self, current: State, curve: Curve) -> list[Formula]:
+        return formulas_for(curve, int(np.isfinite(current.part.misfit).sum())).formulas[:_FORMULAS]
 
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
         trials = []
@@ -363,29 +383,33 @@ class Search:
             if located is None or located.curve is None:
                 continue
             trials.append(located)
-            found = formulas_for(located.curve, int(np.isfinite(current.part.misfit).sum()))
-            for written in found.formulas[:_FORMULAS]:
+            for written in self._formulas(current, located.curve):
                 self.tell(f"trying {written.text}")
                 trials.append(_of_formula(current.part, located.curve, written))
         return [t for t in trials if t]
 
-    def _replace(self, accepted: list[Step], states: list[State]) -> None:
-        """Leave out the effect before a curve where the curve alone explains as much for less.
+    def _prune(self, accepted: list[Step], states: list[State]) -> None:
+        """Leave out effects that a later one makes needless.
 
         A wrong form of the library takes up a part of what an effect outside of it does.
         """
-        last, before = accepted[-1], states[-3]
-        assert last.curve is not None
-        self.tell(f"trying {last.curve.title} instead of {accepted[-2].candidates[0].title}")
-        found = self._accept(
-            before, self._curves(before, [last.curve]), self._look(before.part), self.looks[-1]
-        )
-        if found is None:
-            return
-        both, alone = self._level(states[-1].part, found[1].part)
-        price = _price(both) * sum(c.parameters for c in accepted[-2].candidates)
-        if alone.chi2 < both.chi2 + price * max(both.scatter, 1.0):
-            accepted[-2:], states[-2:] = [found[0]], [found[1]]
+        for k in range(len(accepted) - 1):
+            last = accepted[-1]
+            if last.curve is None:
+                return
+            title = accepted[k].candidates[0].title
+            self.tell(f"trying {last.curve.title} instead of {title}")
+            before = states[k]
+            found = self._accept(
+                before, self._curves(before, [last.curve]), self._look(before.part), self.looks[-1]
+            )
+            if found is None:
+                continue
+            both, alone = self._level(states[-1].part, found[1].part)
+            more = sum(c.parameters for step in accepted[k:-1] for c in step.candidates)
+            if alone.chi2 < both.chi2 + _price(both) * more * max(both.scatter, 1.0):
+                accepted[k:], states[k + 1 :] = [found[0]], [found[1]]
+                return
 
     def _accept(
         self, current: State, trials: list[Trial], look: Look, looks: int
@@ -462,6 +486,7 @@ class Search:
                 or nats > NATS
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
+                or (trial.formula is not None and _same(trial.compared, chosen.compared))
             ):
                 continue
             for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
