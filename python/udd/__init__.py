@@ -42,6 +42,7 @@ _PUBLIC = {
     "lyapunov_spectrum": "udd.spectra",
     "plot": "udd.plot",
     "poincare": "udd.sections",
+    "prune": "udd.discovery",
     "read_measurement": "udd.measurement",
     "render": "udd.film",
     "simulate": "udd.trajectory",
@@ -59,6 +60,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
+    from udd.discovery.pruning import prune as prune
     from udd.ensembles import Ensemble as Ensemble
     from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning

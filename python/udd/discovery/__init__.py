@@ -5,7 +5,8 @@ from __future__ import annotations
 from .discover import discover
 from .heldout import Errors
 from .hint import Hint
+from .pruning import Pruned, prune
 from .results import Alternative, Discovery, Found
 from .scan import Scored
 
-__all__ = ["Alternative", "Discovery", "Errors", "Found", "Hint", "Scored", "discover"]
+__all__ = ["Alternative", "Discovery", "Errors", "Found", "Hint", "Pruned", "Scored", "discover", "prune"]

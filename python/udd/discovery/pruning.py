@@ -26,7 +26,9 @@ ALPHA = 1e-3
 _FAR = -6.0  # terms that better the criterion by so much by going do so several at a time
 _EQUAL = 1e-3  # in the criterion
 _LOOSE = 1  # place in the schedule of a fit that a wrong model has not bent
-_TRIED = 4  # of the terms left out, put back in turn to see whether another can go instead
+_NEARLY = 3  # steps towards a fit that only has to tell whether it is worth while
+_TRIED = 3  # of the terms left out, put back in turn to see whether another can go instead
+_HOPELESS = 20.0  # in the criterion, beyond what an estimate to first order may be off
 _ROUNDS = 8  # of such exchanges
 
 
@@ -210,12 +212,12 @@ class _Pruning:
         schedule = fitted.problem.schedule[fitted.level :]
         return tighten(fitted.measurements, fitted.problem, fitted.point, schedule)
 
-    def _without(self, current: Fit, gently: bool = False) -> Fit:
+    def _without(self, current: Fit, gently: bool = False, kept: str | None = None) -> Fit:
         """Leave out terms as long as that is for the better, several at a time while it is by far.
 
-        Gently: only those that hardly matter.
+        Gently: only those that hardly matter. One may have to be kept.
         """
-        needed: set[str] = set()
+        needed = set() if kept is None else {kept}
         while True:
             order = [(n, change) for n, change in self._order(current) if n not in needed]
             some = [name for name, change in order if change < _FAR][: max(len(order) // 2, 1)]
@@ -265,9 +267,11 @@ class _Pruning:
     def _with(self, fitted: Fit, name: str, amplitude: float) -> Fit | None:
         """The fit with a parameter free that was held at zero."""
         free = tuple(f for f in self.full.problem.free if f.name == name or f.name in fitted.parameters)
-        return self._again(fitted, free, {name: amplitude})
+        return self._again(fitted, free, {name: amplitude}, _NEARLY)
 
-    def _again(self, fitted: Fit, free: tuple[Free, ...], start: Mapping[str, float]) -> Fit | None:
+    def _again(
+        self, fitted: Fit, free: tuple[Free, ...], start: Mapping[str, float], iterations: int = 40
+    ) -> Fit | None:
         places = {f.name: f.index for f in self.full.problem.free if f.role == "model" and f.film is None}
         sets = []
         for model, camera, clock in fitted.point.sets:
@@ -277,7 +281,7 @@ class _Pruning:
             sets.append((values, camera, clock))
         problem = replace(fitted.problem, free=free)
         try:
-            return solve(fitted.measurements, problem, replace(fitted.point, sets=tuple(sets)))
+            return solve(fitted.measurements, problem, replace(fitted.point, sets=tuple(sets)), iterations)
         except FitError:
             return None
 
@@ -292,13 +296,25 @@ class _Pruning:
             *current.problem.arguments(current.point), [(current.model, [f.index]) for f in held]
         )
         own = np.maximum(np.diag(information), 1e-300)
-        for k in np.argsort(-(gradient**2) / own)[:_TRIED]:
-            more = self._with(current, held[k].name, float(gradient[k] / own[k]))
-            if more is None or not more.converged:
-                continue
-            after = self._tightened(self._without(more))
+        # With each one in turn, nearly fitted: what could go then?
+        wider = [
+            (f.name, self._with(current, f.name, g / i)) for f, g, i in zip(held, gradient, own, strict=True)
+        ]
+        hopes = [(self._hope(more, name), name, more) for name, more in wider if more is not None]
+        for hope, name, more in sorted(hopes, key=lambda h: h[0])[:_TRIED]:
+            if hope > self.criterion(current) + _HOPELESS:
+                break
+            # The one put back would be the first to go.
+            after = self._tightened(self._without(self._without(more, kept=name)))
             level = min(after.level, current.level)
             if self.criterion(at_level(after, level)) < self.criterion(at_level(current, level)) - _EQUAL:
-                self.tell(f"with {held[k].name} again")
+                self.tell(f"with {name} again")
                 return after
         return None
+
+    def _hope(self, fitted: Fit, kept: str) -> float:
+        """The criterion without the term that is needed least beside one, to first order."""
+        names = list(fitted.parameters)
+        others = [names.index(name) for name in self.names if name in fitted.parameters and name != kept]
+        least = min((self._change(fitted, [k]) for k in others), default=0.0)
+        return self.criterion(fitted) + min(least, 0.0)
