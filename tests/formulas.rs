@@ -17,8 +17,11 @@ use udd::tape::Tape;
 
 const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 
+/// An effect of the library with its values, its slot, the same as a formula, and that one's amplitudes.
+type Twin = (Kind, &'static [f64], Slot, &'static str, &'static [&'static str]);
+
 /// Effects of the library with their values, and the same as text.
-const TWINS: [(Kind, &[f64], Slot, &str, &[&str]); 9] = [
+const TWINS: [Twin; 9] = [
     (Kind::QuadraticDrag, &[1e-3], Slot::Torque, "-c*abs(Omega)*Omega", &["c"]),
     (Kind::Coulomb, &[1e-3, 0.05], Slot::Torque, "-c*tanh(Omega/eps)", &["c", "eps"]),
     (Kind::UnevenDisk, &[0.01, 0.02, 3.0], Slot::Torque, "a*sin(n*beta) + b*cos(n*beta)", &["a", "b", "n"]),

@@ -21,6 +21,11 @@ impl Rows {
         self.width
     }
 
+    /// How many rows there are; none can be counted where they have no length.
+    fn count(&self) -> usize {
+        self.numbers.len().checked_div(self.width).unwrap_or(0)
+    }
+
     /// Row `i`.
     #[inline(always)]
     pub fn row(&self, i: usize) -> &[f64] {
@@ -44,7 +49,7 @@ impl Rows {
 
     /// Some columns of all rows.
     pub fn part(&self, columns: std::ops::Range<usize>) -> Self {
-        let rows = if self.width > 0 { self.numbers.len() / self.width } else { 0 };
+        let rows = self.count();
         let mut part = Self::zeros(rows, columns.len());
         for i in 0..rows {
             part.row_mut(i).copy_from_slice(&self.row(i)[columns.clone()]);
@@ -54,11 +59,7 @@ impl Rows {
 
     /// These rows with those of `other` set to their right.
     pub fn beside(&self, other: &Self) -> Self {
-        let rows = if self.width > 0 {
-            self.numbers.len() / self.width
-        } else {
-            other.numbers.len() / other.width.max(1)
-        };
+        let rows = self.count().max(other.count());
         let mut all = Self::zeros(rows, self.width + other.width);
         for i in 0..rows {
             let row = all.row_mut(i);
