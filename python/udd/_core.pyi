@@ -71,20 +71,20 @@ class _Crossings(TypedDict):
 
 class _Solution(TypedDict):
     states: _Floats
-    model: list[float]
-    camera: _Floats
-    clock: float
+    sets: list[tuple[list[float], list[float], float]]
     covariance: _Floats
     state_covariance: _Floats
     misfit: _Floats
     seen_variance: _Floats
     defect: _Floats
     cost: tuple[float, float, float]
+    evidence: float
     converged: bool
     iterations: int
 
-# Times, what was seen, its information, and whether the next frame is linked; the states, the camera's
-# parameters and the clock's error; role, index, prior mean and standard deviation of each free parameter.
+# Times, what was seen, its information, whether the next frame is linked, the film and how much of its noise a
+# channel remembers; the states, and for every film the model's, the camera's and the clock's parameters;
+# role, index, film, prior mean and standard deviation of each free parameter.
 _Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_], NDArray[np.int64], list[float]]
 _Values: TypeAlias = tuple[list[float], list[float], float]
 _Start: TypeAlias = tuple[_Floats, list[_Values]]

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::flow::Link;
 use super::rows::Rows;
 use super::{Estimator, Free, Point, Role, Sensor};
+use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 use crate::scalar::{Dual, Scalar};
 
@@ -96,7 +97,17 @@ where
         let state: Vec<&mut [f64]> = columns.state.blocks_mut(D).collect();
         state.into_par_iter().enumerate().filter(|(i, _)| self.record.linked[*i]).for_each(|(i, rows)| {
             let (film, link) = (self.record.film[i], &flow[i]);
-            for place in &link.places {
+            let exact = link.switched && origin == TimeOrigin::Record;
+            if exact {
+                for actor in &actors[film] {
+                    self.along(point, i, &actor.system, |n, end| {
+                        for (k, &column) in actor.columns.iter().enumerate() {
+                            rows[n * p + column] = end.d[k];
+                        }
+                    });
+                }
+            }
+            for place in link.places.iter().filter(|_| !exact) {
                 let t = if origin == TimeOrigin::Record { place.t } else { place.since };
                 for actor in &actors[film] {
                     let rates = rates(&actor.system, t, &place.state);
@@ -117,6 +128,22 @@ where
             }
         });
         columns
+    }
+
+    /// Follows link `i` with its parameters' derivatives, to take each component of its end.
+    fn along(
+        &self,
+        point: &Point<D>,
+        i: usize,
+        system: &impl System<Wide, D>,
+        mut take: impl FnMut(usize, Wide),
+    ) {
+        let Some((_, start, end)) = self.link(point, i) else { return };
+        let x = point.states[i].map(Wide::constant);
+        // The flow went this way already.
+        if let Ok(there) = propagate(system, start, end, x, &self.tolerance) {
+            (0..D).for_each(|n| take(n, there[n]));
+        }
     }
 
     /// The columns of the camera's parameters in one frame.

@@ -42,6 +42,8 @@ pub struct Link<const D: usize> {
     pub defect: SVector<f64, D>,
     /// The derivative of what the model makes by this frame's state.
     pub a: SMatrix<f64, D, D>,
+    /// Whether the law switched on the way: derivatives by its parameters then jump between the places.
+    pub switched: bool,
     /// The rate at the end.
     pub arrival: SVector<f64, D>,
     pub places: [Place<D>; PLACES_PER_LINK],
@@ -51,7 +53,8 @@ impl<const D: usize> Link<D> {
     fn none() -> Self {
         let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
         let zero = SVector::zeros();
-        Self { defect: zero, a: SMatrix::zeros(), arrival: zero, places: [place; PLACES_PER_LINK] }
+        let places = [place; PLACES_PER_LINK];
+        Self { defect: zero, a: SMatrix::zeros(), switched: false, arrival: zero, places }
     }
 }
 
@@ -67,7 +70,7 @@ where
     }
 
     /// The film, start and end of link `i` in the model's time, where its frames are linked.
-    fn link(&self, point: &Point<D>, i: usize) -> Option<(usize, f64, f64)> {
+    pub(super) fn link(&self, point: &Point<D>, i: usize) -> Option<(usize, f64, f64)> {
         let film = self.record.film[i];
         let pace = point.sets[film].pace();
         self.record.linked[i].then(|| (film, self.record.t[i] * pace, self.record.t[i + 1] * pace))
@@ -113,8 +116,10 @@ fn follow<const D: usize>(
     let mut driver: Driver<_, Dual<f64, D>, D> = Driver::new(system, start, x, Some(end - start), tolerance);
     let mut met = [x; PLACES_PER_LINK];
     let mut ahead = 0;
+    let (sides, mut switched) = (*driver.sides(), false);
     while driver.t() != end {
         driver.advance(end)?;
+        switched |= *driver.sides() != sides;
         if driver.counts().accepted > MOST_STEPS {
             return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
         }
@@ -142,6 +147,7 @@ fn follow<const D: usize>(
     Ok(Link {
         defect: SVector::from_fn(|k, _| next[k] - last[k].re),
         a,
+        switched,
         arrival: SVector::from_fn(|k, _| arrival[k].re),
         places,
     })

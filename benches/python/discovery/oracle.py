@@ -37,17 +37,16 @@ def _by_udd(drawn: Record) -> dict[float, float]:
         effects.append(getattr(udd.effects, law.kind.name)(**values, **momentum))
     model = udd.Disk(d.W, k0=d.k0, k1=d.k1, k2=d.k2, effects=effects)
     record = record_of(drawn.measurement)
-    first = int(TRAIN * len(record.t))
-    fitted = fit_record(drawn.measurement, record.part(slice(0, first)), model, [])
-    errors = held_out_errors(fitted, record, first)
+    train = record.first(TRAIN)
+    fitted = fit_record(drawn.measurement, record.part(train), model, [], search=True)
+    errors = held_out_errors(fitted, record, ~train)
     return dict(zip(errors.horizons, errors.median.tolist(), strict=True))
 
 
 def own(drawn: Record) -> dict[float, float]:
     """The true flow from starts fitted to the same windows; nothing of udd but the choice of frames."""
     record = record_of(drawn.measurement)
-    first = int(TRAIN * len(record.t))
-    windows, ends, horizons = _windows(record, first, HORIZONS["disk"], _FILTER["disk"])
+    windows, ends, horizons = _windows(record, ~record.first(TRAIN), HORIZONS["disk"], _FILTER["disk"])
     t = record.t * (1 + drawn.camera.clock)
     seen, there = record.seen, record.observed.all(axis=1)
     frames = windows[:, :1] + np.arange(windows[0, 1] - windows[0, 0] + 1)

@@ -127,7 +127,7 @@ def record_of(
         Where it is no measurement, or too few frames were seen.
     """
     if not isinstance(measurement, Measurement):
-        if isinstance(measurement, Sequence) and not isinstance(measurement, str) and len(measurement):
+        if isinstance(measurement, (list, tuple)) and len(measurement):
             models = model if isinstance(model, Sequence) else [model] * len(measurement)
             return _joined([record_of(*pair) for pair in zip(measurement, models, strict=True)])
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
@@ -135,11 +135,11 @@ def record_of(
         (model,) = model
     own = model if isinstance(model, OwnModel) else None
     if own and not set(measurement.names) <= set(own.state_names):
-        columns, states = ", ".join(measurement.names), ", ".join(own.state_names)
-        raise FitError(f"the measurement has columns {columns}, but the model's states are {states}")
+        given, wanted = ", ".join(measurement.names), ", ".join(own.state_names)
+        raise FitError(f"the measurement has columns {given}, but the model's states are {wanted}")
     if not own and measurement.kind == "own":
-        columns = ", ".join(measurement.names)
-        raise FitError(f"the measurement has columns {columns}, which are neither a disk's nor a pendulum's")
+        given = ", ".join(measurement.names)
+        raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
     values, seen = measurement.values, measurement.seen
     if seen.sum() < 10:
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")
@@ -151,7 +151,8 @@ def record_of(
 
     columns = measurement.names
     names = own.state_names if own else columns
-    places, there = [names.index(name) for name in columns], np.flatnonzero(row >= 0)
+    places = np.array([names.index(name) for name in columns])
+    there = np.flatnonzero(row >= 0)
     full = np.zeros((len(t), len(names)))
     full[np.ix_(there, places)] = values[row[there]]
     sigma = np.full((len(t), len(names)), np.inf)
@@ -187,7 +188,10 @@ def _joined(records: Sequence[Record]) -> Record:
         raise FitError("measurements that are fitted together must see the same kind of body")
     links = [np.append(record.linked, False) for record in records]
     return Record(
-        *(np.concatenate([getattr(r, name) for r in records]) for name in ("t", "seen", "sigma", "rho")),
+        t=np.concatenate([r.t for r in records]),
+        seen=np.concatenate([r.seen for r in records]),
+        sigma=np.concatenate([r.sigma for r in records]),
+        rho=np.concatenate([r.rho for r in records]),
         linked=np.concatenate(links)[:-1],
         states=np.concatenate([r.states for r in records]),
         odd=np.concatenate([r.odd for r in records]),
