@@ -108,6 +108,12 @@ class OwnModel(Model):
         return dict(zip(self.state_names, self.texts, strict=True))
 
     @property
+    def kinematic(self) -> tuple[str, ...]:
+        """The states whose equation only says that another one is their rate, as in ``theta' = v``."""
+        pairs = zip(self.state_names, self.texts, strict=True)
+        return tuple(name for name, text in pairs if text.strip() in self.state_names)
+
+    @property
     def parameters(self) -> dict[str, float]:
         """Name and value of every parameter, in order; an effect's are called ``effect.name``."""
         added = {f"{e.name}.{name}": value for e in self.effects for name, value in e.parameters.items()}

@@ -70,10 +70,10 @@ def library(model: Model, given: Sequence[Candidate] = ()) -> list[Candidate]:
         shapes = [p for p in spec.parameters if p.role == "shape"]
         for momentum in spec.momenta or (None,):
             for values in itertools.product(*(p.grid for p in shapes)):
-                given = dict(zip((p.name for p in shapes), values, strict=True))
-                effect = spec.make(momentum=momentum, treatment=None, **given)
+                chosen = dict(zip((p.name for p in shapes), values, strict=True))
+                effect = spec.make(momentum=momentum, treatment=None, **chosen)
                 notes = [str(momentum)] if len(spec.momenta) > 1 else []
-                notes += [f"{p.name} = {given[p.name]:g}" for p in shapes if len(p.grid) > 1]
+                notes += [f"{p.name} = {chosen[p.name]:g}" for p in shapes if len(p.grid) > 1]
                 title = spec.title + (f" ({', '.join(notes)})" if notes else "")
                 result.append(Candidate(effect, title))
     return result

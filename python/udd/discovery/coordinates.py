@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from udd.errors import FitError
 from udd.models import Disk, Model, Pendulum
+from udd.own_models import OwnModel
 
 Array = NDArray[np.float64]
 
@@ -134,7 +135,8 @@ def slots(model: Model) -> tuple[Slot, ...]:
     """Where a model's unknown curves are tried.
 
     The disk's are those of the effects (the contact's velocities with and without the momentum that goes with
-    them), a pendulum's torque and friction; any other model's are the equations themselves.
+    them), a pendulum's torque and friction; any other model's are the equations themselves, but
+    for those that only say that one state is the rate of another.
     """
     if isinstance(model, Disk):
         turning = (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
@@ -146,7 +148,12 @@ def slots(model: Model) -> tuple[Slot, ...]:
         return turning + moving
     if isinstance(model, Pendulum):
         return (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
-    return tuple(Slot(f"{name}'", None, name, _direct(k)) for k, name in enumerate(model.state_names))
+    known = model.kinematic if isinstance(model, OwnModel) else ()
+    return tuple(
+        Slot(f"{name}'", None, name, _direct(k))
+        for k, name in enumerate(model.state_names)
+        if name not in known
+    )
 
 
 def _inertia(model: Model, x: Array) -> Array | float:

@@ -298,7 +298,7 @@ def _floor(
 
 def _there(record: Record) -> NDArray[np.bool_]:
     """The frames in which everything was seen that the record sees at all, (n,)."""
-    result: NDArray[np.bool_] = record.observed[:, record.observed.any(axis=0)].all(axis=1)
+    result: NDArray[np.bool_] = np.asarray(record.observed[:, record.observed.any(axis=0)].all(axis=1))
     return result
 
 

@@ -12,11 +12,17 @@ from scipy.stats import chi2 as chi2_distribution
 
 from udd import _core
 from udd.fitting import Fit
+from udd.own_models import OwnModel
 
 from .candidates import Candidate, ripples
+from .coordinates import slots
+from .forcing import responses, score_forcings
+from .heldout import pace
+from .terms import waves
 
 #: A candidate is absorbed when the free parameters take this share of its information.
 _ABSORBED = 1e-4
+_WAVES = 100  # scored at a time: what a long record takes in memory
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,12 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
 
 
 def scan_ripples(fit: Fit) -> list[Scored]:
-    """Score a drive ripple at every frequency that the record can tell apart; nothing for a pendulum."""
+    """Score a drive ripple at every frequency that the record can tell apart; nothing for a pendulum.
+
+    Of a user's own model, a wave in each equation.
+    """
+    if isinstance(fit.model, OwnModel):
+        return _scan_waves(fit, fit.model)
     candidates = ripples(fit.model, fit.record.t)
     if not candidates:
         return []
@@ -107,6 +118,31 @@ def scan_ripples(fit: Fit) -> list[Scored]:
     scores = _core.score_ripples(*fit.problem.arguments(fit.point), frequencies)
     scatter = max(fit.scatter, 1.0)
     return [_score(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
+
+
+def _scan_waves(fit: Fit, model: OwnModel) -> list[Scored]:
+    moved, t = responses(fit), fit.record.t
+    # As of the drive's ripple on the disk: what is much faster than the motion does nothing to it.
+    fastest = min(0.25 / float(np.median(np.diff(t)[fit.record.linked])), 6.0 / pace(fit))
+    frequencies = np.arange(2.0 / np.ptp(t), fastest, 0.5 / np.ptp(t))
+    there = {effect.name for effect in model.effects}
+    candidates = [c for c in waves(model, frequencies) if c.effect.name not in there]
+    by_state = {slot.equation: slot for slot in slots(model)}
+    scatter = max(fit.scatter, 1.0)
+    result: list[Scored] = []
+    for first in range(0, len(candidates), _WAVES):
+        some, columns = candidates[first : first + _WAVES], []
+        for one in some:
+            phase = 2 * np.pi * one.effect.values[-1] * moved.t
+            slot = by_state[one.effect.slots[0].removesuffix("'")]
+            value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+            columns.append(moved.columns(slot, value, np.zeros(value.shape)))
+        for one, score, full in zip(
+            some, score_forcings(fit, columns), score_forcings(fit, columns, known=True), strict=True
+        ):
+            alone = np.diag(full.information) * scatter
+            result.append(_score(one, score.gradient * scatter, score.information * scatter, alone, scatter))
+    return result
 
 
 def _score(

@@ -5,9 +5,12 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
 
 from udd import effects
 from udd._expressions import Expression, text_of
+from udd.effects.own import written
 from udd.errors import ModelError
 from udd.own_models import OwnModel
 
@@ -25,15 +28,15 @@ def terms(model: OwnModel) -> list[Candidate]:
     every angle the rate, where that is no state itself. An equation that only says that one state is the rate
     of another gets none.
     """
-    written = _of_states(model)
+    plain = [(text, _name(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}
-    rates = {name: text for name, text in rates.items() if not _kinematic(model, name)}
+    rates = {name: text for name, text in rates.items() if name not in model.kinematic}
     result = []
     for state in model.state_names:
-        if _kinematic(model, state):
+        if state in model.kinematic:
             continue
-        own = written + [(f"({text})", f"rate_of_{name}") for name, text in rates.items() if name != state]
-        result += [_candidate(model, state, text, name) for text, name in own]
+        moving = [(f"({text})", f"rate_of_{k}", f"{k}'") for k, text in rates.items() if k != state]
+        result += [_candidate(model, state, *one) for one in plain + moving]
     return result
 
 
@@ -57,28 +60,48 @@ def given_terms(model: OwnModel, given: Iterable[tuple[str, Expression]]) -> lis
                 f"there is no equation of {state!r} for the candidate {term!r}; there are "
                 f"{', '.join(model.state_names)}"
             )
-        candidate = _candidate(model, state, term, _name(term))
+        candidate = _candidate(model, state, f"({term})", _name(term), term)
         candidate.added_to(model)  # which parses it
         result.append(candidate)
     return result
 
 
-def _kinematic(model: OwnModel, state: str) -> bool:
-    """Whether an equation only says that one state is the rate of another."""
-    return model.equations[state].strip() in model.state_names
-
-
-def _candidate(model: OwnModel, state: str, text: str, name: str) -> Candidate:
-    taken = {*model.state_names, *dict(model.values)}
-    amplitude = next(c for c in ("c", "a", "amplitude", *(f"c{k}" for k in range(99))) if c not in taken)
+def _candidate(model: OwnModel, state: str, text: str, name: str, said: str) -> Candidate:
+    (amplitude,) = _unused(model, "c")
     term = amplitude if text == "1" else f"{amplitude}*{text}"
-    title = f"{text} in {state}'"
-    effect = effects.formula(f"{state}'", term, name=f"{name}_in_{state}", title=title, **{amplitude: 0.0})
+    title = f"{said} in {state}'"
+    values: dict[str, Any] = {amplitude: 0.0}
+    effect = effects.formula(f"{state}'", term, name=f"{name}_in_{state}", title=title, **values)
     return Candidate(effect, title)
 
 
-def _of_states(model: OwnModel) -> list[tuple[str, str]]:
-    """Terms and what their parameters are called after."""
+def waves(model: OwnModel, frequencies: Iterable[float]) -> list[Candidate]:
+    """A drive of each frequency in each equation that says more than what another state's rate is."""
+    a, b, f = _unused(model, "a", "b", "f")
+    text = f"{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
+    result = []
+    for state in model.state_names:
+        if state in model.kinematic:
+            continue
+        spec = written(f"{state}'", text, f"wave_in_{state}", None, [a, b], None, (a, b, f))
+        # The fit may move it within its line.
+        listed = tuple(replace(p, role="frequency") if p.name == f else p for p in spec.parameters)
+        spec = replace(spec, title=f"a wave in {state}'", parameters=listed)
+        for value in frequencies:
+            effect = effects.Effect(spec.name, (0.0, 0.0, float(value)), made=spec)
+            result.append(Candidate(effect, f"a wave of frequency {value:.4g} in {state}'"))
+    return result
+
+
+def _unused(model: OwnModel, *wanted: str) -> list[str]:
+    """Names for a term's parameters that mean nothing in the model."""
+    taken = {*model.state_names, *dict(model.values), "t", "pi"}
+    return [
+        next(n for n in (name, *(f"{name}{k}" for k in range(1, 99))) if n not in taken) for name in wanted
+    ]
+
+
+def _of_states(model: OwnModel) -> list[str]:
     plain = [name for name in model.state_names if name not in model.angles]
     degree = _DEGREE if len(plain) <= _FEW else 2
     powers = [p for d in range(degree + 1) for p in itertools.combinations_with_replacement(plain, d)]
@@ -88,7 +111,7 @@ def _of_states(model: OwnModel) -> list[tuple[str, str]]:
         for wave in ("sin", "cos"):
             result += [f"{wave}({angle})"] + [f"{name}*{wave}({angle})" for name in plain]
         result.append(f"sin(2*({angle}))" if " " in angle else f"sin(2*{angle})")
-    return [(text, _name(text)) for text in result]
+    return result
 
 
 def _product(names: tuple[str, ...]) -> str:

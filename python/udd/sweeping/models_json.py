@@ -58,8 +58,8 @@ def model_from_dict(data: object) -> Model:
         try:
             return OwnModel(**given | {"parameters": dict(given.get("parameters", {}))})
         except (TypeError, ValueError):
-            known = "states, equations, parameters, angles and effects"
-            raise ModelError(f"a model of your own has {known}, not {', '.join(given)}") from None
+            has = "states, equations, parameters, angles and effects"
+            raise ModelError(f"a model of your own has {has}, not {', '.join(given)}") from None
     if kind not in _KINDS:
         raise ModelError(
             f"the model's kind must be one of {', '.join((*_KINDS, OwnModel.kind))}, not {kind!r}"
