@@ -82,7 +82,7 @@ class _Solution(TypedDict):
     converged: bool
     iterations: int
 
-# Times, what was seen, its information, whether the next frame is linked, the film and how much of its noise a
+# Times, what was seen, its information, whether the next frame is linked, the film, how much of its noise a
 # channel remembers; the states, and for every film the model's, the camera's and the clock's parameters;
 # role, index, film, prior mean and standard deviation of each free parameter.
 _Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_], NDArray[np.int64], list[float]]

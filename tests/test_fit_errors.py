@@ -1,0 +1,56 @@
+"""Standard errors of a disk's fit cover, where the friction's kink lies within a frame too."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+import udd
+from simulated import Camera, film
+
+NAMES = ("k0", "k1", "k2", "W")
+
+
+@functools.cache
+def fitted(seed):
+    """A fit of a simulated record, with the truth."""
+    rng = np.random.default_rng([seed, 77])
+    drive = rng.uniform(0.02, 0.08)
+    truth = udd.Disk(drive)
+    camera = Camera(
+        offset=tuple(rng.normal(0, 1e-3, 2)),
+        tilt=rng.normal(0, 0.015),
+        scale=rng.normal(0, 0.003),
+        lag=rng.normal(0, 3e-3),
+        clock=rng.normal(0, 1e-3),
+        row=rng.normal(0, 0.01),
+    )
+    measured, _ = film(truth, rng, 60.0, camera)
+    known = {n: truth.parameters[n] for n in NAMES} | {
+        "y0": camera.offset[0], "z0": camera.offset[1], "tilt": camera.tilt, "scale": camera.scale,
+        "lag": camera.lag, "row": camera.row, "clock": camera.clock,
+    }  # fmt: skip
+    return udd.fit(measured, udd.Disk(drive * (1 + 0.03 * rng.standard_normal()))), known
+
+
+def z_scores(seed):
+    fit, known = fitted(seed)
+    return {name: (fit.parameters[name] - value) / fit.errors[name] for name, value in known.items()}
+
+
+def test_errors_of_fast_disks_cover():
+    """Records whose k1 and k2 were off by 5 to 15 standard errors."""
+    z = np.array([[z_scores(seed)[name] for name in NAMES] for seed in (14, 25, 27, 30, 36, 38, 41)])
+    # The root mean square of 7 scores exceeds 1.9 by chance once in 1000 times.
+    assert np.sqrt((z**2).mean(axis=0)).max() < 1.9
+
+
+@pytest.mark.slow
+def test_errors_cover():
+    z = [z_scores(seed) for seed in range(150)]
+    for name in z[0]:
+        rms = np.sqrt(np.mean([score[name] ** 2 for score in z]))
+        # 150 scores have an rms of 1 +- 0.058.
+        assert 0.82 < rms < 1.18, (name, rms)
