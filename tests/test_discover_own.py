@@ -1,0 +1,173 @@
+"""What the user's own models lack: found as on the disk, by the same search."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+import udd
+from udd.discovery.candidates import library
+from udd.errors import FitError, ModelError
+
+DRIVEN = {"theta": "v", "v": "-w2*sin(theta) - g*v + F*cos(1.4*t)"}
+DRIVEN_VALUES = {"w2": 4.0, "g": 0.05, "F": 2.0}
+#: Two equal rods' ends on a double pendulum: a the first angle, b the second relative to it, and their momenta.
+DA = "((p - (1 + cos(b))*q)/(2 - cos(b)^2))"
+DB = "(((3 + 2*cos(b))*q - (1 + cos(b))*p)/(2 - cos(b)^2))"
+DOUBLE = {
+    "a": DA,
+    "b": DB,
+    "p": "-2*g*sin(a) - g*sin(a + b)",
+    "q": f"-g*sin(a + b) - sin(b)*{DA}*({DA} + {DB})",
+}
+
+
+def seen(
+    model: Any, t: np.ndarray, start: list[float], noise: float, columns: str | list[str], seed: int = 0
+) -> udd.Measurement:
+    """A measured run: noise as a share of each column's spread."""
+    run = udd.simulate(model, t, start).state
+    rng = np.random.default_rng(seed)
+    names = list(model.state_names)
+    values = {}
+    for name in columns:
+        x = run[:, names.index(name)]
+        values[name] = x + noise * x.std() * rng.standard_normal(len(t))
+    return udd.Measurement(t, values)
+
+
+def within(found: udd.Discovery, name: str, truth: float) -> None:
+    """The value lies within four standard errors, which are below a tenth of it."""
+    value, error = found.fit.parameters[name], found.fit.errors[name]
+    assert abs(value - truth) < 4 * error < 0.4 * abs(truth)
+
+
+def test_the_candidates_are_made_of_the_states() -> None:
+    driven = udd.Model(["theta", "v"], DRIVEN, DRIVEN_VALUES, angles=["theta"])
+    titles = [c.title for c in library(driven)]
+    assert {"1 in v'", "v^3 in v'", "abs(v)*v in v'", "sin(2*theta) in v'", "v*cos(theta) in v'"} <= set(
+        titles
+    )
+    # theta' = v says what v is, and theta has no powers.
+    assert all(title.endswith("in v'") and "theta^2" not in title for title in titles)
+    double = udd.Model(list("abpq"), DOUBLE, {"g": 9.81}, angles=["a", "b"])
+    assert {"b' in q'", "a' in p'", "sin(a - b) in p'"} <= {c.title for c in library(double)}
+    lorenz = udd.Model(list("xyz"), {"x": "y - x", "y": "-x*z", "z": "x*y"})
+    expected = [d for k in range(4) for d in itertools.combinations_with_replacement("xyz", k)]
+    assert len(library(lorenz)) == 3 * (len(expected) + 3)
+    # Each is added with an amplitude of zero, whatever names the model has taken.
+    for model in (driven, double, udd.Model(["c", "a"], ["-b*c", "c - a"], {"b": 1.0})):
+        state = np.full(len(model.state_names), 0.3)
+        for candidate in library(model):
+            assert (candidate.added_to(model).rates(0.0, state) == model.rates(0.0, state)).all()
+
+
+def test_the_damping_of_the_diffusionless_lorenz_system_is_found_in_noise() -> None:
+    equations = {"omega": "y - omega", "y": "omega*z", "z": "-omega*y + w"}
+    known = udd.Model(list(equations), equations, {"w": 1.0})
+    truth = known.with_term("z", "z", damping=-0.2)
+    record = seen(truth, np.arange(0, 60, 0.05), [1.0, 1.0, 0.5], 0.05, list(equations))
+    found = udd.discover(record, known)
+    assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["z in z'"]
+    within(found, "z_in_z.c", -0.2)
+    assert found.effects[0].ratio[2] < 0.2
+    # The errors fall to what noise alone leaves, here to within the scatter of a few dozen starts.
+    assert (found.error_after.median[:3] < 2 * found.error_after.floor[:3]).all()
+    assert found.model.with_effects([]) == found.model.replace(effects=[])
+    assert found.to_dict()["effects"][0]["parameters"]["c"]["se"] > 0
+
+
+@pytest.mark.parametrize(
+    ("lacking", "title", "values"),
+    [
+        ("- 0.08*abs(v)*v", "abs(v)*v in v'", {"abs_v_v_in_v.c": -0.08}),
+        ("+ 0.1*sin(4.2*t)", "a wave", {"wave_in_v.b": 0.1, "wave_in_v.f": 4.2 / (2 * np.pi)}),
+        ("", None, {}),
+    ],
+)
+def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
+    lacking: str, title: str | None, values: dict[str, float]
+) -> None:
+    truth = udd.Model(["theta", "v"], DRIVEN | {"v": DRIVEN["v"] + lacking}, DRIVEN_VALUES)
+    known = udd.Model(["theta", "v"], DRIVEN, {"w2": 3.8, "g": 0.1, "F": 1.8}, angles=["theta"])
+    record = seen(truth, np.arange(0, 90, 0.04), [0.5, 0.0], 0.002, ["theta"])
+    found = udd.discover(record, known)
+    if title is None:
+        assert found.verdict == "nothing missing" and not found.effects
+        return
+    assert found.verdict == "effect identified"
+    assert len(found.effects) == 1 and found.effects[0].title.startswith(title)
+    for name, value in values.items():
+        within(found, name, value)
+
+
+@pytest.mark.slow
+def test_damping_at_the_joint_of_a_double_pendulum_is_found_from_its_angles() -> None:
+    known = udd.Model(list("abpq"), DOUBLE, {"g": 9.7}, angles=["a", "b"])
+    truth = known.with_parameters({"g": 9.81}).with_term("q", DB, c=-0.05)
+    found = udd.discover(seen(truth, np.arange(0, 20, 0.02), [1.5, 0.8, 0.0, 0.0], 0.01, "ab"), known)
+    assert [e.title for e in found.effects] == ["b' in q'"]
+    within(found, "rate_of_b_in_q.c", -0.05)
+    within(found, "g", 9.81)
+
+
+def test_a_users_candidate_is_tried_and_a_wrong_one_named() -> None:
+    equations = {"x": "v", "v": "-k*x"}
+    known = udd.Model(["x", "v"], equations, {"k": 1.0})
+    truth = known.with_term("v", "tanh(5*v)", friction=-0.05)
+    record = seen(truth, np.arange(0, 40, 0.05), [1.5, 0.0], 0.01, ["x", "v"])
+    found = udd.discover(record, known, candidates=[("v", "tanh(5*v)")])
+    assert [e.title for e in found.effects] == ["tanh(5*v) in v'"]
+    within(found, "tanh_5_v_in_v.c", -0.05)
+    for wrong, said in [
+        (("w", "v"), "no equation of 'w'"),
+        (("v", "u"), "unknown name u"),
+        ("v", "a state and a term"),
+    ]:
+        with pytest.raises(ModelError, match=said):
+            udd.discover(record, known, candidates=[wrong])  # type: ignore[list-item]
+    t = np.arange(0, 30, 0.05)
+    swing = udd.Measurement(t, {"theta": 0.1 * np.cos(3 * t)})
+    with pytest.raises(FitError, match="candidates are for a model of your own"):
+        udd.discover(swing, udd.Pendulum(1.0), candidates=[("v", "v")])
+
+
+def test_lorenz63_is_recovered_from_thirty_percent_noise() -> None:
+    terms = ["1", "x", "y", "z", "x^2", "x*y", "x*z", "y^2", "y*z", "z^2"]
+    names = [[f"{s}{k}" for k in range(10)] for s in "xyz"]
+    rates = [" + ".join(f"{c}*{term}" for c, term in zip(own, terms, strict=True)) for own in names]
+    full = udd.Model(list("xyz"), rates, {name: 0.0 for own in names for name in own})
+    truth = {"x1": -10.0, "x2": 10.0, "y1": 28.0, "y2": -1.0, "y6": -1.0, "z3": -8 / 3, "z5": 1.0}
+    run = udd.simulate(full.with_parameters(truth), np.arange(0, 10, 0.01), [-8.0, 8.0, 27.0])
+    noise = 0.3 * run.state.std() * np.random.default_rng(1001).standard_normal(run.state.shape)
+    record = udd.Measurement(run.t, dict(zip("xyz", (run.state + noise).T, strict=True)))
+    found = udd.prune(record, full, spread=100.0)
+    assert found.kept == list(truth) and len(found.removed) == 23
+    for name, value in truth.items():
+        assert abs(found.fit.parameters[name] - value) < 4 * found.fit.errors[name]
+    assert min(found.rise.values()) > found.price
+    with pytest.raises(FitError, match="'w' is not a free parameter"):
+        udd.prune(record, full, among=["w"])
+    with pytest.raises(FitError, match="spread must be above 0"):
+        udd.prune(record, full, spread=0.0)
+
+
+def test_effects_belong_to_own_models_as_terms_do() -> None:
+    swing = udd.Model(["x", "v"], ["v", "-k*x"], {"k": 1.0})
+    drag = udd.effects.formula("v'", "c*abs(v)*v*k", name="drag", c=-0.1)
+    model = swing.with_effects([drag])
+    assert model.parameters == {"k": 1.0, "drag.c": -0.1}
+    assert model.rates(0.0, [1.0, 2.0]) == pytest.approx([2.0, -1.4])
+    assert model.replace(**{"drag.c": 0.0}).rates(0.0, [1.0, 2.0]) == pytest.approx([2.0, -1.0])
+    assert eval(repr(model), {"Model": udd.Model, "formula": udd.effects.formula}) == model  # noqa: S307
+    bend = udd.effects.curve("v'", "x", -1.0, 1.0, [1.0, 1.0, 1.0, 1.0])
+    assert swing.with_effects([bend]).rates(0.0, [0.5, 0.0]) == pytest.approx([0.0, 0.5])
+    with pytest.raises(ModelError, match="w', but the model's rates are x', v'"):
+        swing.with_effects([udd.effects.formula("w'", "c*x", c=0.0)])
+    with pytest.raises(ModelError, match="which is the name of a state"):
+        swing.with_effects([udd.effects.formula("v'", "x*v", v=0.0)])
+    with pytest.raises(ModelError, match="takes a term"):
+        swing.with_effects([udd.effects.slip(c=1.0)])
