@@ -14,7 +14,7 @@ from udd.errors import FitError, ModelError
 
 DRIVEN = {"theta": "v", "v": "-w2*sin(theta) - g*v + F*cos(1.4*t)"}
 DRIVEN_VALUES = {"w2": 4.0, "g": 0.05, "F": 2.0}
-#: Two equal rods' ends on a double pendulum: a the first angle, b the second relative to it, and their momenta.
+#: Two equal masses on rods: a the first angle, b the second relative to it, and their momenta p and q.
 DA = "((p - (1 + cos(b))*q)/(2 - cos(b)^2))"
 DB = "(((3 + 2*cos(b))*q - (1 + cos(b))*p)/(2 - cos(b)^2))"
 DOUBLE = {
@@ -162,7 +162,7 @@ def test_effects_belong_to_own_models_as_terms_do() -> None:
     assert model.parameters == {"k": 1.0, "drag.c": -0.1}
     assert model.rates(0.0, [1.0, 2.0]) == pytest.approx([2.0, -1.4])
     assert model.replace(**{"drag.c": 0.0}).rates(0.0, [1.0, 2.0]) == pytest.approx([2.0, -1.0])
-    assert eval(repr(model), {"Model": udd.Model, "formula": udd.effects.formula}) == model  # noqa: S307
+    assert eval(repr(model), {"Model": udd.Model, "formula": udd.effects.formula}) == model
     bend = udd.effects.curve("v'", "x", -1.0, 1.0, [1.0, 1.0, 1.0, 1.0])
     assert swing.with_effects([bend]).rates(0.0, [0.5, 0.0]) == pytest.approx([0.0, 0.5])
     with pytest.raises(ModelError, match="w', but the model's rates are x', v'"):
