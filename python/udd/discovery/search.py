@@ -473,6 +473,12 @@ class Search:
             improvement(before, after, h)[1] > _WORSE for h in before.horizons
         )
 
+    def _says_less(self, formula: Trial, chosen: Trial, nats: float) -> bool:
+        """Whether a formula is the chosen law in other words, or has more constants for nothing."""
+        return _same(formula.compared, chosen.compared) or (
+            nats > 0 and len(formula.names) > len(chosen.names)
+        )
+
     def _alternatives(
         self, chosen: Trial, trials: list[Trial], scanned: Scan, unit: float
     ) -> list[Alternative]:
@@ -486,7 +492,7 @@ class Search:
                 or nats > NATS
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
-                or (trial.formula is not None and _same(trial.compared, chosen.compared))
+                or (trial.formula is not None and self._says_less(trial, chosen, nats))
             ):
                 continue
             for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
