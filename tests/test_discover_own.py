@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import udd
+from udd.cli import main
 from udd.discovery.candidates import library
 from udd.errors import FitError, ModelError
 
@@ -114,7 +117,7 @@ def test_damping_at_the_joint_of_a_double_pendulum_is_found_from_its_angles() ->
     within(found, "g", 9.81)
 
 
-def test_a_users_candidate_is_tried_and_a_wrong_one_named() -> None:
+def test_a_users_candidate_is_tried_and_a_wrong_one_named(tmp_path: Path) -> None:
     equations = {"x": "v", "v": "-k*x"}
     known = udd.Model(["x", "v"], equations, {"k": 1.0})
     truth = known.with_term("v", "tanh(5*v)", friction=-0.05)
@@ -122,6 +125,10 @@ def test_a_users_candidate_is_tried_and_a_wrong_one_named() -> None:
     found = udd.discover(record, known, candidates=[("v", "tanh(5*v)")])
     assert [e.title for e in found.effects] == ["tanh(5*v) in v'"]
     within(found, "tanh_5_v_in_v.c", -0.05)
+    found.report(tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "The rate v&#39; has one more term." in page and "c*(tanh(5*v))" in page
+    assert page.count("<img") == 5 and "data:image/svg+xml" in page  # no picture comes from elsewhere
     for wrong, said in [
         (("w", "v"), "no equation of 'w'"),
         (("v", "u"), "unknown name u"),
@@ -131,8 +138,24 @@ def test_a_users_candidate_is_tried_and_a_wrong_one_named() -> None:
             udd.discover(record, known, candidates=[wrong])  # type: ignore[list-item]
     t = np.arange(0, 30, 0.05)
     swing = udd.Measurement(t, {"theta": 0.1 * np.cos(3 * t)})
-    with pytest.raises(FitError, match="candidates are for a model of your own"):
+    with pytest.raises(FitError, match="for a model of your own"):
         udd.discover(swing, udd.Pendulum(1.0), candidates=[("v", "v")])
+
+
+def test_the_command_takes_a_users_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    equations = {"x": "v", "v": "-k*x"}
+    truth = udd.Model(["x", "v"], equations, {"k": 1.0}).with_term("v", "v", damping=-0.1)
+    record = seen(truth, np.arange(0, 30, 0.05), [1.5, 0.0], 0.01, ["x"])
+    table = np.column_stack([record.t, record.values])
+    np.savetxt(tmp_path / "swing.csv", table, delimiter=",", header="t,x", comments="")
+    swing = tmp_path / "swing.json"
+    swing.write_text(json.dumps({"states": ["x", "v"], "equations": equations, "parameters": {"k": 0.9}}))
+    assert main(["discover", str(tmp_path / "swing.csv"), "--model", str(swing), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"] == "effect identified" and said["effects"][0]["title"] == "v in v'"
+    swing.write_text("x' = v")
+    assert main(["discover", str(tmp_path / "swing.csv"), "--model", str(swing)]) == 1
+    assert "is not JSON" in capsys.readouterr().err
 
 
 def test_lorenz63_is_recovered_from_thirty_percent_noise() -> None:

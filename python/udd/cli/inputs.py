@@ -14,7 +14,7 @@ from .options import add_disk, add_pendulum, disk, pendulum
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
-    from udd.models import Disk, Pendulum
+    from udd.models import Model
 
 _FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".3gp"}
 _CUT = 0.01  # share of the promised frames that may be missing
@@ -23,7 +23,16 @@ _CUT = 0.01  # share of the promised frames that may be missing
 def add_input(parser: argparse.ArgumentParser) -> None:
     """A file and what is known of the device."""
     parser.add_argument(
-        "file", type=Path, help="a film, or a measurement (CSV or Parquet: t,Y,Z,beta or t,theta)"
+        "file",
+        type=Path,
+        help="a film, or a measurement (CSV or Parquet: t,Y,Z,beta or t,theta, or t and your model's states)",
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="JSON",
+        help='a model of your own: {"states": ["x", "v"], "equations": {"x": "v", "v": "-k*x"}, '
+        '"parameters": {"k": 1.0}, "angles": []}',
     )
     add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
     add_pendulum(parser)
@@ -55,8 +64,19 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     known = {"W": args.W, "R": args.R}
     if not is_film(args.file):
         from udd.measurement import read_measurement
+        from udd.measurement.read import columns_of
 
-        return read_measurement(args.file, args.columns, **known), None
+        states = None
+        if args.model is not None:
+            there = columns_of(args.file, args.columns)
+            model = own_model(args)
+            states = [name for name in model.state_names if name in there]
+            if not states:
+                raise UddError(
+                    f"{args.file} has columns {', '.join(there)}, none of which is a state of {args.model}: "
+                    f"{', '.join(model.state_names)}"
+                )
+        return read_measurement(args.file, args.columns, states, **known), None
     if args.pendulum is not None:
         raise UddError("a film of a pendulum cannot be tracked: --pendulum takes a table with t,theta")
     found = tracked(args, 0.08 if args.R is None else args.R)
@@ -86,8 +106,10 @@ def tracked(args: argparse.Namespace, radius: float, pivot: tuple[float, float] 
     return found
 
 
-def model_of(args: argparse.Namespace, measurement: Measurement) -> Disk | Pendulum:
+def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
     """The known model: what the command line says wins over the measurement's header."""
+    if args.model is not None:
+        return own_model(args)
     if measurement.kind == "pendulum":
         if args.pendulum is None:
             raise UddError(f"{args.file} is a pendulum's record: say its length in m with --pendulum LENGTH")
@@ -102,6 +124,25 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Disk | Pendu
         )
     R = _known(args, measurement, "R")
     return disk(args, W, 0.08 if R is None else R)
+
+
+def own_model(args: argparse.Namespace) -> Model:
+    """The user's own model, from its file."""
+    import json
+
+    from udd.sweeping.models_json import model_from_dict
+
+    if args.pendulum is not None or args.W is not None:
+        raise UddError("--model says everything of the model: --pendulum and --W do not apply")
+    try:
+        data = json.loads(args.model.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UddError(f"{args.model} cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise UddError(f"{args.model} is not JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise UddError(f"{args.model} must hold a table with states, equations and parameters")
+    return model_from_dict({"kind": "own"} | data)
 
 
 def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
@@ -120,6 +161,11 @@ def check_early(args: argparse.Namespace) -> None:
     """Refuse what no film could mend, before minutes of work are spent on it."""
     from udd.models import Disk, Pendulum
 
+    if args.model is not None:
+        own_model(args)
+        if is_film(args.file):
+            raise UddError("a film shows a disk: --model takes a table with t and states of the model")
+        return
     if args.pendulum is not None:
         Pendulum(args.pendulum, inertia=args.inertia, g=args.g)
     elif args.W is not None or is_film(args.file):

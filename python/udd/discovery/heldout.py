@@ -25,6 +25,7 @@ HORIZONS = {
 # s of data before each start, from which its state is filtered
 _FILTER = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
 _FILTER_LEVEL = {"disk": 1, "pendulum": 3, "own": 2}  # how tightly, by the place in the schedule
+_UNITS = 24  # that the part which is fitted should at least be long
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
@@ -93,7 +94,8 @@ def pace(fit: Fit) -> float:
     """The unit of the times of this module: a second, or four times what a user's own motion takes to change.
 
     As on the disk, where that is a quarter of a second. It is the least over the states of the standard
-    deviation over the root mean square rate.
+    deviation over the root mean square rate. For a short record the unit is shorter, but not below that, so
+    that the part held out has enough blocks to resample.
     """
     if fit.model.kind != "own":
         return 1.0
@@ -101,7 +103,9 @@ def pace(fit: Fit) -> float:
     rates = (np.diff(fit.states, axis=0)[linked]) / dt[linked, None]
     spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
     moving = (rate > 0) & (spread > 0)
-    return 4.0 * float((spread[moving] / rate[moving]).min()) if moving.any() else float(np.median(dt))
+    change = float((spread[moving] / rate[moving]).min()) if moving.any() else float(np.median(dt))
+    longest = max(float(np.ptp(fit.record.t[fit.record.film == k])) for k in range(len(fit.models)))
+    return max(change, min(4.0 * change, longest / _UNITS))
 
 
 def held_out_errors(

@@ -302,7 +302,7 @@ def _described(
         raise ModelError(f"an effect's name must be a single word, not {name!r}")
     if name in _specs():
         raise ModelError(f"the library has an effect called {name!r} already: give the formula another name")
-    left, _unit, meaning = _SLOTS.get(slot, (f"{slot} = ... + ", "", f"{slot} changes"))
+    left, _unit, meaning = _SLOTS.get(slot, (f"{slot} = ... + ", "", f"the rate {slot} has one more term"))
     names = [p.name for p in parameters]
     linear = [p.name for p in parameters if p.role == "amplitude"]
     # Of a user's own model only the model knows the states.

@@ -106,6 +106,11 @@ def read_measurement(
         raise MeasurementError(f"{source}: {error}") from None
 
 
+def columns_of(path: str | os.PathLike[str], columns: str | Sequence[str] | None = None) -> list[str]:
+    """The names of a table's columns, read as by :func:`read_measurement`."""
+    return _load(Path(path), columns).names
+
+
 def _load(path: Path, columns: str | Sequence[str] | None) -> Table:
     try:
         raw = path.read_bytes()

@@ -102,7 +102,8 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     from matplotlib.ticker import LogLocator
 
     before, after = discovery.error_before, discovery.error_after
-    factor, unit = (1e3, "mm") if before.unit == "m" else (1e3, "mrad")
+    shown = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "spread": (100.0, "% of the spread")}
+    factor, unit = shown[before.unit]
     ax = new_axes(ax)
     lines = [(before, BEFORE, "o", "the known model")]
     if discovery.effects:
@@ -125,7 +126,7 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     )
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.set_xticks(before.horizons, [f"{h:g}" for h in before.horizons])
+    ax.set_xticks(before.horizons, [f"{h:.3g}" for h in before.horizons])
     ax.minorticks_off()
     ax.yaxis.set_major_formatter("{x:g}")
     low, high = ax.get_ylim()

@@ -12,7 +12,7 @@ from udd.discovery.innovations import innovations
 from udd.errors import UddError
 from udd.files import write_whole
 
-from . import figures, tables, words
+from . import figures, own, tables, words
 
 
 def write(
@@ -57,14 +57,18 @@ def write(
     )
     environment.filters["pretty"] = words.pretty
     origin = film if source is None else source
+    of_own = discovery.fit.model.kind == "own"
+    if of_own and film is not None:
+        raise UddError("a film shows a disk, not a model of your own")
     fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]
-    surprises = [innovations(fit) for fit in fits]
-    page = environment.get_template("page.html").render(
+    surprises = [] if of_own else [innovations(fit) for fit in fits]
+    page = environment.get_template("own.html" if of_own else "page.html").render(
         d=discovery,
         style=environment.loader.get_source(environment, "page.css")[0] if environment.loader else "",
         words=words,
         tables=tables,
-        pictures=figures.draw(discovery, film, surprises),
+        own=own,
+        pictures=own.draw(discovery) if of_own else figures.draw(discovery, film, surprises),
         innovations=surprises,
         numbers=words.headline(discovery),
         command=command or words.command(discovery, None if origin is None else Path(origin).name),

@@ -183,7 +183,7 @@ def errors(discovery: Any) -> list[dict[str, str]]:
         b, a = before.at(h), after.at(h)
         rows.append(
             {
-                "horizon": f"{h:g} s",
+                "horizon": f"{h:.3g} s",
                 "before": _interval(b, before.unit),
                 "after": _interval(a, after.unit),
                 "floor": words.length(a[3], after.unit),

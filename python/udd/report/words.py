@@ -49,8 +49,11 @@ MEANINGS = {
     "up": "centre of the marks, above the disk's own (red mark on top)",
     "lag": "orientation seen later than position",
     "row": "rolling shutter: time per height in the picture",
+    "lens": "how much larger the lens shows what is 0.1 m from the middle",
     "clock": "recorded time runs fast",
     "theta0": "zero of the angle",
+    "aside": "pivot to the right of where it was taken to be, in lengths of the pendulum",
+    "above": "pivot above where it was taken to be, in lengths of the pendulum",
 }
 
 
@@ -173,29 +176,35 @@ def headline(discovery: Any) -> Headline:
         span, values = "over all of it (r.m.s.)", (before.whole, after.whole)
         h = before.horizons[-1]
     else:
-        span, values = f"after {h:g}\u00a0s", (before.at(h)[0], after.at(h)[0])
+        span, values = f"after {h:.4g}\u00a0s", (before.at(h)[0], after.at(h)[0])
     value, low, high = discovery.ratio
     return Headline(
         span=span,
         before=length(values[0], unit),
         after=length(values[1], unit),
         floor=length(after.at(h)[3], unit),
-        floor_at=f"{h:g}\u00a0s",
+        floor_at=f"{h:.4g}\u00a0s",
         ratio=f"{value:.2g}",
         interval=f"{low:.2g} to {high:.2g}" if math.isfinite(low) else "not known: too few blocks",
     )
 
 
 def length(value: float, unit: str) -> str:
-    """An error with its unit, in thousandths: mm or mrad."""
+    """An error with its unit: mm or mrad, or per cent of a motion's spread."""
     if not math.isfinite(value):
         return "–"
-    return f"{_digits(1e3 * value, 3)} {'mm' if unit == 'm' else 'mrad'}"
+    return _with_unit(value, unit, 3)
 
 
 def rough(value: float, unit: str) -> str:
     """As :func:`length`, with two digits."""
-    return f"{_digits(1e3 * value, 2)} {'mm' if unit == 'm' else 'mrad'}"
+    return _with_unit(value, unit, 2)
+
+
+def _with_unit(value: float, unit: str, digits: int) -> str:
+    if unit == "spread":
+        return f"{_digits(100 * value, digits)} %"
+    return f"{_digits(1e3 * value, digits)} {'mm' if unit == 'm' else 'mrad'}"
 
 
 def _digits(value: float, n: int) -> str:
@@ -240,6 +249,8 @@ def title_of(discovery: Any, name: str) -> str:
 
 def limit(other: Any) -> str:
     """Why one alternative stays open."""
+    if other.likeness > IDENTICAL and other.effect.slots[0].endswith("'"):
+        return "On these data the two act identically."
     if other.likeness > IDENTICAL:
         return (
             "At one drive speed the two act on the disk identically, and no longer record would tell them "
@@ -257,7 +268,7 @@ def limit(other: Any) -> str:
 def command(discovery: Any, source: str | None) -> str | None:
     """What `udd discover` takes to do the same; None where the file is not known."""
     known = discovery.baseline.problem.models[0]
-    if source is None or known.effects or len(discovery.fit.measurements) > 1:
+    if source is None or known.effects or known.kind == "own" or len(discovery.fit.measurements) > 1:
         return None
     usual = type(known)(*([known.W] if discovery.measurement.kind == "disk" else [known.length]))
     given = {"disk": ["W"], "pendulum": ["length"]}[discovery.measurement.kind]
