@@ -47,7 +47,7 @@ class Pruned:
     rise : dict of str to float
         For each that was kept, by how much chi2 would rise without it.
     price : float
-        What a parameter has to be worth, in chi2.
+        What a parameter has to be worth, in chi2; with a `spread` beside what its prior makes it cost.
     """
 
     fit: Fit
@@ -86,9 +86,8 @@ def prune(
     """Find the parameters of a model that the data need; hold the others at zero.
 
     All free parameters are fitted together. Those that matter least are held at zero and the rest fitted
-    again, until each one left is worth more than chance explains: chi2 would rise by more than it falls, with
-    a chance of `alpha` over all of them together, for a term that is not there. Then those that were left out
-    are put back in turn, to see whether another can go instead.
+    again, as long as that is for the better; once from a tight fit and once from a loose one. Then those that
+    were left out are put back in turn, to see whether another can go instead.
 
     Parameters
     ----------
@@ -99,8 +98,13 @@ def prune(
         The parameters that may go; by default all that are free.
     free, priors
         As for :func:`udd.fit`.
+    spread : float, optional
+        How large the factors may well be, in the user's units: the standard deviation of their prior around
+        zero. Sets of terms are then compared by their evidence, for each term less the logarithm of their
+        number; of two sets that explain the data equally well, that wins whose factors need to be known less
+        precisely, mostly that of the lower powers. By default every term is priced alike.
     alpha : float
-        Chance that a term that is not there is kept.
+        Without a `spread`, the chance that a term that is not there is kept, over all of them together.
     progress : callable, optional
         Told in a few words what is being done.
 
