@@ -297,29 +297,55 @@ impl<const D: usize> Eliminated<D> {
     /// The covariance of each frame's state, the parameters' uncertainty (covariance `parameters`)
     /// included.
     pub fn state_covariance(&self, parameters: &DMatrix<f64>) -> Vec<SMatrix<f64, D, D>> {
-        Isa::best().run(StateCovariance { of: self, parameters })
+        let uncertain = self.uncertain(&lower_root(parameters));
+        let whole = |i: usize, own: &SMatrix<f64, D, D>| {
+            let rows =
+                |r: usize, c: usize| dot(uncertain.shifts.row(D * i + r), uncertain.shifts.row(D * i + c));
+            own + SMatrix::from_fn(rows)
+        };
+        uncertain.conditional.iter().enumerate().map(|(i, own)| whole(i, own)).collect()
     }
+
+    /// How uncertain the states are, given a root of the parameters' covariance.
+    pub(super) fn uncertain(&self, root: &DMatrix<f64>) -> Uncertain<D> {
+        Isa::best().run(StateCovariance { of: self, root })
+    }
+}
+
+/// The states' uncertainty, frame by frame.
+pub(super) struct Uncertain<const D: usize> {
+    /// Their covariance were the parameters known.
+    pub conditional: Vec<SMatrix<f64, D, D>>,
+    /// `D` rows for each frame: by how much they move with each of independent changes of the parameters.
+    pub shifts: Rows,
+}
+
+/// A root of a covariance: its columns are independent changes.
+pub(super) fn lower_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = covariance.nrows();
+    nalgebra::Cholesky::new(covariance.clone()).map_or_else(|| DMatrix::zeros(n, n), |lower| lower.l())
+}
+
+/// The product of two rows.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 struct StateCovariance<'a, const D: usize> {
     of: &'a Eliminated<D>,
-    parameters: &'a DMatrix<f64>,
+    root: &'a DMatrix<f64>,
 }
 
 impl<const D: usize> Work for StateCovariance<'_, D> {
-    type Output = Vec<SMatrix<f64, D, D>>;
+    type Output = Uncertain<D>;
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Self::Output {
         let Eliminated { pivots, links, solved, .. } = self.of;
-        let (n, p) = (pivots.len(), self.parameters.nrows());
-        // A root of the parameters' covariance: the columns of independent changes of them.
-        let lower = nalgebra::Cholesky::new(self.parameters.clone()).map(|c| c.l());
-        let lower = lower.unwrap_or_else(|| DMatrix::zeros(p, p));
-        let mut covariance: Vec<SMatrix<f64, D, D>> = vec![SMatrix::zeros(); n];
+        let (n, p) = (pivots.len(), self.root.nrows());
+        let mut found = Uncertain { conditional: vec![SMatrix::zeros(); n], shifts: Rows::zeros(n * D, p) };
         let mut conditional: SMatrix<f64, D, D> = SMatrix::zeros();
         let (mut response, mut own) = (Rows::zeros(D, p), Rows::zeros(D, p));
-        let mut moved = vec![0.0; p];
         for i in (0..n).rev() {
             let back = pivots[i].transpose().try_inverse().unwrap_or_else(SMatrix::zeros);
             let link = if i + 1 < n { links[i].transpose() } else { SMatrix::zeros() };
@@ -339,22 +365,17 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
                     add(row, back[(k, j)], own.row(j));
                 }
             }
-            // The rows times the root.
             for k in 0..D {
-                moved.fill(0.0);
+                let shift = found.shifts.row_mut(D * i + k);
                 for (j, &value) in response.row(k).iter().enumerate() {
-                    for (c, to) in moved.iter_mut().enumerate().take(j + 1) {
-                        *to += value * lower[(j, c)];
+                    for (c, to) in shift.iter_mut().enumerate().take(j + 1) {
+                        // More of a parameter takes from the state what it explains.
+                        *to -= value * self.root[(j, c)];
                     }
                 }
-                own.row_mut(k).copy_from_slice(&moved);
             }
-            covariance[i] = conditional;
-            for (r, c) in (0..D).flat_map(|r| (0..D).map(move |c| (r, c))) {
-                let both: f64 = own.row(r).iter().zip(own.row(c)).map(|(a, b)| a * b).sum();
-                covariance[i][(r, c)] += both;
-            }
+            found.conditional[i] = conditional;
         }
-        covariance
+        found
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
+use super::bordered::{Uncertain, lower_root};
 use super::linearise::invert;
 use super::{Bordered, Eliminated, EstimateError, Estimator, Free, Linear, Point, Sensor};
 use crate::model::Family;
@@ -208,12 +209,11 @@ where
         let linear = self.linearise(&point)?;
         let reduced = self.equations(&point, &linear).eliminate(&self.record.t)?;
         let covariance = invert(&reduced.schur).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
+        let root = lower_root(&covariance);
+        let uncertain = reduced.uncertain(&root);
         let state_covariance = reduced.state_covariance(&covariance);
-        let (mut misfit, mut seen_variance) = (Vec::new(), Vec::new());
-        for (sight, p) in linear.sights.iter().zip(&state_covariance) {
-            misfit.push(sight.misfit);
-            seen_variance.push((sight.h * p * sight.h.transpose()).diagonal());
-        }
+        let misfit: Vec<_> = linear.sights.iter().map(|sight| sight.misfit).collect();
+        let seen_variance = (0..misfit.len()).map(|i| seen_variance(i, &linear, &uncertain, &root)).collect();
         let defect: Vec<_> = linear.flow.iter().map(|link| link.defect).collect();
         let cost = self.cost(&point, &misfit, &defect);
         let evidence = self.evidence(&cost, reduced.log_determinant, &reduced.schur);
@@ -230,6 +230,25 @@ where
             defect,
         })
     }
+}
+
+/// The variance of what is fitted to frame `i`: of its state, and of the camera that sees it.
+fn seen_variance<const D: usize, const M: usize>(
+    i: usize,
+    linear: &Linear<D, M>,
+    uncertain: &Uncertain<D>,
+    root: &DMatrix<f64>,
+) -> SVector<f64, M> {
+    let h = &linear.sights[i].h;
+    SVector::from_fn(|m, _| {
+        let camera = linear.columns.seen.row(M * i + m);
+        let moved = (0..root.ncols()).map(|c| {
+            let by_state: f64 = (0..D).map(|k| h[(m, k)] * uncertain.shifts.at(D * i + k, c)).sum();
+            by_state + camera.iter().enumerate().map(|(j, g)| g * root[(j, c)]).sum::<f64>()
+        });
+        let known = (h.row(m) * uncertain.conditional[i] * h.row(m).transpose())[(0, 0)];
+        known + moved.map(|v| v * v).sum::<f64>()
+    })
 }
 
 /// Where a matrix of information has no inverse: the parameters that can change together.

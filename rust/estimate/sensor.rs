@@ -68,16 +68,17 @@ impl Sensor<4, 3> for DiskCamera {
 /// A sensor that sees a pendulum's angle, with an unknown zero, from a pivot that is a little off:
 ///
 /// ```text
-/// theta_seen = theta + theta0 - right cos(theta) + up sin(theta)
+/// theta_seen = theta + theta0 - aside cos(theta) + above sin(theta)
 /// ```
 ///
-/// The pivot that the angle was measured from lies `right` and `up` of the true one, in lengths of the pendulum.
+/// The true pivot lies `aside` (to the right) and `above` the one that the angle was measured from, in lengths of
+/// the pendulum.
 #[derive(Clone, Copy, Debug)]
 pub struct AngleSensor;
 
 impl Sensor<2, 1> for AngleSensor {
     const PARAMETERS: &'static [(&'static str, &'static str)] =
-        &[("theta0", "rad"), ("right", ""), ("up", "")];
+        &[("theta0", "rad"), ("aside", ""), ("above", "")];
 
     fn is_angle(&self, _channel: usize) -> bool {
         true
@@ -85,9 +86,9 @@ impl Sensor<2, 1> for AngleSensor {
 
     #[inline]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 2], _rate: &[S; 2]) -> [S; 1] {
-        let &[theta0, right, up] = camera.first_chunk().expect("three camera parameters");
+        let &[theta0, aside, above] = camera.first_chunk().expect("three camera parameters");
         let (sin, cos) = x[1].sin_cos();
-        [x[1] + theta0 - right * cos + up * sin]
+        [x[1] + theta0 - aside * cos + above * sin]
     }
 }
 

@@ -28,7 +28,7 @@ CAMERA = {
         "row": 0.05,
         "lens": 0.01,
     },
-    "pendulum": {"theta0": 0.1, "right": 0.01, "up": 0.01},
+    "pendulum": {"theta0": 0.1, "aside": 0.01, "above": 0.01},
 }
 CLOCK = 3e-3
 
