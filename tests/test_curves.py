@@ -21,7 +21,7 @@ from udd.discovery.located import curve_effect, fit_curve, fit_formula
 from udd.discovery.smoothing import chance, smooth
 from udd.discovery.splines import Spline, along, product, rough_product
 from udd.errors import FitError, UddError
-from udd.fitting import loosened
+from udd.fitting import fit_record, loosened, record_of
 from udd.plot.curves import curve as draw
 
 E = udd.effects
@@ -45,7 +45,7 @@ def test_a_law_of_no_library_is_located_and_described(case):
     found = scan_curves(fit)
     best = found.curves[0]
     assert best.name in case.found
-    assert found.p < 1e-6
+    assert found.p < 1e-4  # a tenth of what a search takes to accept it
     # Friction over the speed has an infinite slope at rest, where it does nothing; its torque is smooth.
     curve = distinct(refined(next(c for c in found.curves if c.name == case.found[0]), fit), fit)
     described = formulas_for(curve, int(np.isfinite(fit.misfit).sum()))
@@ -341,7 +341,8 @@ def test_a_curve_is_drawn(null):
 def test_a_located_curve_is_fitted_in_full():
     """A strong law, around which nothing is linear: curve and formula explain what is missing."""
     case = unmodelled.CASES[0]
-    base = udd.fit(unmodelled.record(case.law, 1), udd.Disk(W))
+    measured = unmodelled.record(case.law, 1)
+    base = fit_record(measured, record_of(measured), udd.Disk(W), search=True)
     plain = udd.fit(unmodelled.record(None, 1), udd.Disk(W))
     assert base.scatter > 3
     found = fit_curve(base, scan_curves(loosened(base, 3.0)).curves[0])
@@ -364,7 +365,8 @@ def test_a_located_curve_is_fitted_in_full():
 
 def test_a_broken_power_can_be_fitted():
     case = unmodelled.CASES[1]
-    base = udd.fit(unmodelled.record(case.law, 1), udd.Disk(W))
+    measured = unmodelled.record(case.law, 1)
+    base = fit_record(measured, record_of(measured), udd.Disk(W), search=True)
     curve = scan_curves(loosened(base, 3.0)).curves[0]
     assert curve.name == ("friction", "|Omega|")
     root = Formula(

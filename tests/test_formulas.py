@@ -199,7 +199,9 @@ def test_a_fit_finds_a_formulas_numbers_as_the_librarys_effects() -> None:
     assert abs(own.parameters["own.c"] - 0.05) < 4.0 * own.errors["own.c"]
     # A curve over the speed takes the place of both frictions.
     bend = curve("torque", "Omega", -4.5, 4.5, np.zeros(8))
-    found = udd.fit(seen, udd.Pendulum(1.0, effects=bend), free=[f"curve.{c}" for c in bend.amplitudes])
+    # The pivot is known here: were it not, an even torque could be its fault.
+    free = [f"curve.{c}" for c in bend.amplitudes]
+    found = udd.fit(seen, udd.Pendulum(1.0, effects=bend), free=free, camera=["theta0"])
     speed = np.linspace(-3.0, 3.0, 7)
     basis = bend.spec.basis(speed)  # type: ignore[attr-defined]
     order = list(found.parameters)
@@ -209,4 +211,4 @@ def test_a_fit_finds_a_formulas_numbers_as_the_librarys_effects() -> None:
     error = np.sqrt(np.einsum("ki,ij,kj->k", basis, covariance, basis))
     wanted = -0.01 * speed - 0.05 * np.abs(speed) * speed
     # That a spline bends where the drag's curvature jumps is less than the error.
-    assert (np.abs(basis @ coefficients[places] - wanted) < 4.0 * error).all() and (error < 0.01).all()
+    assert (np.abs(basis @ coefficients[places] - wanted) < 4.0 * error).all() and (error < 0.02).all()

@@ -51,9 +51,7 @@ def given_terms(model: OwnModel, given: Iterable[tuple[str, Expression]]) -> lis
     result = []
     for one in given:
         if isinstance(one, str) or not isinstance(one, (tuple, list)) or len(one) != 2:
-            raise ModelError(
-                f"a candidate is a state and a term, as in ('v', 'abs(v)*v'), not {one!r}"
-            )
+            raise ModelError(f"a candidate is a state and a term, as in ('v', 'abs(v)*v'), not {one!r}")
         state, term = str(one[0]).removesuffix("'"), text_of("a candidate", one[1])
         if state not in model.state_names:
             raise ModelError(

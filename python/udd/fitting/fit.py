@@ -22,6 +22,9 @@ from .record import Record, record_of
 from .solve import solve, tighten
 
 _NOISE_ROUNDS = 12
+#: In a search a pendulum's angle that states no error is not taken for better than this part of what is
+#: typical: frames may scatter less, but perspective bends the angle by as much.
+_FAITHFUL = {"pendulum": 0.5}
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 
@@ -174,7 +177,9 @@ def refit(fitted: Fit) -> Fit:
     own = isinstance(fitted.model, OwnModel)
     schedule = fitted.problem.schedule if own else levels(fitted.model.kind)
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
-    shown, problem, point = _estimate_noise(fitted.measurements, problem, fitted.point)
+    shown, point = fitted.model.kind not in _FAITHFUL, fitted.point
+    if shown:
+        shown, problem, point = _estimate_noise(fitted.measurements, problem, point)
     if not shown:
         problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
     result = tighten(fitted.measurements, problem, point, problem.schedule[fitted.level :])
@@ -214,6 +219,8 @@ def _estimate_noise(
         noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
         if measurements[0].sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):
             return False, problem, point
+        if not problem.likeliest and measurements[0].sigma is None and measurements[0].kind in _FAITHFUL:
+            noise = replace(noise, factor=np.maximum(noise.factor, _FAITHFUL[measurements[0].kind]))
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, omega):
             break
