@@ -25,6 +25,7 @@ _SIGMA = {"disk": (5e-4, 5e-4, 7e-3), "pendulum": (5e-3,)}
 
 #: A frame is odd that lies farther off than this times what is typical; honest noise does in 1 of 1e8.
 _ODD = 9.0
+_LEAP = 0.5  # of the steps before and after, which a bend of the motion does not reach
 _CLEANED = 8  # times odd frames are looked for: those that come close together spoil each other's look
 
 
@@ -227,9 +228,12 @@ def _odd(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bo
         off = np.zeros_like(guess)
         cubic = (4 * (filled[1:-3] + filled[3:-1]) - filled[:-4] - filled[4:]) / 6
         off[2:-2] = np.abs(filled[2:-2] - cubic)
+        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
+        # A film may be so precise that the motion's own bends stand out: they are small beside its steps.
+        step = np.abs(np.diff(filled, axis=0))
+        off[2:-2][off[2:-2] < _LEAP * np.maximum(step[:-3], step[3:])] = 0.0
         off[~inside | odd] = 0.0
         # Of frames whose neighbours are odd too only the worst goes: it spoils the others' look.
-        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
         far = (off / typical).max(axis=1)
         found = (far > _ODD) & (far >= maximum_filter1d(far, 5))
         if not found.any():
