@@ -20,6 +20,7 @@ from .heldout import pace
 from .results import Discovery, Found
 from .search import Search, Step
 from .terms import given_terms
+from .together import together
 
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
@@ -100,8 +101,9 @@ def discover(
     options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each, "search": True}
 
     tell("fitting the known model")
-    base = fit_record(measurement, record.part(train), model, free, **options)
-    baseline = fit_record(measurement, record, model, free, **options)
+    base, baseline = together(
+        lambda frames: fit_record(measurement, frames, model, free, **options), (record.part(train), record)
+    )
     search = Search(record, ~train, tell, pace(base), given)
     before = search.errors(base)
     end = search.run(base, baseline, before)
