@@ -44,6 +44,7 @@ _PUBLIC = {
     "poincare": "udd.sections",
     "prune": "udd.discovery",
     "read_measurement": "udd.measurement",
+    "relatives": "udd.relatives",
     "render": "udd.film",
     "simulate": "udd.trajectory",
     "sweep": "udd.sweeping",
@@ -56,6 +57,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd import effects as effects
     from udd import errors as errors
     from udd import plot as plot
+    from udd import relatives as relatives
     from udd.branching.diagram import bifurcation as bifurcation
     from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery
