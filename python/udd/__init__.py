@@ -40,6 +40,7 @@ _PUBLIC = {
     "forecast": "udd.forecasting",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
+    "paper": "udd.paper",
     "plot": "udd.plot",
     "poincare": "udd.sections",
     "prune": "udd.discovery",
@@ -56,6 +57,7 @@ __all__ = [*_PUBLIC]
 if TYPE_CHECKING:  # the same for type checkers
     from udd import effects as effects
     from udd import errors as errors
+    from udd import paper as paper
     from udd import plot as plot
     from udd import relatives as relatives
     from udd.branching.diagram import bifurcation as bifurcation

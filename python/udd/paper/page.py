@@ -1,0 +1,66 @@
+"""The page: pictures and the table of claims, in one file that needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import platform
+from collections import Counter
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+from .registry import FAILS, HOLDS, REMARK
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .make import Checked, Drawn
+
+_CLASSES = {HOLDS: "holds", REMARK: "remark", FAILS: "fails"}
+
+
+def png(figure: Figure, dpi: int) -> bytes:
+    """A figure as a PNG file, the same bytes every time."""
+    picture = BytesIO()
+    figure.savefig(picture, format="png", dpi=dpi, metadata={"Software": None})
+    return picture.getvalue()
+
+
+def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
+    """The page as HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("udd.paper"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("index.html").render(
+        figures=[(one, _embedded(one)) for one in figures],
+        claims=claims,
+        classes=_CLASSES,
+        counts=Counter(one.verdict.verdict for one in claims),
+        order=(HOLDS, REMARK, FAILS),
+        filmed=any(one.figure.filmed for one in figures),
+        versions=_versions(),
+    )
+
+
+def _embedded(one: Drawn) -> str:
+    return f"data:image/png;base64,{base64.b64encode(one.path.read_bytes()).decode()}"
+
+
+def _versions() -> str:
+    """What the numbers may depend on."""
+    found = []
+    for name in ("udd", "numpy", "scipy", "matplotlib"):
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            found.append(f"{name} (of unknown version)")
+    return (
+        f"{', '.join(found)}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+    )
