@@ -144,8 +144,7 @@ def test_a_rider_multiplies_the_swing_every_half_period() -> None:
     model = relatives.pumped_swing(1.0, depth=0.05, quickness=2000.0, sharpness=1e9)
     ends = udd.poincare(model, "v", 8, state0=[0.0, 0.002, 1.05], direction="both", transient=1, t_max=100.0)
     ratios = np.abs(ends.component("theta")[1:] / ends.component("theta")[:-1])
-    # Rider and swing are finitely quick (1/2000 of the unit of time, in which the swing goes on) and the swing
-    # finitely small.
+    # The rider takes 1/2000 of the unit of time, in which the swing goes on.
     np.testing.assert_allclose(ratios, (1.05 / 0.95) ** 1.5, rtol=2e-3)
 
 

@@ -2,10 +2,10 @@
 
 Every one is a :class:`udd.Model` made from text, so that runs, sections, exponents and fits take it.
 
-==========================  ====================================================================================
+==========================  ===============================================================================
 function                    its relation to the disk
-==========================  ====================================================================================
-:func:`lorenz`              the full Lorenz system; with sigma and r large it is the DLE at ``w = b r/sigma^2``
+==========================  ===============================================================================
+:func:`lorenz`              the full Lorenz system; the DLE where sigma and r are large, ``w = b r/sigma^2``
 :func:`scaled_lorenz`       the same system in the variables of the DLE, which it becomes at ``epsilon = 0``
 :func:`waterwheel`          Malkus' wheel; without leakage it is the DLE exactly, with it Lorenz's at b = 1
 :func:`pendulum`            the disk without a drive, damped; a steady torque may act on it
@@ -13,7 +13,7 @@ function                    its relation to the disk
 :func:`shaken_pendulum`     (ii) driven by a suspension point that moves up and down
 :func:`pumped_pendulum`     (iii) driven by a length that changes periodically
 :func:`pumped_swing`        a swing whose rider stands up on the way out and squats on the way in
-==========================  ====================================================================================
+==========================  ===============================================================================
 
 Pendulums have the paper's dimensionless form, ``theta = 0`` hanging, and the state ``[v, theta]`` with
 ``v = theta'``; 1 is the unit of time of their friction unless that is changed.
@@ -154,7 +154,8 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
     Notes
     -----
     Without leakage, in the unit of time ``1/friction``, this is the DLE with ``y = gravity a/friction^2``,
-    ``z = gravity b/friction^2`` and the drive ``w = gravity inflow/friction^3``; with it, Lorenz's equations at b = 1.
+    ``z = gravity b/friction^2`` and the drive ``w = gravity inflow/friction^3``; with it, Lorenz's equations
+    at b = 1.
 
     References
     ----------
@@ -295,7 +296,7 @@ def shaken_pendulum(r: float, friction: float, amplitude: float, frequency: floa
 
     Notes
     -----
-    Small swings are amplified at ``frequency = 2 sqrt(r)`` where ``amplitude > 2 friction sqrt(r)`` (Mathieu).
+    Small swings grow at ``frequency = 2 sqrt(r)`` where ``amplitude > 2 friction sqrt(r)`` (Mathieu).
     Standing on its head is stable where ``amplitude^2 > 2 r frequency^2`` for fast shaking (Kapitza).
 
     Examples
@@ -340,8 +341,8 @@ def pumped_pendulum(r: float, friction: float, amplitude: float, frequency: floa
 
     Notes
     -----
-    Small swings grow as ``exp((3/4 amplitude sqrt(r) - friction/2) t)`` at ``frequency = 2 sqrt(r)``, to first
-    order in the amplitude.
+    Small swings grow as ``exp((3/4 amplitude sqrt(r) - friction/2) t)`` at ``frequency = 2 sqrt(r)``, to
+    first order in the amplitude.
 
     Examples
     --------

@@ -23,7 +23,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--no-films",
         action="store_true",
-        help="leave out what needs films, which are made and tracked once (minutes) and then kept in DIR/films",
+        help="leave out what needs films, which are made and tracked once (minutes) and then kept in "
+        "DIR/films",
     )
     parser.add_argument("--list", action="store_true", help="only say which figures and claims there are")
 

@@ -34,7 +34,7 @@ def disk(W: float, *, beyond: bool = False) -> Disk:
 
 
 def rotating(W: float, sense: int = 1) -> tuple[float, float, float]:
-    """The disk's steadily rotating state (Omega, Y, Z): ``Omega^2 = g W/k0``, ``Y = W/Omega``, fast enough."""
+    """The disk's rotating state (Omega, Y, Z): ``Omega^2 = g W/k0``, ``Y = W/Omega``, above the kink."""
     omega = sense * math.sqrt(G * W / K0)
     return omega, W / omega, 0.0
 

@@ -54,5 +54,7 @@ class Lab:
             measured = self.measured("0.0")
             self.tell("fitting the friction law")
             start = device.disk(0.0).replace(k0=0.02, k1=0.08, k2=0.04)
-            self._fitted.append(fit(measured, start, free=["k0", "k1", "k2"]))
+            # The camera is a plain one, and the disk's size sets the scale.
+            camera = ["y0", "z0", "tilt"]
+            self._fitted.append(fit(measured, start, free=["k0", "k1", "k2"], camera=camera))
         return self._fitted[0]

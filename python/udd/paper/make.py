@@ -98,7 +98,7 @@ def reproduce(
     Raises
     ------
     UddError
-        An unknown key, one that needs films while there are to be none, or a folder that cannot be written to.
+        An unknown key, one that needs films while there are to be none, a folder that cannot be written to.
 
     Examples
     --------
@@ -140,7 +140,8 @@ def _chosen(only: Iterable[str] | None, films: bool) -> tuple[list[Figure], list
         entry = FIGURES.get(key) or CLAIMS.get(key)
         if entry is None:
             raise UddError(
-                f"no figure or claim is called {key!r}; the figures are {', '.join(FIGURES)}; the claims are {', '.join(CLAIMS)}"
+                f"no figure or claim is called {key!r}; the figures are {', '.join(FIGURES)}; the claims "
+                f"are {', '.join(CLAIMS)}"
             )
         if entry.filmed and not films:
             raise UddError(f"{key} needs a film, and there are to be none")

@@ -12,6 +12,7 @@ from udd.models import Disk
 
 _FRAMES = 7  # of a window: 0.28 s at the paper's 25 frames per second
 _ORDER = 4
+_FINER = 5  # points that are drawn for each frame
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Smoothed:
     Attributes
     ----------
     t : ndarray, shape (n,)
-        s.
+        s, five for each frame.
     state : ndarray, shape (n, 4)
         [Omega, Y, Z, beta], Omega from the smoothed beta.
     model : Disk
@@ -42,7 +43,8 @@ class Smoothed:
 
 
 def smoothed(measurement: Measurement, model: Disk) -> Smoothed:
-    """Savitzky and Golay's local polynomials; frames that were not seen are bridged by straight lines."""
+    """Savitzky and Golay's local polynomials, splines between frames, lines where nothing was seen."""
+    from scipy.interpolate import CubicSpline
     from scipy.signal import savgol_filter
 
     t, seen = measurement.t, measurement.seen
@@ -50,4 +52,5 @@ def smoothed(measurement: Measurement, model: Disk) -> Smoothed:
     columns = [np.interp(t, t[seen], measurement[name][seen]) for name in ("Y", "Z", "beta")]
     y, z, beta = (savgol_filter(column, _FRAMES, _ORDER) for column in columns)
     omega = savgol_filter(columns[2], _FRAMES, _ORDER, deriv=1, delta=step)
-    return Smoothed(t, np.column_stack([omega, y, z, beta]), model)
+    fine = np.linspace(t[0], t[-1], _FINER * (len(t) - 1) + 1)
+    return Smoothed(fine, CubicSpline(t, np.column_stack([omega, y, z, beta]))(fine), model)

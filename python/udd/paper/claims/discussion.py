@@ -17,7 +17,8 @@ from udd.sections import poincare
 @claim(
     "forced-pendulum",
     place="Section 6",
-    says="A periodically forced pendulum cannot have a fixed period; it detunes and is modulated over long times.",
+    says="A periodically forced pendulum cannot have a fixed period; it detunes and is modulated over "
+    "long times.",
 )
 def forced_pendulum(_lab: Lab) -> Verdict:
     """A damped one, near resonance."""
@@ -28,11 +29,13 @@ def forced_pendulum(_lab: Lab) -> Verdict:
     swing = float(np.abs(found.component("theta")).max())
     ratio = found.return_times.mean() * frequency / (2 * np.pi)
     evidence = (
-        f"with friction 0.2 and a torque 0.2 cos(0.9 t), r = 1, it swings by {swing:.2f} rad with the period of the torque "
+        f"with friction 0.2 and a torque 0.2 cos(0.9 t), r = 1, it swings by {swing:.2f} rad with the "
+        "period of the torque "
         f"(ratio {ratio:.9f}), alike to {spread:.0e} over 400 swings after 400 more"
     )
     otherwise = (
-        "a damped one locks to its drive, whose period it takes; detuning and modulation stay where friction is "
+        "a damped one locks to its drive, whose period it takes; detuning and modulation stay where "
+        "friction is "
         "absent. What the disk has over it is a period of its own, without a clock that drives it"
     )
     return judged(spread > 1e-6, evidence, otherwise=otherwise)
@@ -50,11 +53,13 @@ def clock_period(_lab: Lab) -> Verdict:
     W = np.linspace(0.08, 0.12, 9)
     slope = np.polyfit(np.log(W), np.log(disk_periods(W)), 1)[0]
     evidence = (
-        f"DLE: T √w = {scaled[0]:.6f}, {scaled[1]:.6f}, {scaled[2]:.6f} at w = 10, 100, 1000 (limit {C:.6f}); disk: T goes "
+        f"DLE: T √w = {scaled[0]:.6f}, {scaled[1]:.6f}, {scaled[2]:.6f} at w = 10, 100, 1000 (limit "
+        f"{C:.6f}); disk: T goes "
         f"as W^{slope:.3f} from 8 to 12 cm/s"
     )
     remark = (
-        "the period is set by the drive, as W^(−1/2): a clock as good as half the relative steadiness of its wheels. The disk's orbit "
+        "the period is set by the drive, as W^(−1/2): a clock as good as half the relative steadiness of "
+        "its wheels. The disk's orbit "
         "grows with W, and at 15 cm/s it has no room left"
     )
     return judged(abs(scaled[2] / C - 1) < 1e-4 and abs(slope + 0.5) < 0.02, evidence, remark)
@@ -87,10 +92,11 @@ def successive_heights(_lab: Lab) -> Verdict:
         spreads.append(float(np.median(np.abs(np.diff(following[order])))))
     evidence = (
         "the next height is a function of the last (neighbours 0.0005 apart differ by "
-        f"{spreads[0]:.0e}, {spreads[1]:.0e}, {spreads[2]:.0e} at w = 0.1, 0.03, 0.01); distance to the limit "
+        f"{spreads[0]:.0e}, {spreads[1]:.0e}, {spreads[2]:.0e} at w = 0.1, 0.03, 0.01); distance to the "
+        "limit "
         f"6 (h + h′) = (1 + 4 h′)^(3/2), median: {gaps[0]:.3f}, {gaps[1]:.3f}, {gaps[2]:.3f}"
     )
-    remark = "as w → 0 the cusps crowd and shrink onto a smooth map with the stable fixed point 1.354"
+    remark = "as w → 0 the cusps crowd and shrink onto a smooth map with the stable fixed point 1.353"
     return judged(gaps[2] < gaps[1] < gaps[0] and spreads[0] < 0.01, evidence, remark)
 
 
@@ -107,7 +113,8 @@ def spin_down(_lab: Lab) -> Verdict:
     lost = down[spread > 1.0]
     bound = hopf_of_disk(device.B / device.L)
     evidence = (
-        f"b = 43.6 /m: lowered in steps of 2 mm/s, a minute each, the rotation is lost at {100 * lost[0]:.1f} cm/s; linear theory "
+        "b = 43.6 /m: lowered in steps of 2 mm/s, a minute each, the rotation is lost at "
+        f"{100 * lost[0]:.1f} cm/s; linear theory "
         f"puts the bound at {100 * bound:.2f} cm/s"
     )
     remark = "with the added relaxation; the paper's plain model has no stable rotation at all"
@@ -126,5 +133,8 @@ def aperiodic(_lab: Lab) -> Verdict:
     found = lyapunov_spectrum(1.0, t=50_000, tol=2e-3)
     value, error = found.exponents[0], found.standard_errors[0]
     total = found.exponents.sum()
-    evidence = f"w = 1: largest exponent {value:.4f} ± {error:.4f}, dimension {found.dimension:.3f}, exponents' sum {total:.6f}"
+    evidence = (
+        f"w = 1: largest exponent {value:.4f} ± {error:.4f}, dimension {found.dimension:.3f}, exponents' "
+        f"sum {total:.6f}"
+    )
     return judged(found.verdict == "chaos", evidence)

@@ -46,7 +46,8 @@ def chaos_39(_lab: Lab) -> Verdict:
     """The exponent without the edge, and how many stay on the disk."""
     spectrum, left = _spectrum(0.039), _left(0.039)
     remark = (
-        f"the attractor reaches beyond the disk's edge: {left:.0%} of random starts leave the wheels within two minutes; the exponent "
+        f"the attractor reaches beyond the disk's edge: {left:.0%} of random starts leave the wheels "
+        "within two minutes; the exponent "
         'belongs to the equations without the edge (edge="ignore")'
     )
     return judged(spectrum.verdict == "chaos", _said(spectrum), remark if left > 0.1 else "")
@@ -60,7 +61,10 @@ def chaos_39(_lab: Lab) -> Verdict:
 def order_55(_lab: Lab) -> Verdict:
     """The equations are chaotic there."""
     spectrum = _spectrum(0.055)
-    otherwise = "for the model with the paper's constants, whose attractor also leaves the disk there; the device may differ"
+    otherwise = (
+        "for the model with the paper's constants, whose attractor also leaves the disk there; the "
+        "device may differ"
+    )
     return judged(spectrum.verdict == "periodic orbit", _said(spectrum), otherwise=otherwise)
 
 
@@ -96,9 +100,7 @@ def dle_39(_lab: Lab) -> Verdict:
 
 
 def _late(w: float, n: int = 16) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """States of a crowd after a time that outlasts most chaotic transients, and how near each orbit then comes to
-    where it was 22 section points before.
-    """
+    """States of a crowd after most chaotic transients, and how near each comes to itself 22 points before."""
     starts = np.random.default_rng(1).normal(size=(n, 3))
     states = ensemble(DLE(w), 60_000.0, starts, rtol=1e-9).end
     y = poincare(DLE(w), n=200, state0=states, transient=0).component("y")
@@ -113,12 +115,15 @@ def dle_45(_lab: Lab) -> Verdict:
     value, error = lyapunov(DLE(4.5), t=100_000, tol=3e-3, state0=states[0], with_error=True)
     beside = _late(4.50001)[1]
     evidence = (
-        f"up to t = 2000: {_said(early, 'per unit of time')}. After t = 60,000, {(gaps < 0.1).sum()} of {len(gaps)} orbits "
-        f"come back after 22 section points, to {np.median(gaps):.3f} in y (exponent {value:.3f} ± {error:.3f}); "
+        f"up to t = 2000: {_said(early, 'per unit of time')}. After t = 60,000, {(gaps < 0.1).sum()} of "
+        f"{len(gaps)} orbits "
+        f"come back after 22 section points, to {np.median(gaps):.3f} in y (exponent {value:.3f} ± "
+        f"{error:.3f}); "
         f"at w = 4.50001 they do so to {np.median(beside):.1e}"
     )
     remark = (
-        "only after a chaotic transient of thousands of units, and in a window of w some 3e-5 wide; at 4.5 itself the "
+        "only after a chaotic transient of thousands of units, and in a window of w some 3e-5 wide; at "
+        "4.5 itself the "
         "motion is chaotic still, in 22 bands that a picture does not resolve"
     )
     return judged(bool((gaps < 0.1).mean() > 0.8), evidence, remark)
@@ -129,7 +134,10 @@ def dle_71(_lab: Lab) -> Verdict:
     """The period of the symmetric figure-eight."""
     spectrum = lyapunov_spectrum(7.1, t=80_000, transient=40_000, tol=1e-3)
     slow = -1 / spectrum.exponents[1]
-    evidence = f"verdict “{spectrum.verdict}”, T = {spectrum.period:.9f}, second exponent {spectrum.exponents[1]:.6f}"
+    evidence = (
+        f"verdict “{spectrum.verdict}”, T = {spectrum.period:.9f}, second exponent "
+        f"{spectrum.exponents[1]:.6f}"
+    )
     remark = f"0.0036 above the symmetry breaking: transients die with the time constant {slow:.0f}"
     return judged(spectrum.verdict == "periodic orbit", evidence, remark if slow > 1000 else "")
 
@@ -146,7 +154,8 @@ def coexistence(_lab: Lab) -> Verdict:
     spread = np.ptp(np.abs(found.component("y")), axis=-1)
     simple = spread < 1e-6
     evidence = (
-        f"at w = 7.6, {simple.sum()} of 60 random starts end on the symmetric figure-eight, {(~simple).sum()} elsewhere "
+        f"at w = 7.6, {simple.sum()} of 60 random starts end on the symmetric figure-eight, "
+        f"{(~simple).sum()} elsewhere "
         f"(|y| at z = 0 spreads over {np.median(spread[~simple]):.2f})"
         if (~simple).any()
         else "all starts end alike at w = 7.6"

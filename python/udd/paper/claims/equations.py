@@ -79,7 +79,10 @@ def zero_drive_swings(_lab: Lab) -> Verdict:
     large = turns[np.abs(run.Y[turns]) > 1e-3]
     count = len(large) / 2
     places = ", ".join(f"{1e3 * y:.1f}" for y in run.Y[turns][:6])
-    evidence = f"the computed swings turn at Y = {places} mm: {count:g} to {count + 1:g} oscillations above a millimetre"
+    evidence = (
+        f"the computed swings turn at Y = {places} mm: {count:g} to {count + 1:g} oscillations above a "
+        f"millimetre"
+    )
     return judged(2 <= count <= 4, evidence)
 
 

@@ -74,8 +74,11 @@ def steady_torque(_lab: Lab) -> Verdict:
             laps = np.diff(np.interp(2 * np.pi * whole, run.theta, run.t))
             rounds.append((torque, np.ptp(laps) / laps.mean()))
     worst = max(spread for _, spread in rounds)
-    evidence = f"r = 1: torques up to {max(held):.2f} hold it, from {rounds[0][0]:.2f} on it turns, its rounds' times alike to {worst:.0e}"
-    return judged(worst < 1e-3 and max(held) < rounds[0][0], evidence)
+    evidence = (
+        f"r = 1: torques up to {max(held):.2f} hold it, from {rounds[0][0]:.2f} on it turns, its rounds' "
+        f"times alike to {worst:.0e}"
+    )
+    return judged(bool(worst < 1e-3 and max(held) < rounds[0][0]), evidence)
 
 
 @claim(

@@ -30,7 +30,8 @@ def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarr
 @claim(
     "unstable-rotation",
     place="Section 5 E",
-    says="The rotating states of the DLE are unstable at every drive: one negative real eigenvalue and a growing pair.",
+    says="The rotating states of the DLE are unstable at every drive: one negative real eigenvalue and a "
+    "growing pair.",
 )
 def unstable_rotation(_lab: Lab) -> Verdict:
     """The cubic's roots over six decades, and the rates' Jacobian."""
@@ -41,7 +42,8 @@ def unstable_rotation(_lab: Lab) -> Verdict:
     own = eigenvalues(DLE(3.9), device.rotating_dle(DLE(3.9)), _UNITS)
     gap = np.abs(np.sort_complex(own) - np.sort_complex(np.roots([1, 1, 3.9, 7.8]))).max()
     evidence = (
-        f"the pair's real part is positive from w = 1e-3 ({least:.1e}) to 1e3; the cubic's roots at 3.9 are the "
+        f"the pair's real part is positive from w = 1e-3 ({least:.1e}) to 1e3; the cubic's roots at 3.9 "
+        "are the "
         f"Jacobian's eigenvalues to {gap:.0e}"
     )
     return judged(least > 0 and shape and gap < 1e-8, evidence)
@@ -57,7 +59,10 @@ def unstable_rotation_disk(_lab: Lab) -> Verdict:
     drives = np.linspace(0.005, 0.3, 60)
     rates = [growth(device.disk(float(W)), device.rotating(float(W)), _SIZES) for W in drives]
     k = int(np.argmin(rates))
-    evidence = f"from 0.5 to 30 cm/s the growth rate is positive, least {rates[k]:.2f} /s at {100 * drives[k]:.1f} cm/s"
+    evidence = (
+        f"from 0.5 to 30 cm/s the growth rate is positive, least {rates[k]:.2f} /s at "
+        f"{100 * drives[k]:.1f} cm/s"
+    )
     return judged(min(rates) > 0, evidence)
 
 
@@ -71,7 +76,10 @@ def rotation_approximation(_lab: Lab) -> Verdict:
     found = {W: device.rotating(W) for W in (0.014, 0.039, 0.055, 0.071, 0.088)}
     far = max(y for _, y, _ in found.values()) / device.R
     slow = min(omega for omega, _, _ in found.values())
-    evidence = f"Y is at most {far:.1%} of the radius, |Ω| at least {slow:.2f} rad/s (the kink is at {device.KINK:.2f})"
+    evidence = (
+        f"Y is at most {far:.1%} of the radius, |Ω| at least {slow:.2f} rad/s (the kink is at "
+        f"{device.KINK:.2f})"
+    )
     return judged(far < 0.2 and slow > device.KINK, evidence)
 
 
@@ -92,7 +100,8 @@ def damping_stabilises(_lab: Lab) -> Verdict:
     closed = device.hopf_drive(device.B)
     disk = hopf_of_disk(device.B / device.L)
     evidence = (
-        f"the growth rate vanishes at w = {found:.8f}; closed form (1 − B)/(B (1 + B)) = {closed:.8f}. The full disk with "
+        f"the growth rate vanishes at w = {found:.8f}; closed form (1 − B)/(B (1 + B)) = {closed:.8f}. "
+        "The full disk with "
         f"b = B/L = {device.B / device.L:.1f} /m: W = {100 * disk:.2f} cm/s"
     )
     return judged(abs(found - closed) < 1e-7 and rate(found + 0.1) < 0 < rate(found - 0.1), evidence)
@@ -124,11 +133,13 @@ def stable_below(_lab: Lab) -> Verdict:
         caught.append(bool(_is_rotating(end, 3.7, 0.05)))
     basin = 0.1 * (caught.index(False) - 1) if False in caught else float("nan")
     evidence = (
-        f"1 % below w_H the growth rate is {rate:+.4f}, and of {of} starts within 0.05 of the rotation {kept} are there at "
+        f"1 % below w_H the growth rate is {rate:+.4f}, and of {of} starts within 0.05 of the rotation "
+        f"{kept} are there at "
         f"t = 10,000. Above, at w = 3.7, starts down to z = −{basin:.1f} go to it"
     )
     otherwise = (
-        "finite disturbances are survived above w_H only: the Hopf bifurcation is subcritical, an unstable cycle "
+        "finite disturbances are survived above w_H only: the Hopf bifurcation is subcritical, an "
+        "unstable cycle "
         "bounds the basin there and none guards the rotation below"
     )
     return judged(kept > 0, evidence, otherwise=otherwise)
@@ -155,13 +166,15 @@ def _transients() -> tuple[float, float, bool]:
 @claim(
     "bistable",
     place="Section 5 E, Fig. mult2 b",
-    says="At B = 0.2, w = 3.7 a stable rotation (from z = −3.2) and a chaotic state (from −3.5) exist together.",
+    says="At B = 0.2, w = 3.7 a stable rotation (from z = −3.2) and a chaotic state (from −3.5) exist "
+    "together.",
 )
 def bistable(_lab: Lab) -> Verdict:
     """The two starts, and how long the chaos lives."""
     mean, error, parted = _transients()
     evidence = (
-        f"the two starts part as said; of 200 orbits from about z = −3.5 the chaos ends in rotation after {mean:,.0f} ± {error:,.0f} "
+        "the two starts part as said; of 200 orbits from about z = −3.5 the chaos ends in rotation after "
+        f"{mean:,.0f} ± {error:,.0f} "
         "units on average"
     )
     remark = "the chaotic orbit is a transient, though a long one: in the end the disk rotates"
@@ -190,7 +203,8 @@ def not_from_rest(_lab: Lab) -> Verdict:
         f"of 300 starts at rest up to 4 cm from the contact, with b = 43.6 /m, rotate after a minute: {words}"
     )
     otherwise = (
-        "it was seen on the device, and is nearly so in the model just above the lower bound on W; at larger drives "
+        "it was seen on the device, and is nearly so in the model just above the lower bound on W; at "
+        "larger drives "
         "the model's swings fall into rotation"
     )
     return judged(max(shares.values()) < 0.01, evidence, otherwise=otherwise)

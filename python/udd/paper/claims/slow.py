@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def _ascents() -> tuple[tuple[int, int], ...]:
     passes = np.flatnonzero((run.Z[:-1] < 0) & (run.Z[1:] >= 0))
     bounds = [*passes.tolist(), len(run.t)]
     pairs = []
-    for first, following in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, following in pairwise(bounds):
         top = first + int(np.argmax(run.Z[first:following]))
         if run.Z[top] > 0.01 and top < following - 1:
             pairs.append((first, top))
@@ -80,7 +81,10 @@ def higher_deeper(_lab: Lab) -> Verdict:
     tops = np.array([run.Z[k] for _, k in pairs])
     depths = np.array([-run.Z[k : k + 200].min() for _, k in pairs])
     higher, deeper = spearmanr(first, tops).statistic, spearmanr(tops, depths).statistic
-    evidence = f"rank correlations over {len(pairs)} cycles: |Y| at Z = 0 with the height {higher:.3f}, height with depth {deeper:.3f}"
+    evidence = (
+        f"rank correlations over {len(pairs)} cycles: |Y| at Z = 0 with the height {higher:.3f}, height "
+        f"with depth {deeper:.3f}"
+    )
     return judged(higher < -0.9 and deeper > 0.9, evidence)
 
 
@@ -99,12 +103,15 @@ def static_friction(_lab: Lab) -> Verdict:
     law = device.G * creep[2] ** 2 / (2 * device.SLOW * device.K1)
     gap = abs(np.log(creep[1] / 1e-6) / law - 1)
     evidence = (
-        f"the friction torque k Ω vanishes with Ω, so no torque is too small to move the disk: in {len(_ascents())} "
-        f"ascents of ten minutes |Ω| is never below {slowest:.3f} rad/s. Let go 1 µm beside the axis it creeps as "
+        "the friction torque k Ω vanishes with Ω, so no torque is too small to move the disk: in "
+        f"{len(_ascents())} "
+        f"ascents of ten minutes |Ω| is never below {slowest:.3f} rad/s. Let go 1 µm beside the axis it "
+        "creeps as "
         f"Y = Y₀ exp[g (Z² − Z₀²)/(2 W k₁)], to {gap:.1%} in the exponent on the first 2 cm"
     )
     otherwise = (
-        "this is about the paper's model, in which creep looks like sticking; a real disk may well stick, but a "
+        "this is about the paper's model, in which creep looks like sticking; a real disk may well "
+        "stick, but a "
         "constant threshold would then carry it to its edge, since g Y does not change while it sticks "
         '(udd.effects.coulomb with treatment="set-valued" shows it)'
     )
@@ -121,7 +128,8 @@ def torque_shape(_lab: Lab) -> Verdict:
     peak = device.K1**2 / (4 * device.K2)
     bottom = device.K0 * device.KINK
     evidence = (
-        f"k falls from {device.K1} to {device.K0} m²/s at |Ω| = {device.KINK:.6f} rad/s; the torque k Ω is N-shaped: largest "
+        f"k falls from {device.K1} to {device.K0} m²/s at |Ω| = {device.KINK:.6f} rad/s; the torque k Ω "
+        "is N-shaped: largest "
         f"{peak:.6f} m²/s² at {device.K1 / (2 * device.K2):.5f} rad/s, then least {bottom:.6f} at the kink"
     )
     return judged(peak > bottom, evidence, "true of the coefficient; the torque itself vanishes with Ω")

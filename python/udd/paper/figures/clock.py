@@ -45,8 +45,10 @@ def disk_periods(W: Array) -> Array:
     "clock",
     paper="Section 6, the clock",
     title="The upward-driven disk as a clock",
-    caption="(a) Period of the DLE's figure-eight: T √w tends to 10.60375 as the drive grows, so T falls as w^(−1/2). (b) "
-    "The full disk does the same from 7.6 to 12.5 cm/s; its orbit grows, and at 15 cm/s it has no room on the disk. (c) At w = 12 a push of the state by 1 % to 50 % is forgotten: the half "
+    caption="(a) Period of the DLE's figure-eight: T √w tends to 10.60375 as the drive grows, so T falls "
+    "as w^(−1/2). (b) "
+    "The full disk does the same from 7.6 to 12.5 cm/s; its orbit grows, and at 15 cm/s it has no room "
+    "on the disk. (c) At w = 12 a push of the state by 1 % to 50 % is forgotten: the half "
     "periods return to the old value to ten digits.",
 )
 def clock(_lab: Lab) -> Figure:
@@ -80,8 +82,8 @@ def clock(_lab: Lab) -> Figure:
 
 
 def after_a_push(w: float, push: float, n: int) -> tuple[Array, Array]:
-    """How far the half periods are from the undisturbed one, one after the other, after a push of the state."""
+    """How far the half periods are from the undisturbed one, one by one, after a push of the state."""
     still = poincare(DLE(w), n=2, transient=3000)
     half = float(still.return_times[0])
     pushed = poincare(DLE(w), n=n, transient=0, state0=still.state[-1] * (1 + push) + [0, 0, push])
-    return np.arange(1, n), np.abs(pushed.return_times / half - 1)
+    return np.arange(1.0, n), np.abs(pushed.return_times / half - 1)

@@ -52,7 +52,8 @@ def computed_slow(_lab: Lab) -> Figure:
     paper="Fig. YZth",
     title="Intermediate and large drive, computed",
     caption="The disk after 60 s, for 20 s. At 3.9 and 5.5 cm/s the attractor reaches beyond the disk's edge "
-    '(dashed): the equations are followed there all the same (edge="ignore"), where the real disk would leave the wheels. '
+    '(dashed); the equations are followed there all the same (edge="ignore"), where the real disk would '
+    "leave the wheels. "
     "At 5.5 cm/s these equations are chaotic, not high-periodic.",
 )
 def computed_orbits(_lab: Lab) -> Figure:
@@ -68,7 +69,8 @@ def computed_orbits(_lab: Lab) -> Figure:
     "dle-orbits",
     paper="Fig. UDDth",
     title="The diffusionless Lorenz equations",
-    caption="After 500 units of time, for 60. At w = 4.5 the orbit is a chaotic transient, which lasts thousands of "
+    caption="After 500 units of time, for 60. At w = 4.5 the orbit is a chaotic transient, which lasts "
+    "thousands of "
     "units on average before a window of periodic motion takes it; at w = 7.1, 0.0036 above the symmetry "
     "breaking, it still nears the symmetric figure-eight.",
 )

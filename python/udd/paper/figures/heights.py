@@ -53,8 +53,8 @@ def maxima(w: float, starts: Array, n: int, time: float) -> Array:
 def limit(following: Array) -> Array:
     """The height from which the centre fell, if it rises to `following` next, as the drive vanishes.
 
-    With z rising as w t the spin obeys ``omega'' + omega' = z omega``: it decays as ``exp(-t/2)`` while the centre
-    swings (z < -1/4), and falls, then grows at the rate ``(sqrt(1 + 4 z) - 1)/2``. The next fall begins where
+    With z rising as w t the spin obeys ``omega'' + omega' = z omega``: it decays as ``exp(-t/2)`` while the
+    centre swings (z < -1/4), then changes at the rate ``(sqrt(1 + 4 z) - 1)/2``. The next fall begins where
     it is back at its old size, to leading order in w: ``6 (h + h') = (1 + 4 h')^(3/2)``.
     """
     result: Array = (1 + 4 * following) ** 1.5 / 6 - following
@@ -65,9 +65,11 @@ def limit(following: Array) -> Array:
     "heights",
     paper="Section 5 B, the map of successive heights",
     title="From one height to the next",
-    caption="How high the centre rises (z at its maximum) over the height from which it fell before, in the DLE. The map has cusps, at "
+    caption="How high the centre rises (z at its maximum) over the height from which it fell before, in "
+    "the DLE. The map has cusps, at "
     "which the swings end with hardly any sideways motion left and the centre rises higher; they crowd as "
-    "w falls, by π w/√(h − 1/4). Black: the limit w → 0, 6 (h + h′) = (1 + 4 h′)^(3/2), whose fixed point 1.354 is stable: "
+    "w falls, by π w/√(h − 1/4). Black: the limit w → 0, 6 (h + h′) = (1 + 4 h′)^(3/2), whose fixed "
+    "point 1.353 is stable: "
     "the chaos is in the cusps.",
 )
 def heights(_lab: Lab) -> Figure:

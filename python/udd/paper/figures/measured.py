@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     "marks",
     paper="Fig. center",
     title="Where the disk is in a frame",
-    caption="Frames of the film at W = 1.4 cm/s, as slow and as fast as the disk gets. Rings: the four marks; light blue: the disk and its "
+    caption="Frames of the film at W = 1.4 cm/s, as slow and as fast as the disk gets. Rings: the four "
+    "marks; light blue: the disk and its "
     "centre; cross: the contact. The paper loses its marks in the blur; this tracker fits the blurred marks.",
     filmed=True,
 )
@@ -30,13 +31,14 @@ def marks(lab: Lab) -> Figure:
     from udd.tracking import pictures_at, pixels
 
     measured, smooth = lab.measured("1.4"), lab.smoothed("1.4")
-    speed = np.abs(smooth.state[:, 0])
+    omega = np.interp(measured.t, smooth.t, smooth.state[:, 0])
+    speed = np.abs(omega)
     chosen = sorted(int(k) for k in (np.argmin(speed[50:]) + 50, np.argmax(speed)))
     pictures = pictures_at(films.film_of("1.4", lab.folder), chosen)
     made, axes = panels(1, 2, 8.4, 5.4, note=FILMED)
     for k, (frame, picture) in enumerate(zip(chosen, pictures, strict=True)):
         plot.overlay(picture, pixels(measured), frame, axes[k])
-        titled(axes[k], k, f"T = {measured.t[frame]:.2f} s, Ω = {smooth.state[frame, 0]:.1f} rad/s")
+        titled(axes[k], k, f"T = {measured.t[frame]:.2f} s, Ω = {omega[frame]:.1f} rad/s")
     return made
 
 
@@ -106,7 +108,8 @@ def slow_orbit(lab: Lab) -> Figure:
     "slow-polar",
     paper="Fig. polar",
     title="Small drive: polar coordinates",
-    caption="W = 1.4 cm/s. (a) Θ = θ − π, the direction of the centre from hanging, clockwise, unwrapped: it rests at multiples of 2π. "
+    caption="W = 1.4 cm/s. (a) Θ = θ − π, the direction of the centre from hanging, clockwise, "
+    "unwrapped: it rests at multiples of 2π. "
     "(b) The distance R of the centre from the contact.",
     filmed=True,
 )
@@ -117,7 +120,7 @@ def slow_polar(lab: Lab) -> Figure:
     y, z = smooth.state[:, 1], smooth.state[:, 2]
     angle = np.unwrap(np.arctan2(y, z) - np.pi)
     turns = angle / (2 * np.pi)
-    turns -= np.round(np.median(turns[-25:]))
+    turns -= np.round(turns[0] + 0.5)
     axes[0].plot(smooth.t, turns, color=AFTER, linewidth=1.1)
     axes[0].set_ylabel("Θ / 2π")
     axes[1].plot(smooth.t, scale("R") * np.hypot(y, z), color=AFTER, linewidth=1.1)
@@ -136,7 +139,8 @@ def slow_polar(lab: Lab) -> Figure:
     "measured-orbits",
     paper="Fig. YZs",
     title="Intermediate and large drive, measured",
-    caption="Starts were chosen for which the disk stays between the wheels for the 16 s of the film; at 3.9 and 5.5 cm/s many others "
+    caption="Starts were chosen for which the disk stays between the wheels for the 16 s of the film; at "
+    "3.9 and 5.5 cm/s many others "
     "leave.",
     filmed=True,
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from udd import effects, plot
+from udd import effects
 from udd.models import DLE, Disk
 from udd.paper import device
 from udd.paper.canvas import panels, titled
@@ -62,7 +62,8 @@ def eigenvalues_plain(_lab: Lab) -> Figure:
     paper="Fig. mult2",
     title="Stability with damping of the rolling constraint",
     caption="(a) Eigenvalues with B = 0.2: stable above w_H = (1 − B)/(B (1 + B)) = 10/3. (b) w = 3.7, from "
-    "ω = y = √w and z = −3.2 (blue, winds in) and z = −3.5 (orange, chaotic for a long time: the motion is a transient "
+    "ω = y = √w and z = −3.2 (blue, winds in) and z = −3.5 (orange, chaotic for a long time: the motion "
+    "is a transient "
     "whose mean life is tens of thousands of units).",
 )
 def damped_rotation(_lab: Lab) -> Figure:
@@ -98,7 +99,8 @@ def relaxed(W: float, b: float, momentum: str = "constraint") -> Disk:
     "rotating-states",
     paper="Section 3 C, Video 4",
     title="The two steadily rotating states of the disk",
-    caption="W = 8.8 cm/s, from near each rotating state. (a) With the paper's relaxation of the rolling constraint, "
+    caption="W = 8.8 cm/s, from near each rotating state. (a) With the paper's relaxation of the rolling "
+    "constraint, "
     "b = B/L = 43.6 /m, both are reached and kept: Ω = ±√(g W/k₀). (b) Without it the disk leaves them.",
 )
 def rotating_states(_lab: Lab) -> Figure:
@@ -134,7 +136,8 @@ def lowest_relaxation(W: float, momentum: str) -> float:
     "relaxation-needed",
     paper="Section 5 D, for the full disk",
     title="The relaxation that keeps the rotation stable",
-    caption="Above the curves the full disk's rotating state is stable to small disturbances. The relaxation −b W Z may "
+    caption="Above the curves the full disk's rotating state is stable to small disturbances. The "
+    "relaxation −b W Z may "
     "change the rolling constraint alone, as the paper has it, or the angular momentum too. Dashed: the DLE, "
     "w_H = (1 − B)/(B (1 + B)).",
 )
@@ -177,8 +180,10 @@ def spun_down(drives: NDArray[np.float64], start: list[float], time: float = 60.
     "spin-down",
     paper="Section 3 C",
     title="Spin-down: the drive is lowered, then raised again",
-    caption="The full disk with b = 43.6 /m, 60 s at each drive; line: mean of Ω, band: its standard deviation. Lowered, the rotation "
-    "holds until it turns unstable (5.8 cm/s to first order, where it begins to part). Raised, the chaotic swings last until they "
+    caption="The full disk with b = 43.6 /m, 60 s at each drive; line: mean of Ω, band: its standard "
+    "deviation. Lowered, the rotation "
+    "holds until it turns unstable (5.8 cm/s to first order, where it begins to part). Raised, the "
+    "chaotic swings last until they "
     "happen to be caught by a rotating state: at high drives they are a transient. Grey: Ω = √(g W/k₀).",
 )
 def spin_down(_lab: Lab) -> Figure:
