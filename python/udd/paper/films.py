@@ -33,8 +33,8 @@ class Recipe:
     seed : int
         Of the camera's noise.
     quality : float
-        Of the film's compression, as :func:`udd.render` takes it. A poor one lets a disk at rest freeze, errors
-        and all, which a fit takes for many frames that agree.
+        Of the film's compression, as :func:`udd.render` takes it. A poor one lets a disk at rest freeze,
+        errors and all, which a fit takes for many frames that agree.
     """
 
     W: float
