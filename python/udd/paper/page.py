@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import platform
+import re
 from collections import Counter
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -27,6 +28,12 @@ def png(figure: Figure, dpi: int) -> bytes:
     return picture.getvalue()
 
 
+def sentence(text: str) -> str:
+    """With a capital where it begins with a word, true minus signs, and a full stop."""
+    start = text[0].upper() if text[1:2].islower() else text[0]
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", f"{start}{text[1:]}.")
+
+
 def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
     """The page as HTML."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -38,6 +45,7 @@ def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["sentence"] = sentence
     return environment.get_template("index.html").render(
         figures=[(one, _embedded(one)) for one in figures],
         claims=claims,

@@ -28,7 +28,7 @@ class Figure:
     key : str
         What it is called on the command line and as a file.
     paper : str
-        Which figure of the paper it is, by the label in its source; or what it belongs to.
+        Which figure of the paper it is, or which part it belongs to.
     title, caption : str
     filmed : bool
         Whether it needs films to be made and tracked.

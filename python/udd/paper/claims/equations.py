@@ -118,7 +118,7 @@ def friction_law(lab: Lab) -> Verdict:
     """The package's own fit of a film that was made with this law."""
     fit = lab.friction_fit()
     known = {"k0": device.K0, "k1": device.K1, "k2": device.K2}
-    parts = [f"{name} = {fit.parameters[name]:.4f} ± {fit.errors[name]:.4f}" for name in known]
+    parts = [f"{name} = {fit.parameters[name]:.5f} ± {fit.errors[name]:.5f}" for name in known]
     far = max(abs(fit.parameters[name] - value) / fit.errors[name] for name, value in known.items())
     evidence = (
         f"from the film: {', '.join(parts)}; at most {far:.1f} standard errors from the law it was made with"

@@ -93,5 +93,5 @@ def diffusive_state(_lab: Lab) -> Verdict:
     off = np.abs(on.state - np.stack([0 * t, 0 * t, 0.5 * t - 1], axis=1)).max()
     beside = simulate(DLE(0.5), t, [0, 1e-9, -1], method="taylor")
     parted = np.abs(beside.y).max()
-    evidence = f"on it to {off:.0e} over 20 units; let go 1e-9 beside it y reaches {parted:.1f}"
+    evidence = f"a run stays on it to {off:g} over 20 units; let go 1e-9 beside it y reaches {parted:.1f}"
     return judged(off < 1e-12 and parted > 0.1, evidence)

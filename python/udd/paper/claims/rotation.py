@@ -165,7 +165,7 @@ def _transients() -> tuple[float, float, bool]:
 
 @claim(
     "bistable",
-    place="Section 5 E, Fig. mult2 b",
+    place="Section 5 E, Figure 16 b",
     says="At B = 0.2, w = 3.7 a stable rotation (from z = −3.2) and a chaotic state (from −3.5) exist "
     "together.",
 )

@@ -30,7 +30,7 @@ def settled(W: float) -> Trajectory:
 
 @figure(
     "computed-slow",
-    paper="Fig. UDDths",
+    paper="Figure 10",
     title="Small drive, computed",
     caption="(a) The disk at W = 1.4 cm/s for 45 s, from rest as good as upright, 4 cm up. (b) The DLE at "
     "w = 0.1 from (y, z) = (−0.175, 1) at rest. Slow ascents near the axis, a fall to either side, swings.",
@@ -49,7 +49,7 @@ def computed_slow(_lab: Lab) -> Figure:
 
 @figure(
     "computed-orbits",
-    paper="Fig. YZth",
+    paper="Figure 11",
     title="Intermediate and large drive, computed",
     caption="The disk after 60 s, for 20 s. At 3.9 and 5.5 cm/s the attractor reaches beyond the disk's edge "
     '(dashed); the equations are followed there all the same (edge="ignore"), where the real disk would '
@@ -67,7 +67,7 @@ def computed_orbits(_lab: Lab) -> Figure:
 
 @figure(
     "dle-orbits",
-    paper="Fig. UDDth",
+    paper="Figure 12",
     title="The diffusionless Lorenz equations",
     caption="After 500 units of time, for 60. At w = 4.5 the orbit is a chaotic transient, which lasts "
     "thousands of "

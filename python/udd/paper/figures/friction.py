@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @figure(
     "friction",
-    paper="Fig. kcompare",
+    paper="Figure 9",
     title="The friction law from the swings without a drive",
     caption="(a, b) Tracked motion and a run of the fitted model from the fitted first state. (c) The "
     "fitted k(Ω) with one standard "

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @figure(
     "marks",
-    paper="Fig. center",
+    paper="Figure 3",
     title="Where the disk is in a frame",
     caption="Frames of the film at W = 1.4 cm/s, as slow and as fast as the disk gets. Rings: the four "
     "marks; light blue: the disk and its "
@@ -44,7 +44,7 @@ def marks(lab: Lab) -> Figure:
 
 @figure(
     "zero-drive",
-    paper="Fig. zero",
+    paper="Figure 4",
     title="Zero drive",
     caption="The wheels stand still; the disk swings out from R = 5.8 cm, 127° from upright.",
     filmed=True,
@@ -60,7 +60,7 @@ def zero_drive(lab: Lab) -> Figure:
 
 @figure(
     "slow-drive",
-    paper="Fig. YZ14",
+    paper="Figure 5",
     title="Small drive: the centre over time",
     caption="W = 1.4 cm/s. Dots: tracked, one for each frame; line: smoothed.",
     filmed=True,
@@ -85,7 +85,7 @@ def slow_drive(lab: Lab) -> Figure:
 
 @figure(
     "slow-orbit",
-    paper="Fig. slow",
+    paper="Figure 6",
     title="Small drive: angular momentum and orbit",
     caption="W = 1.4 cm/s. J = I Ω − W Y with Ω from the smoothed orientation.",
     filmed=True,
@@ -106,7 +106,7 @@ def slow_orbit(lab: Lab) -> Figure:
 
 @figure(
     "slow-polar",
-    paper="Fig. polar",
+    paper="Figure 7",
     title="Small drive: polar coordinates",
     caption="W = 1.4 cm/s. (a) Θ = θ − π, the direction of the centre from hanging, clockwise, "
     "unwrapped: it rests at multiples of 2π. "
@@ -137,7 +137,7 @@ def slow_polar(lab: Lab) -> Figure:
 
 @figure(
     "measured-orbits",
-    paper="Fig. YZs",
+    paper="Figure 8",
     title="Intermediate and large drive, measured",
     caption="Starts were chosen for which the disk stays between the wheels for the 16 s of the film; at "
     "3.9 and 5.5 cm/s many others "

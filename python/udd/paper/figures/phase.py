@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @figure(
     "measured-phase",
-    paper="Fig. YZphsp",
+    paper="Figure 13",
     title="Phase space, measured",
     caption="J, Y, Z from tracked films; J = I Ω − W Y takes Ω from the smoothed orientation.",
     filmed=True,
@@ -35,7 +35,7 @@ def measured_phase(lab: Lab) -> Figure:
 
 @figure(
     "computed-phase",
-    paper="Fig. YZthphsp",
+    paper="Figure 14",
     title="Phase space, computed",
     caption="The same from the equations, as in the figure of the computed orbits.",
 )

@@ -46,7 +46,7 @@ def _eigenvalue_panel(ax: Axes, damping: float) -> None:
 
 @figure(
     "eigenvalues",
-    paper="Fig. rootsDLE",
+    paper="Figure 15",
     title="Stability of steady rotation without damping",
     caption="Eigenvalues at ω = y = √w, z = 0. The pair's real part is positive at every drive: unstable.",
 )
@@ -59,7 +59,7 @@ def eigenvalues_plain(_lab: Lab) -> Figure:
 
 @figure(
     "damped-rotation",
-    paper="Fig. mult2",
+    paper="Figure 16",
     title="Stability with damping of the rolling constraint",
     caption="(a) Eigenvalues with B = 0.2: stable above w_H = (1 − B)/(B (1 + B)) = 10/3. (b) w = 3.7, from "
     "ω = y = √w and z = −3.2 (blue, winds in) and z = −3.5 (orange, chaotic for a long time: the motion "
