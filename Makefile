@@ -22,7 +22,7 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery
+.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,6 +31,9 @@ install: .venv/.udd ## make .venv from the lock file and install the release bui
 
 demo: .venv/.udd ## from the sample film to the report: run the main job and print where its report is
 	$(BIN)/udd demo
+
+docs: .venv/.udd ## build the documentation into docs/_build/html; every page is run, and a warning is an error
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 test: test-rust test-python ## build everything and run all tests (cargo and pytest)
 
@@ -86,7 +89,7 @@ lock: .venv/.deps ## write requirements.lock anew, with today's versions
 	  --custom-compile-command "make lock" --output-file requirements.lock
 
 clean: ## remove .venv and everything that was built
-	rm -rf .venv .venv-peers dist demo target .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers dist demo paper docs/_build target .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 

@@ -40,10 +40,12 @@ _PUBLIC = {
     "forecast": "udd.forecasting",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
+    "paper": "udd.paper",
     "plot": "udd.plot",
     "poincare": "udd.sections",
     "prune": "udd.discovery",
     "read_measurement": "udd.measurement",
+    "relatives": "udd.relatives",
     "render": "udd.film",
     "simulate": "udd.trajectory",
     "sweep": "udd.sweeping",
@@ -55,7 +57,9 @@ __all__ = [*_PUBLIC]
 if TYPE_CHECKING:  # the same for type checkers
     from udd import effects as effects
     from udd import errors as errors
+    from udd import paper as paper
     from udd import plot as plot
+    from udd import relatives as relatives
     from udd.branching.diagram import bifurcation as bifurcation
     from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery

@@ -16,6 +16,7 @@ from . import (
     fit,
     forecast,
     lyapunov,
+    paper,
     poincare,
     simulate,
     sweep,
@@ -35,6 +36,7 @@ _COMMANDS = (
     fit,
     forecast,
     discover,
+    paper,
 )
 
 
