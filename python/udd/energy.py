@@ -71,10 +71,10 @@ def energy_books(run: Trajectory) -> Books:
 
     Notes
     -----
-    With ``I = R^2/2 + Y^2 + Z^2`` the disk's energy ``I Omega^2/2 + g Z`` changes by ``g W - k Omega^2``, plus what
-    the effects put in; so on every bounded orbit the time averages of motor and friction power are the same
-    without effects. Likewise ``omega^2/2 + z`` of the DLE changes by ``w - omega^2``. All powers are read off the
-    model's own rates.
+    With ``I = R^2/2 + Y^2 + Z^2`` the disk's energy ``I Omega^2/2 + g Z`` changes by ``g W - k Omega^2``,
+    plus what the effects put in; so on every bounded orbit the time averages of motor and friction power are
+    the same without effects. Likewise ``omega^2/2 + z`` of the DLE changes by ``w - omega^2``. All powers are
+    read off the model's own rates.
 
     Examples
     --------

@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from . import (
+    app,
     basins,
     bifurcation,
     demo,
@@ -35,6 +36,7 @@ _COMMANDS = (
     fit,
     forecast,
     discover,
+    app,
 )
 
 
