@@ -17,7 +17,7 @@ from udd.sweeping.models_json import model_to_dict
 from . import limits
 from .maps import SURFACES
 from .result import text_of
-from .runs import RATE, clock_of, columns_of
+from .runs import RATE, clock_of, columns_of, per_unit
 
 #: Least, greatest, step of a slider, and by what the SI value is multiplied for the reader in which unit.
 _RANGES: dict[str, dict[str, tuple[float, float, float, float, str]]] = {
@@ -97,6 +97,7 @@ def _model(model: Model) -> dict[str, Any]:
         "units": list(model.state_units),
         "columns": columns_of(model),
         "clock": clock_of(model),
+        "per_unit": per_unit(model),
         "radius": plain.R / metres,
         "surfaces": {key: component for key, (_, component) in SURFACES[model.kind].items()},
     }

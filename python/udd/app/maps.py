@@ -28,12 +28,8 @@ _EXPONENT = {"dle": (1200.0, 0.03), "disk": (160.0, 0.25)}  # time of a run, and
 
 #: The surfaces that the page offers, and the component that its return map shows.
 SURFACES = {
-    "dle": {"z = 0, upward": ("z", "y"), "maxima of z": ("maxima of z", "z"), "reversals": ("reversal", "z")},
-    "disk": {
-        "Z = 0, upward": ("Z", "Y"),
-        "maxima of Z": ("maxima of Z", "Z"),
-        "reversals": ("reversal", "Z"),
-    },
+    "dle": {"zero": ("z", "y"), "maxima": ("maxima of z", "z"), "reversals": ("reversal", "z")},
+    "disk": {"zero": ("Z", "Y"), "maxima": ("maxima of Z", "Z"), "reversals": ("reversal", "Z")},
 }
 
 

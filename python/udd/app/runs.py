@@ -7,7 +7,7 @@ from collections import OrderedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.energy import angular_momentum, energy_books
+from udd.energy import Books, angular_momentum, energy_books
 from udd.errors import ModelError
 from udd.models import DLE, Disk, Model
 from udd.trajectory import Trajectory, simulate
@@ -18,7 +18,7 @@ from .spec import Start, key_of
 Array = NDArray[np.float64]
 
 RATE = 240  # states per second that passes on the page
-_FIRST = 8.0  # s of the first call
+_FIRST = 4.0  # s of the first call
 _SCALE = Disk(0.0)  # the constants in which the DLE is shown: the paper's
 
 
@@ -27,9 +27,14 @@ def clock_of(model: Model) -> float:
     return 2.0 * _SCALE.k0 / _SCALE.R**2 if isinstance(model, DLE) else 1.0
 
 
+def per_unit(model: Model) -> float:
+    """States shown in a unit of the model's time: 240 of a disk, 64 of the DLE."""
+    return RATE / clock_of(model)
+
+
 def times_of(model: Model, count: int) -> Array:
-    """The times at which states are shown: ``np.arange(count) * step``."""
-    result: Array = np.arange(count, dtype=np.float64) * (clock_of(model) / RATE)
+    """The times at which states are shown."""
+    result: Array = np.arange(count) / per_unit(model)
     return result
 
 
@@ -66,7 +71,9 @@ class Run:
             told = len(run.t)
         elif told >= most:
             self.outcome, told = "full", most
-        rows = _table(run, told)
+        books = energy_books(run)
+        rows = _table(run, books, told)
+        self.motor = float(books.motor[0])
         before, dim = len(self.rows), run.state.shape[1]
         if before and not np.array_equal(rows[:before, :dim], self.rows[:, :dim]):
             raise AssertionError("a longer run did not repeat a shorter one")
@@ -80,8 +87,7 @@ class Run:
         return self.rows[first:last], self.outcome != "running" and last == len(self.rows)
 
 
-def _table(run: Trajectory, count: int) -> Array:
-    books = energy_books(run)
+def _table(run: Trajectory, books: Books, count: int) -> Array:
     work = [books.friction, books.work("friction"), books.work("effects")]
     if isinstance(run.model, DLE):
         omega, step = run.state[:, 0], np.diff(run.t)
@@ -121,7 +127,7 @@ def as_csv(start: Start, seconds: float) -> str:
     if not 0 < seconds <= limits.MODEL_SECONDS:
         raise ModelError(f"seconds must be above 0 and at most {limits.MODEL_SECONDS:g}, not {seconds:g}")
     run = Run(start)
-    rows, _ = run.piece(0, int(seconds * RATE) + 1)
+    rows, _ = run.piece(0, round(seconds * RATE) + 1)
     names = start.model.state_names
     lines = [f"# model = {start.model!r}", f"# outcome = {run.outcome}", ",".join(("t", *names))]
     table = np.column_stack([run.t[: len(rows)], rows[:, : len(names)]])

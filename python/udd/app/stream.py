@@ -20,7 +20,7 @@ from udd.errors import UddError
 
 from . import limits, maps, wire
 from .jobs import Jobs, Send
-from .runs import RATE, Runs, clock_of, columns_of
+from .runs import RATE, Runs, columns_of
 from .spec import message_of, start_of, whole
 
 _WAITING = 64  # messages that a page may be behind
@@ -100,7 +100,7 @@ class Page:
         run = await asyncio.to_thread(self._runs.of, start)
         rows, last = await asyncio.to_thread(run.piece, first, count)
         if first == 0:
-            about = {"columns": columns_of(start.model), "clock": clock_of(start.model), "rate": RATE}
+            about = {"columns": columns_of(start.model), "motor": run.motor}
             await self._out.put({"type": "run", "generation": generation, "run": which, **about})
         await self._out.put(wire.piece(generation, which, first, rows, last))
         if last:

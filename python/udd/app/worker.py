@@ -152,12 +152,12 @@ def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     from udd.film import render
     from udd.trajectory import simulate
 
-    from .runs import times_of
+    from .runs import RATE, times_of
     from .spec import start_of
 
     start, seconds = start_of(asked["start"]), float(asked["seconds"])
     tell({"say": "filming the run"})
-    times = times_of(start.model, int(seconds * 240) + 1)
+    times = times_of(start.model, round(seconds * RATE) + 1)
     run = simulate(start.model, times, start.state)
     render(run, OUT / "run.mp4")
     return {"parts": [{"name": "run.mp4", "title": "Film of the run"}]}
