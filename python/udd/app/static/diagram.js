@@ -30,7 +30,7 @@ export class Diagram {
   }
 
   offer(kind) {
-    const names = this.page.about(kind).states.slice(0, 3);
+    const names = this.page.about(kind).states.slice(0, 2); // the third is zero on the section
     this.select.replaceChildren(...names.map((n) => new Option(t(`axis_${n}`), n)));
     this.select.selectedIndex = 1;
     this.range = null;
@@ -148,7 +148,7 @@ export class Diagram {
       for (let k = 1; k < values; k++) if (Math.abs(drive[k] - now) < Math.abs(drive[v] - now)) v = k;
       const here = new Set();
       for (let s = 0; s < starts; s++) if (label[s * values + v] > 0) here.add(label[s * values + v]);
-      this.said.textContent = here.size ? t("diagram_branches", { n: here.size }) : "";
+      this.said.textContent = here.size ? t(here.size > 1 ? "diagram_branches" : "diagram_branch", { n: here.size }) : "";
     }
   }
 

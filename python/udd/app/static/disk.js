@@ -1,5 +1,5 @@
 // The disk between its wheels, seen from the front, as the device's films show it.
-import { Canvas, COLOURS, SOFT } from "./plot.js";
+import { Canvas, COLOURS } from "./plot.js";
 import { fading } from "./trail.js";
 
 const MARKS = ["#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b"]; // clockwise from the one at beta: the device's own
@@ -116,9 +116,6 @@ export class DiskView extends Canvas {
       c.lineTo(w / 2, at);
     }
     c.stroke();
-    c.fillStyle = SOFT;
-    c.font = `${this.text}px sans-serif`;
-    c.fillText("O", w, this.text * 0.35);
     c.restore();
   }
 }

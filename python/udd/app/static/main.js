@@ -18,7 +18,7 @@ const { t } = texts;
 const $ = (id) => document.getElementById(id);
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8];
 const BESIDE = 1e-6; // of the second disk: m, or without a unit
-const TRAIL = 2400; // states: ten seconds
+const TRAIL = 2400, EVERY = 2; // ten seconds of states, every second one
 const SCALES = { Y: 100, Z: 100, J: 1e4 };
 
 class Page {
@@ -34,7 +34,7 @@ class Page {
     this.disk = new DiskView($("disk"), (place, done) => this.drag(place, done));
     this.phase = new PhaseView($("phase"));
     this.plane = new PlaneView($("plane"));
-    this.trails = [new Trail(TRAIL, 3), new Trail(TRAIL, 3)];
+    this.trails = [0, 1].map(() => new Trail(TRAIL / EVERY, 3));
     this.shown = 0; // states of this run that are in the trails
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.stats = { frames: 0, delays: [], ahead: Infinity };
@@ -293,7 +293,7 @@ class Page {
     const first = Math.max(this.shown, now - TRAIL);
     player.records.forEach((record, run) => {
       if (!record) return;
-      for (let k = first; k <= Math.min(now, record.count - 1); k++) {
+      for (let k = first + (first % EVERY); k <= Math.min(now, record.count - 1); k += EVERY) {
         const row = record.row(k);
         this.trails[run].push([row[columns[0]], row[columns[1]], row[columns[2]]]);
       }
@@ -338,8 +338,7 @@ class Page {
     }
     if (rows[1]) {
       const far = Math.hypot(rows[1][this.drawn[1]] - rows[0][this.drawn[1]], rows[1][this.drawn[2]] - rows[0][this.drawn[2]]);
-      const unit = kind === "disk" ? " m" : "";
-      $("apart").textContent = t("twin_apart", { apart: far.toExponential(1).replace("-", "−").replace("e", " · 10^") + unit });
+      $("apart").textContent = t(`twin_apart_${kind}`, { apart: small(far) });
     } else $("apart").textContent = "";
   }
 
@@ -352,6 +351,13 @@ class Page {
     const unit = this.home.model.kind === "disk" ? "second" : "unit_of_time";
     $("over-text").textContent = t(ended.outcome, { t: t(unit, { x: ended.t.toFixed(2) }) });
   }
+}
+
+/** A small number as 2.9 · 10⁻⁶. */
+function small(value) {
+  const [digits, power] = value.toExponential(1).split("e");
+  const raised = [...String(Number(power))].map((d) => (d === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[d])).join("");
+  return `${digits} · 10${raised}`;
 }
 
 await texts.load();
