@@ -51,8 +51,8 @@ def _presets() -> list[tuple[str, Model, list[float]]]:
         ("fig12c", DLE(7.1), [1.0, 1.0, 0.01]),
         ("fig16", DLE(3.7, B=0.2), [root, root, -3.2]),
         ("rotating", DLE(3.7, B=0.2), [root, root, -0.5]),
-        ("bistable", DLE(7.6), [1.0, 0.5, 0.3]),
-        ("ejected", Disk(0.042), [2.0, 0.02, -0.02, 0.0]),
+        ("bistable", DLE(7.6), [-2.0, -0.6, 0.0]),
+        ("ejected", Disk(0.042), [3.0, 0.005, 0.0, 0.0]),
         ("relaxed", damped, [0.0, 0.001, 0.04, 0.0]),
     ]
 

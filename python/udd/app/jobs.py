@@ -132,10 +132,7 @@ class Jobs:
                 continue
             job.state = "running"
             job.tell()
-            try:
-                await _run(job)
-            finally:
-                _kill(job)
+            await _run(job)
             if job.state == "running":  # its process ended without a word
                 job.state = "failed"
                 job.answer = {
@@ -155,14 +152,23 @@ async def _run(job: Job) -> None:
         limit=_LINE,
     )
     assert job.process.stdin is not None and job.process.stdout is not None
-    job.process.stdin.write((json.dumps(job.asked) + "\n").encode())
+    try:
+        await _talk(job, job.process.stdin, job.process.stdout)
+    finally:
+        _kill(job)
+        await job.process.wait()
+
+
+async def _talk(job: Job, to: asyncio.StreamWriter, back: asyncio.StreamReader) -> None:
+    to.write((json.dumps(job.asked) + "\n").encode())
     with contextlib.suppress(ConnectionError):
-        await job.process.stdin.drain()
-    async for line in job.process.stdout:
+        await to.drain()
+        to.close()
+        await to.wait_closed()
+    async for line in back:
         if job.state != "running":
             break
         _take(job, json.loads(line))
-    await job.process.wait()
 
 
 def _take(job: Job, message: dict[str, Any]) -> None:

@@ -92,11 +92,15 @@ def _is_local(host: str) -> bool:
 def _listen(host: str, port: int) -> socket.socket:
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listening = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise UddError(f"{host}:{port} cannot be served: {error.strerror or error}") from None
+    listening = socket.socket(family, kind, protocol)
+    try:
         if sys.platform != "win32":
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
         listening.listen(64)
     except OSError as error:
+        listening.close()
         raise UddError(f"{host}:{port} cannot be served: {error.strerror or error}") from None
     return listening

@@ -26,6 +26,7 @@ from . import limits
 
 OUT = Path("out")
 _PICTURES_EVERY = 0.2  # s between the frames that are shown
+_CUT = 0.01  # share of the promised frames that may be missing
 _PICTURE = 480  # pixels, the longer side of what is shown
 
 Tell = Callable[[dict[str, Any]], None]
@@ -50,7 +51,7 @@ def main() -> None:
         done["warnings"] = [str(w.message) for w in warned if issubclass(w.category, UserWarning)]
         tell({"done": done})
     except UddError as error:
-        tell({"error": _sentence(error)})
+        tell({"error": _sentence(error, asked.get("file", ""))})
     except MemoryError:
         tell({"error": "This takes more memory than a job may have."})
 
@@ -65,8 +66,11 @@ def _limit() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limits.MEMORY, limits.MEMORY))
 
 
-def _sentence(error: Exception) -> str:
+def _sentence(error: Exception, file: str) -> str:
+    """What is wrong, without the name that the file has here."""
     text = " ".join(str(error).split())
+    if file:
+        text = text.removeprefix(f"{file}: ").replace(file, "the file")
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?", ")")) else ".")
 
 
@@ -122,8 +126,11 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
     def watch(seen: Glimpse) -> None:
         nonlocal last
         now = time.monotonic()
-        if seen.picture.index >= limits.FRAMES:
-            raise TrackError(f"the film has more than {limits.FRAMES} frames")
+        if seen.frames > limits.FRAMES:
+            raise TrackError(f"the film has {seen.frames} frames; at most {limits.FRAMES} are tracked here")
+        if seen.frames < (1 - _CUT) * film.promised:
+            missing = film.promised - seen.frames
+            raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
         if now - last < _PICTURES_EVERY and seen.picture.index + 1 < seen.frames:
             return
         if last == 0.0:
@@ -139,12 +146,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
             frame["centre"] = [factor * c for c in seen.centre]
         tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
 
-    measured = track_in_detail(file, disk_radius=radius, watch=watch).measurement
-    missing = int(measured.meta.get("frames_missing", 0))
-    whole = missing + len(measured)
-    if missing > 0.01 * whole:
-        raise TrackError(f"the film is cut off: {missing} of its {whole} frames are missing")
-    return measured
+    return track_in_detail(file, disk_radius=radius, watch=watch).measurement
 
 
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:

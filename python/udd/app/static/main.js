@@ -64,6 +64,7 @@ class Page {
       this.sections.offer(model.kind);
       this.diagram.offer(model.kind);
       this.phase.forget();
+      for (const e of document.querySelectorAll(".beyond")) e.hidden = model.kind !== "disk";
     }
     if (!keepTrail) {
       for (const trail of this.trails) trail.clear();
@@ -349,7 +350,7 @@ class Page {
     $("over").hidden = !ended;
     if (!ended) return;
     const unit = this.home.model.kind === "disk" ? "second" : "unit_of_time";
-    $("over-text").textContent = t(ended.outcome, { t: t(unit, { x: ended.t.toFixed(2) }) });
+    $("over-text").textContent = t(`ended_${ended.outcome}`, { t: t(unit, { x: ended.t.toFixed(2) }) });
   }
 }
 
