@@ -178,6 +178,9 @@ def score_columns(
 def filter(
     model: Model, data: _Data, start: _Start, diffusion: list[float], windows: list[tuple[int, int]]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
+def innovations(
+    model: Model, data: _Data, start: _Start, diffusion: list[float], vague: list[float]
+) -> _Floats: ...
 def predict(
     model: Model, sets: list[_Values], film: list[int], t0: _Floats, states: _Floats, times: _Floats
 ) -> _Floats: ...

@@ -315,7 +315,7 @@ def _starts(
     fitted: Fit, film: int, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
-    data = data_of(part, replace(fitted.noise, weight=np.ones(len(part.t))), part.states[:, 0])
+    data = data_of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
     (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], list(fitted.problem.diffusion)
     own = fitted.models[film]
     order = list(own.parameters)

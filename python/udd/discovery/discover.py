@@ -125,9 +125,9 @@ def discover(
         error_before=before,
         error_after=end.errors,
         ratio=search.improvement(before, end.errors) if found else (1.0, 1.0, 1.0),
-        scans=end.scans,
-        curves=end.curves,
-        looks=search.looks,
+        scans=[sorted(look.library.scored, key=lambda s: -s.chi2) for look in end.looks],
+        curves=[look.curves for look in end.looks],
+        looks=[look.looks for look in end.looks],
         split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=end.part,
     )

@@ -137,11 +137,11 @@ def _scan_waves(fit: Fit, model: OwnModel) -> list[Scored]:
             slot = by_state[one.effect.slots[0].removesuffix("'")]
             value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
             columns.append(moved.columns(slot, value, np.zeros(value.shape)))
-        for one, score, full in zip(
-            some, score_forcings(fit, columns), score_forcings(fit, columns, known=True), strict=True
-        ):
-            alone = np.diag(full.information) * scatter
-            result.append(_score(one, score.gradient * scatter, score.information * scatter, alone, scatter))
+        for one, score in zip(some, score_forcings(fit, columns), strict=True):
+            gradient, information, alone = (
+                scatter * part for part in (score.gradient, score.information, score.alone)
+            )
+            result.append(_score(one, gradient, information, alone, scatter))
     return result
 
 

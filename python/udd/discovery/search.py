@@ -86,15 +86,20 @@ class Look:
     library : Scan
     curves : list of Curve
         The likeliest first.
+    looks : int
+        How many scores could have been the best, around all fits that were tried.
     """
 
     fit: Fit
     library: Scan
     curves: list[Curve]
+    looks: int
 
-    def passing(self, looks: int) -> list[Scored]:
+    def passing(self) -> list[Scored]:
         """The candidates that chance does not explain, the strongest first."""
-        usable = [s for s in self.library.scored if s.physical and not s.absorbed and s.p * looks < ALPHA]
+        usable = [
+            s for s in self.library.scored if s.physical and not s.absorbed and s.p * self.looks < ALPHA
+        ]
         return sorted(usable, key=lambda s: -round(s.chi2, 3))
 
     def nats(self, scored: Scored) -> float:
@@ -248,14 +253,13 @@ def _unused(current: Fit, name: str) -> str:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where a search ended: fits of the first part and of all data, errors, what was done and seen."""
+    """Where a search ended: fits of the first part and of all data, errors, what was seen and done."""
 
     part: Fit
     whole: Fit
     errors: Errors
     accepted: list[Step]
-    scans: list[list[Scored]]
-    curves: list[list[Curve]]
+    looks: list[Look]
 
 
 class Search:
@@ -271,7 +275,6 @@ class Search:
     ) -> None:
         self.record, self.held, self.tell = record, held, tell
         self.unit, self.given = unit, given
-        self.looks: list[int] = []
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -289,22 +292,19 @@ class Search:
     def run(self, base: Fit, whole: Fit, before: Errors) -> Outcome:
         """Add effects until none passes."""
         accepted: list[Step] = []
-        scans: list[list[Scored]] = []
-        curves: list[list[Curve]] = []
+        looks: list[Look] = []
         states = [State(base, whole, before)]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = self._look(states[-1].part)
-            scans.append(sorted(look.library.scored, key=lambda s: -s.chi2))
-            curves.append(look.curves)
-            found = self._addition(states[-1], look)
+            looks.append(self._look(states[-1].part))
+            found = self._addition(states[-1], looks[-1])
             if found is None:
                 break
             accepted.append(found[0])
             states.append(found[1])
-            self._prune(accepted, states)
+            self._prune(accepted, states, looks)
         end = states[-1]
-        return Outcome(end.part, end.whole, end.errors, accepted, scans, curves)
+        return Outcome(end.part, end.whole, end.errors, accepted, looks)
 
     def _look(self, fitted: Fit) -> Look:
         """Score every candidate and curve around the fit and, where it explains little, around a looser one.
@@ -320,9 +320,8 @@ class Search:
             scanned = scan(current, [*library(current.model, self.given), *best])
             curves = scan_curves(current)
             looks += len(scanned.scored) + len(rippled) + curves.looks
-            found.append(Look(current, scanned, curves.curves))
-        self.looks.append(looks)
-        return max(found, key=Look.strongest)
+            found.append(Look(current, scanned, curves.curves, 0))
+        return replace(max(found, key=Look.strongest), looks=looks)
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
         """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
@@ -330,16 +329,15 @@ class Search:
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
-        looks = self.looks[-1]
-        passing = look.passing(looks)
+        passing = look.passing()
         singles = self._singles(current, passing)
         if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             singles += self._rivals(current, look, max(look.nats(s) for s in passing))
-        likely = _states_first([c for c in look.curves if c.p * looks < ALPHA])[:_CURVES]
+        likely = _states_first([c for c in look.curves if c.p * look.looks < ALPHA])[:_CURVES]
         return (
-            self._accept(current, singles, look, looks)
+            self._accept(current, singles, look)
             or self._pair(current, look)
-            or self._accept(current, self._curves(current, likely), look, looks)
+            or self._accept(current, self._curves(current, likely), look)
         )
 
     def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
@@ -372,7 +370,7 @@ class Search:
                 continue
             self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
             trials.append(_of_library(current.part, [a.candidate, b.candidate], [0.0] * columns))
-        return self._accept(current, [t for t in trials if t], look, len(best))
+        return self._accept(current, [t for t in trials if t], replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
@@ -388,7 +386,7 @@ class Search:
                 trials.append(_of_formula(current.part, located.curve, written))
         return [t for t in trials if t]
 
-    def _prune(self, accepted: list[Step], states: list[State]) -> None:
+    def _prune(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
         """Leave out effects that a later one makes needless.
 
         A wrong form of the library takes up a part of what an effect outside of it does.
@@ -400,20 +398,16 @@ class Search:
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
             before = states[k]
-            found = self._accept(
-                before, self._curves(before, [last.curve]), self._look(before.part), self.looks[-1]
-            )
+            found = self._accept(before, self._curves(before, [last.curve]), looks[k])
             if found is None:
                 continue
             both, alone = self._level(states[-1].part, found[1].part)
             more = sum(c.parameters for step in accepted[k:-1] for c in step.candidates)
             if alone.chi2 < both.chi2 + _price(both) * more * max(both.scatter, 1.0):
-                accepted[k:], states[k + 1 :] = [found[0]], [found[1]]
+                accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
                 return
 
-    def _accept(
-        self, current: State, trials: list[Trial], look: Look, looks: int
-    ) -> tuple[Step, State] | None:
+    def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         if not trials:
@@ -434,7 +428,7 @@ class Search:
                 continue
             before, after = self._level(current.whole, whole.fit)
             fall = (before.chi2 - after.chi2) / after.inflation(before)
-            p = min(float(chi2.sf(fall, trial.freedom)) * looks, 1.0)
+            p = min(float(chi2.sf(fall, trial.freedom)) * look.looks, 1.0)
             if p >= ALPHA:
                 continue
             try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,10 @@ class Noise:
     blur: Array
     weight: Array
     memory: Array
+
+    def everywhere(self, frames: int) -> Noise:
+        """The same noise in another record, in which no frame is odd."""
+        return replace(self, weight=np.ones(frames))
 
     def sd(self, record: Record, omega: Array) -> Array:
         """Standard deviation of every frame and channel, (n, m)."""

@@ -113,7 +113,7 @@ def filtered(
 
     All parameters are a fit's.
     """
-    data = data_of(record, replace(fitted.noise, weight=np.ones(len(record.t))), record.states[:, 0])
+    data = data_of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
     pairs = [(int(a), int(b)) for a, b in windows]
     return _core.filter(fitted.model, data, (record.states, list(fitted.point.sets)), list(diffusion), pairs)
 
@@ -170,7 +170,7 @@ def held(fitted: Fit, record: Record, level: int) -> Fit:
     A wrong model may not get that far: the level of the result says how far it got.
     """
     problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
-    problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
+    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
     start = replace(fitted.point, states=record.states)
     return tighten(fitted.measurements, problem, start, problem.schedule[: level + 1])
 
