@@ -34,6 +34,7 @@ _PUBLIC = {
     "covariant_vectors": "udd.spectra",
     "discover": "udd.discovery",
     "effects": "udd.effects",
+    "energy_books": "udd.energy",
     "ensemble": "udd.ensembles",
     "errors": "udd.errors",
     "fit": "udd.fitting",
@@ -65,6 +66,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
     from udd.discovery.pruning import prune as prune
+    from udd.energy import energy_books as energy_books
     from udd.ensembles import Ensemble as Ensemble
     from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning

@@ -62,6 +62,7 @@ class Film:
         with self._open() as container:
             stream = container.streams.video[0]
             self.promised = int(stream.frames)  # 0 where the container does not say
+            self.size = (int(stream.codec_context.width), int(stream.codec_context.height))
             rate = stream.average_rate or stream.guessed_rate
             self.fps = float(rate) if rate else math.nan
             pixel = stream.codec_context.pix_fmt or ""

@@ -65,9 +65,14 @@ class Held:
 
 
 def follow(
-    pictures: Iterable[Picture], known: Known, tick: Callable[[int], object] = lambda _: None
+    pictures: Iterable[Picture],
+    known: Known,
+    tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
 ) -> Tracks:
-    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held."""
+    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held.
+
+    After each picture `tick` is told where the disk is in it, NaN where it is not held.
+    """
     tracks = Tracks([], [], [], [], [], [], [], [], [])
     past: list[Held] = []
     last: NDArray[np.uint8] | None = None
@@ -78,7 +83,7 @@ def follow(
         if fit is not None:
             rate = motion.turn / known.exposure if known.exposure > 0 else 0.0
             past = [*past[-2:], Held(picture.t, pose, rate)]
-        tick(picture.index)
+        tick(picture, pose)
     return tracks
 
 

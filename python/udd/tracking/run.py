@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Any
 
@@ -18,13 +18,16 @@ from .decode import Film, Picture, TrackError
 from .disk import Outline
 from .exposure import at_middle
 from .find import sightings
+from .glimpse import Glimpse
 from .lens import Lens
+from .look import Pose
 from .loop import Known, Tracks, follow
 from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
 from .result import Camera, metres, recount
+from .rgb import rgb
 from .survey import Survey, slowest, survey
 
 FEWEST_SIGHTS = 3  # survey frames that must show all four marks
@@ -98,8 +101,9 @@ def track_in_detail(
     disk_radius: float = 0.08,
     pivot: tuple[float, float] | None = None,
     progress: bool = False,
+    watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
-    """As `track`, with everything that was found on the way, in pixels."""
+    """As `track`, with everything that was found on the way, in pixels; `watch` is told of each frame."""
     try:
         radius = float(disk_radius)
     except (TypeError, ValueError):
@@ -116,7 +120,7 @@ def track_in_detail(
             f"{len(seen)} of {len(look_over.pictures)} frames looked at show all four"
         )
     known, rim = prepare(film, look_over, sights, seen)
-    tracks = _follow(film, known, look_over.frames, progress)
+    tracks = _follow(film, known, look_over.frames, progress, watch)
     centre, angle = at_middle(
         np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure
     )
@@ -137,13 +141,19 @@ def track_in_detail(
     return Tracking(measurement, tracks, known, camera, rim)
 
 
-def _follow(film: Film, known: Known, frames: int, progress: bool) -> Tracks:
-    if not progress:
-        return follow(film.pictures(), known)
+def _follow(
+    film: Film, known: Known, frames: int, progress: bool, watch: Callable[[Glimpse], object] | None
+) -> Tracks:
     from tqdm import tqdm
 
-    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}") as bar:
-        return follow(film.pictures(), known, lambda _: bar.update())
+    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
+
+        def tick(picture: Picture, pose: Pose) -> None:
+            bar.update()
+            if watch is not None:
+                watch(Glimpse(picture, pose, known.look, frames, film.full_range))
+
+        return follow(film.pictures(), known, tick)
 
 
 def _camera(
@@ -224,7 +234,7 @@ def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[ND
     film = Film(video)
     for picture in film.pictures():
         if picture.index in wanted:
-            found[picture.index] = _rgb(picture, film.full_range)
+            found[picture.index] = rgb(picture, film.full_range)
             if len(found) == len(wanted):
                 break
     lost = wanted - set(found)
@@ -241,29 +251,11 @@ def pictures_between(video: str | os.PathLike[str], t: NDArray[np.float64]) -> I
     for picture in film.pictures(float(t[0])):
         while want is not None and before is not None and picture.t > want:
             nearest = before if want - before.t < picture.t - want else picture
-            yield _rgb(nearest, film.full_range)
+            yield rgb(nearest, film.full_range)
             want = next(wanted, None)
         if want is None:
             return
         before = picture
     while want is not None and before is not None:
-        yield _rgb(before, film.full_range)
+        yield rgb(before, film.full_range)
         want = next(wanted, None)
-
-
-def _rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
-    import cv2
-
-    h, w = picture.y.shape
-    if not full_range and h % 2 == w % 2 == 0:  # OpenCV knows these: twenty times faster
-        codes = np.concatenate([picture.y.ravel(), picture.u.ravel(), picture.v.ravel()])
-        known = cv2.cvtColor(codes.reshape(h * 3 // 2, w), cv2.COLOR_YUV2RGB_I420)
-        return np.asarray(known, dtype=np.uint8)
-    y, u, v = (
-        cv2.resize(p, (w, h), interpolation=cv2.INTER_LINEAR).astype(np.float32)
-        for p in (picture.y, picture.u, picture.v)
-    )
-    if not full_range:
-        y, u, v = (y - 16) * (255 / 219), (u - 128) * (255 / 224) + 128, (v - 128) * (255 / 224) + 128
-    planes = np.clip(np.round(np.dstack([y, v, u])), 0, 255).astype(np.uint8)
-    return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YCrCb2RGB), dtype=np.uint8)
