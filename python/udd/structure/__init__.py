@@ -1,0 +1,1 @@
+"""The bifurcation structure: equilibria, cycles, how they change with parameters."""
