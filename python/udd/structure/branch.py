@@ -180,5 +180,8 @@ class Branch:
     def __repr__(self) -> str:
         ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}" if len(self) else "nowhere"
         found = "; ".join(f"{point.kind} at {point.value:.10g}" for point in self.points)
-        mirror = "symmetric " if self.symmetric else ""
-        return f"<Branch of {mirror}{self.kind}s, {self.parameter} = {ends}, {len(self)} points: {found or 'no bifurcation'}>"
+        what = "equilibria" if self.kind == "equilibrium" else "cycles"
+        what = f"symmetric {what}" if self.symmetric else what
+        return (
+            f"<Branch of {what}, {self.parameter} = {ends}, {len(self)} points: {found or 'no bifurcation'}>"
+        )

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from .flow import Flight, Floats, Flow
 from .path import _DENSE
 
 __all__ = ["CycleCurve"]
+
+
+@lru_cache(maxsize=16)
+def _pattern(m: int, r: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of the matrix of the equations.
+
+    In this order: the pieces' derivatives, the nodes after them, the span, the parameter, and the phase.
+    """
+    n = m * r
+    own, each = np.arange(n), np.arange(n).reshape(m, r)
+    rows = [np.repeat(own, r), own, own, own, np.full(r, n)]
+    after = np.roll(each, -1, axis=0).ravel()
+    columns = [np.repeat(each, r, axis=0).ravel(), after, np.full(n, n), np.full(n, n + 1), np.arange(r)]
+    return np.concatenate(rows), np.concatenate(columns)
 
 
 @dataclass(eq=False)
@@ -60,7 +76,8 @@ class CycleCurve:
 
     def nodes(self, u: Floats) -> Floats:
         """The nodes (m, r)."""
-        return u[:-2].reshape(self.pieces, -1) * self.flow.size * np.sqrt(self.pieces)
+        nodes: Floats = u[:-2].reshape(self.pieces, -1) * self.flow.size * np.sqrt(self.pieces)
+        return nodes
 
     def span(self, u: Floats) -> float:
         """The time until the orbit closes."""
@@ -122,16 +139,10 @@ class CycleCurve:
             dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
             dense[n, :r] = self.across * size / weight
             return residual, dense
-        blocks = sparse.block_diag(list(by_state), format="csr")
-        ones = sparse.kron(
-            sparse.csr_array(np.roll(np.eye(m), 1, axis=1)), sparse.csr_array(np.eye(r)), format="csr"
-        )
-        gap_rows = sparse.hstack(
-            [blocks - ones / weight, by_span.reshape(n, 1), by_value.reshape(n, 1)], format="csr"
-        )
-        row = np.zeros((1, n + 2))
-        row[0, :r] = self.across * size / weight
-        return residual, sparse.csr_array(sparse.vstack([gap_rows, row], format="csr"))
+        minus = np.full(n, -1.0 / weight)
+        row = self.across * size / weight
+        data = np.concatenate([by_state.ravel(), minus, by_span.ravel(), by_value.ravel(), row])
+        return residual, sparse.csr_array((data, _pattern(m, r)), shape=(n + 1, n + 2))
 
     def closing(self, u: Floats) -> Floats:
         """The derivative (r, r) of the map from the first node to where the orbit closes."""

@@ -13,15 +13,17 @@ from udd.branching.coordinates import coordinates_of
 from udd.errors import ModelError
 from udd.models import Model
 
-__all__ = ["Flight", "Flow", "Floats", "flow_of"]
+__all__ = ["Flight", "Floats", "Flow", "flow_of"]
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Flight:
-    """Where pieces of orbits end: states (m, r), derivatives by the starts (m, r, r), by up to two
-    parameters (m, r, 2), and rates (m, r)."""
+    """Where pieces of orbits end.
+
+    States (m, r), derivatives by the starts (m, r, r) and by up to two parameters (m, r, 2), rates (m, r).
+    """
 
     x: Floats
     by_state: Floats
@@ -131,7 +133,9 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13) -> Flow:
     """
     if not isinstance(model, Model):
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
-    found = coordinates_of(model, states)
+    # A component that happens to be small is no smaller than a tenth of the largest.
+    seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
+    found = coordinates_of(model, seen)
     # At states of no particular kind; the same in every process.
     finite = np.where(np.isfinite(found.size), found.size, 1.0)
     probes = finite * np.random.default_rng(2).uniform(-0.9, 0.9, (8, len(finite)))

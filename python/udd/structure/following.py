@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,13 +12,13 @@ from udd.errors import IntegrationError
 
 from .branch import BifurcationPoint, Branch
 from .cycle_curve import CycleCurve
-from .equilibria import rest_at
 from .flow import Floats
 from .kinks import corner_ahead
 from .locating import error_of, found_between, point_at
 from .orbits import closes_earlier, cycle_at, pieces_for
 from .path import Lost, Place, advance, correct, tangent_at
 from .rest_curve import RestCurve
+from .rests import rest_at
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
@@ -33,6 +34,8 @@ _NAMES = {
     "Hopf": "torus",
     "Neimark-Sacker": "torus",
 }
+_WATCHED = 6  # points in which a branch shows that it comes to a connection,
+_CONVERGED = 1e-11  # by this relative change of its parameter
 _ASIDE = 1e-9  # from a corner, in scaled unknowns
 _SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
 
@@ -124,9 +127,9 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
                     way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
                     way.end = _birth(curve, place, here)
                     return way
-                error = _error(curve, here, sigma, place, gone, kind)
+                bound = _error(curve, here, sigma, place, gone, kind)
                 solution = solution_at(curve, place.u)
-                point = point_at(curve, parameter, kind, place, solution, arclength + sigma, error)
+                point = point_at(curve, parameter, kind, place, solution, arclength + sigma, bound)
                 way.points.append(point)
                 if limits.until(point):
                     way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
@@ -147,6 +150,9 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
             after = replace(after, fold=float(there.tangent[-1]))
         here, signs = there, after
         way.places.append((curve, here, signs, arclength))
+        if isinstance(curve, CycleCurve) and (near := _connection(way)) is not None:
+            way.end = f"a connection near {near:.13g}: the period grows without bound"
+            return way
         if len(way.places) > 8 and _back(way.places[0], here, curve, step):
             way.end = "the branch is closed"
             return way
@@ -183,7 +189,9 @@ def _cut(curve: AnyCurve, here: Place, gone: float, way: Way, arclength: float, 
     try:
         u = correct(curve, guess, row)
         place = Place(u, tangent_at(curve, u, here.tangent))
-        way.places.append((curve, place, signs_at(curve, place), arclength + float(np.linalg.norm(u - here.u))))
+        way.places.append(
+            (curve, place, signs_at(curve, place), arclength + float(np.linalg.norm(u - here.u)))
+        )
     except (Lost, IntegrationError):
         pass  # the last point is inside
     return bound
@@ -211,6 +219,20 @@ def _prepared(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Place]:
     fresh.seen = curve.seen
     fresh.fix_phase(place.u)
     return fresh, Place(place.u, tangent_at(fresh, place.u, place.tangent))
+
+
+def _connection(way: Way) -> float | None:
+    """Where the parameter has come to a stand while the period goes on growing."""
+    if len(way.places) < _WATCHED:
+        return None
+    last = [
+        (curve, place.u) for curve, place, _, _ in way.places[-_WATCHED:] if isinstance(curve, CycleCurve)
+    ]
+    values = [curve.value(u) for curve, u in last]
+    spans = [curve.span(u) for curve, u in last]
+    still = max(values) - min(values) < _CONVERGED * max(abs(value) for value in values)
+    growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > 1.05 * spans[0]
+    return values[-1] if still and growing else None
 
 
 def _back(first: tuple[AnyCurve, Place, Signs, float], here: Place, curve: AnyCurve, step: float) -> bool:

@@ -15,8 +15,10 @@ _BEYOND = 1e-7  # so far beyond the corner the law of the other side is asked, i
 
 
 def corner_ahead(curve: RestCurve, here: Place, step: float) -> tuple[Place, Place, int] | None:
-    """The corner within the next step, if there is one: the place with the tangent that arrives there, with
-    the tangent that leaves it, and which surface it is."""
+    """The corner within the next step, if there is one.
+
+    The place with the tangent that arrives there, with the tangent that leaves it, and which surface it is.
+    """
     values = curve.at(here.u).surfaces
     if not len(values):
         return None

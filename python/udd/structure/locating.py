@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy import optimize
 
@@ -17,6 +15,7 @@ from .solutions import Equilibrium, PeriodicOrbit
 __all__ = ["error_of", "found_between", "locate", "point_at"]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
+_STILL = 1e-5  # a tangent with less of the parameter
 _COARSE = 100.0  # by this factor runs are less accurate where the error is told
 
 
@@ -43,15 +42,18 @@ def found_between(
     for name in changed:
         if name == "plus" and "fold" in changed:
             continue
+        if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
+            continue
         try:
-            sigma, place = locate(curve, a, step, lambda signs, name=name: float(getattr(signs, name)))
+            sigma, place = locate(curve, a, step, name)
         except (Lost, ValueError):
             continue
         here = signs_at(curve, place)
         if name == "fold":
             kind = "fold" if "plus" in changed else "end"
         elif name == "plus":
-            kind = "branch point"
+            # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
+            kind = "branch point" if abs(here.fold) > _STILL else "fold"
         elif name == "minus":
             symmetric = isinstance(curve, CycleCurve) and bool((curve.mirror < 0).any())
             kind = "symmetry breaking" if symmetric else "period doubling"
@@ -71,10 +73,8 @@ def _on_axis(pair: complex) -> bool:
     return abs(pair.real) < 1e-6 * abs(pair.imag)
 
 
-def locate(
-    curve: RestCurve | CycleCurve, a: Place, step: float, function: Callable[[Signs], float]
-) -> tuple[float, Place]:
-    """The zero of a function between `a` and the point at the distance `step` after it.
+def locate(curve: RestCurve | CycleCurve, a: Place, step: float, name: str) -> tuple[float, Place]:
+    """The zero of one of the functions between `a` and the point at the distance `step` after it.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def locate(
     def at(sigma: float) -> float:
         u = correct(curve, a.u + sigma * a.tangent, a.tangent)
         cache[sigma] = Place(u, tangent_at(curve, u, a.tangent))
-        return function(signs_at(curve, cache[sigma]))
+        return float(getattr(signs_at(curve, cache[sigma]), name))
 
     sigma = float(optimize.brentq(at, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
     if sigma not in cache:

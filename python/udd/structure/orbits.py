@@ -68,10 +68,10 @@ def periodic_orbit(
     Notes
     -----
     The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
-    Prince's method of order 8 where the law has no power series), with derivatives from dual numbers; Newton's
-    method closes the gaps. Where the law has kinks, runs land on them. A cycle that is its own mirror image
-    is solved for over half its period. Cycles need not be stable: near a chaotic motion's close returns
-    there are unstable ones.
+    Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
+    Newton's method closes the gaps. Where the law has kinks, runs land on them. A cycle that is its own
+    mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's close
+    returns there are unstable ones.
 
     Examples
     --------
@@ -162,9 +162,8 @@ def closed(
     try:
         u = correct(curve, guess, row, patience=30)
     except (Lost, IntegrationError) as error:
-        raise ModelError(
-            f"no cycle of period {span * (2 if (mirror < 0).any() else 1):.6g} is found near the guess: {error}"
-        ) from None
+        about = span * (2 if (mirror < 0).any() else 1)
+        raise ModelError(f"no cycle of period {about:.6g} is found near the guess: {error}") from None
     residual, _ = curve.equations(u)
     ends = curve.nodes(u)
     rest = np.abs(curve.rate_at(flow.values, ends[0]) * flow.clock / flow.size).max()

@@ -19,8 +19,9 @@ _ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
 _NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
 _MOST = 8  # Newton steps from a good guess
 _TURN = 0.95  # least cosine between one tangent and the next
+_MOVED = 0.25  # of a step, from the tangent to the curve
 _STRAIGHT = 0.995  # from here on the next step may be longer
-_DENSE = 240  # unknowns up to which a dense matrix is as fast
+_DENSE = 100  # unknowns up to which a dense matrix is as fast
 
 
 class Lost(Exception):
@@ -106,13 +107,15 @@ def advance(
     reason = "the curve turns too sharply"
     while step >= shortest:
         try:
-            u = correct(curve, here.u + step * here.tangent, here.tangent)
+            guess = here.u + step * here.tangent
+            u = correct(curve, guess, here.tangent)
             tangent = tangent_at(curve, u, here.tangent)
         except (Lost, IntegrationError) as error:
             step, reason = 0.5 * step, str(error)
             continue
         turn = float(tangent @ here.tangent)
-        if turn < _TURN:
+        # A curve that turns no more does not move further: it would be another one.
+        if turn < _TURN or np.linalg.norm(u - guess) > _MOVED * step:
             step *= 0.5
             continue
         # Where the curve is nearly straight steps may grow.

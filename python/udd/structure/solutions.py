@@ -113,7 +113,8 @@ class PeriodicOrbit:
 
         model = self.model.replace(edge="ignore") if hasattr(self.model, "edge") else self.model
         times = np.linspace(0.0, self.period, n + 1)
-        return simulate(model, times, self.state, **{"rtol": 1e-12, "atol": 1e-14, "method": "auto"} | options)
+        tight: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"} | options
+        return simulate(model, times, self.state, **tight)
 
     def __repr__(self) -> str:
         stable = "stable" if self.stable else "unstable"

@@ -30,15 +30,17 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[RestCurve | Cycl
     if curve is None or place is None:
         raise ModelError("this bifurcation point was not made by udd.continuation")
     # Nearer and nearer to the point: the branch may bend away from its first direction.
+    made: tuple[RestCurve | CycleCurve, Floats, Floats]
     for size in amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03]):
         if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, CycleCurve):
-            new, base, row = _doubled(curve, place)
+            made = _doubled(curve, place)
         elif point.kind == "Hopf" and isinstance(curve, RestCurve):
-            new, base, row = _from_rest(curve, place)
+            made = _from_rest(curve, place)
         elif point.kind == "branch point":
-            new, base, row = _crossing(curve, place)
+            made = _crossing(curve, place)
         else:
             raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
+        new, base, row = made
         try:
             u = correct(new, base + size * row, row, patience=20)
             if isinstance(new, CycleCurve):
@@ -103,9 +105,7 @@ def _through(curve: CycleCurve, x: Floats, away: Floats) -> CycleCurve:
     return curve
 
 
-def _crossing(
-    curve: RestCurve | CycleCurve, place: Place
-) -> tuple[RestCurve | CycleCurve, Floats, Floats]:
+def _crossing(curve: RestCurve | CycleCurve, place: Place) -> tuple[RestCurve | CycleCurve, Floats, Floats]:
     """The other of two directions that the equations leave free."""
     _, matrix = curve.equations(place.u)
     dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from udd._validate import number
 from udd.errors import ModelError
@@ -18,7 +19,7 @@ from .flow import Floats, Flow, flow_of
 from .following import AnyCurve, Limits, Way, follow
 from .path import Lost, Place, correct, tangent_at
 from .rest_curve import RestCurve
-from .signs import Signs, signs_at
+from .signs import Signs
 from .solutions import Equilibrium, PeriodicOrbit
 from .switching import born_at
 
@@ -58,7 +59,8 @@ def continuation(
     most : int
         Points at most, in either direction.
     period : float, optional
-        A branch of cycles ends where the period exceeds this, by default 100 typical times.
+        A branch of cycles ends where the period exceeds this, by default 40 typical times, or 8
+        times that of the start.
     until : str or callable, optional
         A kind of bifurcation whose first point ends the branch, or what tells it of a
         :class:`BifurcationPoint`.
@@ -76,12 +78,12 @@ def continuation(
 
     Notes
     -----
-    The curve is followed by its arclength (H. B. Keller, 1977): a step along the tangent, then Newton's method
-    in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of pairs of
-    multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method along the
-    arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its period,
-    where losing the symmetry is a multiplier -1. Where an equilibrium meets a surface on which the law has a
-    kink, the branch lands on it and goes on with the other law's tangent.
+    The curve is followed by its arclength (H. B. Keller, 1977): a step along the tangent, then Newton's
+    method in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of
+    pairs of multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method
+    along the arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its
+    period, where losing the symmetry is a multiplier -1. Where an equilibrium meets a surface on which the
+    law has a kink, the branch lands on it and goes on with the other law's tangent.
 
     Examples
     --------
@@ -116,12 +118,18 @@ def continuation(
         curve, place = _at(start, parameter)
     value = curve.value(place.u)
     if not low <= value <= high:
-        raise ModelError(f"the start, at {parameter} = {value:.6g}, lies outside the bounds {low:g} to {high:g}")
-    limit = 100.0 * curve.flow.clock if period is None else number("period", period, above=0.0)
+        raise ModelError(
+            f"the start, at {parameter} = {value:.6g}, lies outside the bounds {low:g} to {high:g}"
+        )
+    own = curve.span(place.u) if isinstance(curve, CycleCurve) else 0.0
+    limit = max(40.0 * curve.flow.clock, 8.0 * own)
+    limit = limit if period is None else number("period", period, above=0.0)
     wanted = _wanted(until)
     limits = Limits(low, high, step, longest, int(most), limit, until=wanted)
     if isinstance(start, BifurcationPoint):
-        return branch_from([follow(curve, place, parameter, limits)], model, parameter, f"born at a {start.kind}")
+        return branch_from(
+            [follow(curve, place, parameter, limits)], model, parameter, f"born at a {start.kind}"
+        )
     up = place if place.tangent[-1] >= 0 else Place(place.u, -place.tangent)
     ways = []
     if direction in ("both", "down"):
@@ -170,7 +178,7 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, P
         old = start._curve
         curve = replace(
             old,
-            flow=flow,
+            flow=replace(old.flow, model=flow.model),
             values=flow.values,
             parameter=index,
             scale=abs(value) or 1.0,
@@ -227,7 +235,8 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
         multipliers.append(own[np.argsort(key, kind="stable")])
     table = np.array(multipliers)
     cycle = isinstance(first, CycleCurve)
-    stable = (np.abs(table) < 1).all(axis=1) if cycle else (table.real < 0).all(axis=1)
+    inside = np.abs(table) < 1 if cycle else table.real < 0
+    stable: NDArray[np.bool_] = np.all(inside, axis=1)
     return Branch(
         model,
         parameter,

@@ -23,7 +23,7 @@ _REST = 1e-9  # rates, in typical sizes per typical time, that are as good as no
 _REACHES = (0.3, 1.0, 3.0, 10.0)  # boxes in which the search starts, in typical sizes
 
 
-def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 256) -> list[Equilibrium]:
+def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128) -> list[Equilibrium]:
     """The equilibria of a model.
 
     Parameters
@@ -58,9 +58,9 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 256
     >>> import udd
     >>> for rest in udd.equilibria(udd.DLE(3.0, B=0.2)):
     ...     print(rest.state.round(6) + 0.0, rest.kind)
-    [0. 0. 5.] saddle
     [-1.732051 -1.732051  0.      ] saddle-focus
     [1.732051 1.732051 0.      ] saddle-focus
+    [0. 0. 5.] saddle
     """
     if not isinstance(model, Model):
         raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
@@ -100,7 +100,9 @@ def _refined(flow: Flow, guess: Floats) -> Floats | None:
     unit = flow.clock / flow.size
 
     def rates(scaled: Floats) -> Floats:
-        return expansion(flow, flow.values, scaled * flow.size).rate * unit
+        found = flow.model.rates(0.0, flow.full(scaled * flow.size))[flow.kept]
+        scaled_rates: Floats = found * unit
+        return scaled_rates
 
     def slopes(scaled: Floats) -> Floats:
         by_state = expansion(flow, flow.values, scaled * flow.size).by_state
