@@ -9,6 +9,7 @@ mod jobs;
 mod lyapunov;
 mod model;
 mod section;
+mod shooting;
 mod simulate;
 
 use pyo3::prelude::*;
@@ -22,6 +23,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     lyapunov::register(module)?;
     section::register(module)?;
     ensemble::register(module)?;
+    shooting::register(module)?;
     estimate::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;
