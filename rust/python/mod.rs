@@ -8,6 +8,7 @@ mod interrupt;
 mod jobs;
 mod lyapunov;
 mod model;
+mod picture;
 mod section;
 mod simulate;
 
@@ -23,6 +24,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     section::register(module)?;
     ensemble::register(module)?;
     estimate::register(module)?;
+    picture::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;
     Ok(())
