@@ -120,6 +120,9 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
         raise TrackError(f"the film's frames of {film.size[0]} x {film.size[1]} pixels are too large")
     if film.promised > limits.FRAMES:
         raise TrackError(f"the film has {film.promised} frames; at most {limits.FRAMES} are tracked here")
+    missing = film.promised - film.packets()
+    if missing > _CUT * film.promised:
+        raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
     tell({"say": "looking over the film"})
     last = 0.0
 
@@ -128,9 +131,6 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
         now = time.monotonic()
         if seen.frames > limits.FRAMES:
             raise TrackError(f"the film has {seen.frames} frames; at most {limits.FRAMES} are tracked here")
-        if seen.frames < (1 - _CUT) * film.promised:
-            missing = film.promised - seen.frames
-            raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
         if now - last < _PICTURES_EVERY and seen.picture.index + 1 < seen.frames:
             return
         if last == 0.0:
