@@ -58,7 +58,10 @@ def score(
     """Compare the rows (t; Y, Z, beta; NaN: not given) with the film's truth."""
     row = matched(t, film, ())
     truth = film.state[row, 1:]
-    bad = np.isin(np.round(film.t[row] * 25).astype(int), [*case.defects.get("black", ()), *case.defects.get("repeated", ())])
+    bad = np.isin(
+        np.round(film.t[row] * 25).astype(int),
+        [*case.defects.get("black", ()), *case.defects.get("repeated", ())],
+    )
     held = film.held[row] & ~bad
     seen = np.isfinite(values).all(axis=1)
     use = seen & film.held[row]

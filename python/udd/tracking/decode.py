@@ -83,19 +83,6 @@ class Film:
         self.full_range = bool(said["full_range"])
         self.light = light_of_codes(self.full_range)  # of each brightness code
 
-    def packets(self) -> int:
-        """Count the coded frames that the file holds, without decoding any."""
-        import av
-
-        count = 0
-        with self._open() as container:
-            try:
-                for packet in container.demux(container.streams.video[0]):
-                    count += packet.size > 0 and not packet.is_corrupt
-            except av.error.FFmpegError:
-                pass  # cut off in the middle of one
-        return count
-
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
         """All frames that decode, in order of presentation, with increasing times.
 
@@ -159,7 +146,9 @@ class _Decoder:
             if index < 0:  # the end: what did not decode
                 self.broken = height
                 return
-            planes = [np.empty(shape, np.uint8) for shape in ((height, width), (rows, columns), (rows, columns))]
+            planes = [
+                np.empty(shape, np.uint8) for shape in ((height, width), (rows, columns), (rows, columns))
+            ]
             if not all(_fill(self.pipe, memoryview(p).cast("B")) for p in planes):
                 break
             yield Picture(index, t, *planes, damaged)

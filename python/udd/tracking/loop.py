@@ -117,9 +117,7 @@ def _one(
     return "", fit, pose, motion
 
 
-def hold(
-    picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]
-) -> Fit | None:
+def hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
     """Align and check; a mark that disagrees with three others is left out."""
     most_off = MOST_OFF + STREAK_OFF * _streak(motion, known.look)
     start = Pose(pose.centre, pose.angle)

@@ -202,9 +202,7 @@ def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
         return second_pass(film.pictures(), known, tracks, lambda _: bar.update())
 
 
-def _camera(
-    tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None
-) -> Camera:
+def _camera(tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None) -> Camera:
     angle, centre = np.array(tracks.angle), np.array(tracks.centre)
     good = np.isfinite(angle)
     found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
