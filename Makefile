@@ -41,7 +41,7 @@ test-rust: ## only the tests of the Rust core; needs no Python
 	cargo test --locked --no-fail-fast
 
 test-python: .venv/.udd ## only the tests of the Python package
-	$(PY) -m pytest
+	$(PY) -m pytest -n auto --dist loadfile
 
 lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
 
