@@ -49,10 +49,10 @@ def discover(
     0.1 % over all candidates together (in those 60 % for white noise, and in all data with the misfits' own
     colour), its amplitudes are physical, and the last 40 % are explained better beyond doubt: with all
     parameters held, the 95 % interval of the costs' ratio excludes 1, and at no horizon do forecasts get
-    worse. All coefficients are refitted and the search goes on; single effects that do not pass are tried in
-    pairs. Forms that the data cannot tell apart are named. Where no effect passes but the model does not
-    explain the data (chi2 per degree of freedom above 2.5), an effect is present that the library does not
-    hold.
+    worse. All coefficients are refitted and the search goes on; effects that do not pass alone are tried in
+    twos and threes. Forms that the data cannot tell apart are named. Where no effect passes but the model
+    does not explain the data (chi2 per degree of freedom above 2.5), an effect is present that the library
+    does not hold.
 
     Parameters
     ----------

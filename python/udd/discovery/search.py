@@ -46,7 +46,7 @@ _FORMULAS = 3  # for each, fitted in full
 
 @dataclass(frozen=True)
 class Step:
-    """An addition that was accepted: one candidate, a pair, or a curve.
+    """An addition that was accepted: one candidate, two or three together, or a curve.
 
     Attributes
     ----------
@@ -330,7 +330,7 @@ class Search:
         return replace(max(found, key=Look.strongest), looks=looks)
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
+        """The best thing to add that passes: an effect of the library, some of them together, or a curve.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
@@ -342,7 +342,8 @@ class Search:
         likely = _states_first([c for c in look.curves if c.p * look.looks < ALPHA])[:_CURVES]
         return (
             self._accept(current, singles, look)
-            or self._pair(current, look)
+            or self._group(current, look, 2)
+            or self._group(current, look, 3)
             or self._accept(current, self._curves(current, likely), look)
         )
 
@@ -373,16 +374,17 @@ class Search:
         self._trying([s.candidate.title for s in best])
         return _fitted(together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best))
 
-    def _pair(self, current: State, look: Look) -> tuple[Step, State] | None:
-        best = look.library.pairs()
+    def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
+        """Several effects at once that pass only together."""
+        best = look.library.groups(size)
         likely = [
-            [a.candidate, b.candidate]
-            for a, b, fall in best[:_TRIED]
-            if a.candidate.effect.name != b.candidate.effect.name
-            and chi2.sf(fall, len(a.amplitudes) + len(b.amplitudes)) * len(best) < ALPHA
+            [s.candidate for s in group]
+            for group, fall in best[:_TRIED]
+            if len({s.candidate.effect.name for s in group}) == size
+            and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
-        self._trying([f"{a.title} with {b.title}" for a, b in likely])
-        nothing = [[0.0 for c in pair for _name in c.amplitude_names] for pair in likely]
+        self._trying([" with ".join(c.title for c in group) for group in likely])
+        nothing = [[0.0 for c in group for _name in c.amplitude_names] for group in likely]
         trials = together(lambda k: _of_library(current.part, likely[k], nothing[k]), range(len(likely)))
         return self._accept(current, _fitted(trials), replace(look, looks=len(best)))
 
