@@ -51,7 +51,10 @@ def browser() -> Iterator[Any]:
 
 
 def until(page: Any, condition: str, seconds: float = 60.0) -> None:
-    """Wait for a condition in JavaScript. (Playwright's own way evaluates text, which the page's policy forbids.)"""
+    """Wait for a condition in JavaScript.
+
+    Playwright's own way evaluates text within the page, which its policy forbids.
+    """
     end = time.monotonic() + seconds
     while not page.evaluate(condition):
         assert time.monotonic() < end, f"{condition} did not come about"

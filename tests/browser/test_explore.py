@@ -228,7 +228,11 @@ def test_others_are_kept_out(opened: Opened, link: str) -> None:
     page = opened.page
     page.goto("about:blank")
     socket = f"ws://{address.netloc}/api/socket?{address.query}"
-    script = "(url) => new Promise((r) => { const s = new WebSocket(url); s.onopen = () => r('open'); s.onclose = () => r('closed'); })"
+    script = """(url) => new Promise((told) => {
+      const socket = new WebSocket(url);
+      socket.onopen = () => told("open");
+      socket.onclose = () => told("closed");
+    })"""
     assert page.evaluate(script, socket) == "closed"
     opened.said.clear()  # the browser says that it was refused
 
