@@ -22,7 +22,7 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery
+.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery bench-tracker
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,7 +41,7 @@ test-rust: ## only the tests of the Rust core; needs no Python
 	cargo test --locked --no-fail-fast
 
 test-python: .venv/.udd ## only the tests of the Python package
-	$(PY) -m pytest
+	$(PY) -m pytest -n auto --dist loadfile
 
 lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
 
@@ -76,6 +76,9 @@ bench-startup: .venv/.udd ## what importing udd takes in seconds, and a long swe
 
 bench-discovery: .venv/.udd ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(PY) benches/python/discovery $(ARGS)
+
+bench-tracker: .venv/.udd ## the tracker on films with every defect in turn (ARGS="--only clean,standard --fast --peers")
+	$(PY) benches/python/tracker $(ARGS)
 
 bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)
 	cd benches/python && PYTHONPATH=. $(CURDIR)/$(PEERS)/python -m peers $(ARGS)

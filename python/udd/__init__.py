@@ -13,17 +13,22 @@ from typing import TYPE_CHECKING, Any
 # imported before it is used, so that `import udd` stays fast. The names must not be those of other modules.
 _PUBLIC = {
     "DLE": "udd.models",
+    "BifurcationPoint": "udd.structure",
+    "Branch": "udd.structure",
+    "Cascade": "udd.structure",
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
+    "Equilibrium": "udd.structure",
     "Fit": "udd.fitting",
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
     "Model": "udd.models",
     "Pendulum": "udd.models",
+    "PeriodicOrbit": "udd.structure",
     "Section": "udd.sections",
     "Spectrum": "udd.spectra",
     "SweepSpec": "udd.sweeping",
@@ -31,16 +36,21 @@ _PUBLIC = {
     "UddError": "udd.errors",
     "basins": "udd.branching",
     "bifurcation": "udd.branching",
+    "cascade": "udd.structure",
+    "continuation": "udd.structure",
     "covariant_vectors": "udd.spectra",
     "discover": "udd.discovery",
     "effects": "udd.effects",
+    "energy_books": "udd.energy",
     "ensemble": "udd.ensembles",
+    "equilibria": "udd.structure",
     "errors": "udd.errors",
     "fit": "udd.fitting",
     "forecast": "udd.forecasting",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
     "paper": "udd.paper",
+    "periodic_orbit": "udd.structure",
     "plot": "udd.plot",
     "poincare": "udd.sections",
     "prune": "udd.discovery",
@@ -65,6 +75,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
     from udd.discovery.pruning import prune as prune
+    from udd.energy import energy_books as energy_books
     from udd.ensembles import Ensemble as Ensemble
     from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning
@@ -88,6 +99,15 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.spectra import Spectrum as Spectrum
     from udd.spectra import covariant_vectors as covariant_vectors
     from udd.spectra import lyapunov_spectrum as lyapunov_spectrum
+    from udd.structure import BifurcationPoint as BifurcationPoint
+    from udd.structure import Branch as Branch
+    from udd.structure import Cascade as Cascade
+    from udd.structure import Equilibrium as Equilibrium
+    from udd.structure import PeriodicOrbit as PeriodicOrbit
+    from udd.structure import cascade as cascade
+    from udd.structure import continuation as continuation
+    from udd.structure import equilibria as equilibria
+    from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec
     from udd.sweeping.sweeps import sweep as sweep
     from udd.tracking import track as track

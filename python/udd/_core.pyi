@@ -69,6 +69,20 @@ class _Crossings(TypedDict):
     t_end: _Floats
     outcome: NDArray[np.uint8]
 
+class _Pieces(TypedDict):
+    x: _Floats
+    by_state: _Floats
+    by_parameter: _Floats
+    rate: _Floats
+
+class _Expansion(TypedDict):
+    rate: _Floats
+    by_state: _Floats
+    by_parameter: _Floats
+    surfaces: _Floats
+    second: _Floats
+    third: _Floats
+
 class _Solution(TypedDict):
     states: _Floats
     sets: list[tuple[list[float], list[float], float]]
@@ -150,6 +164,17 @@ def sections(
     threads: int,
     progress: Callable[[int], object] | None = None,
 ) -> _Crossings: ...
+def shoot(
+    model: Model,
+    values: _Floats,
+    starts: _Floats,
+    t: _Floats,
+    spans: _Floats,
+    wanted: list[int],
+    rtol: float,
+    atol: float,
+) -> _Pieces: ...
+def expansion(model: Model, t: float, x: list[float], all: bool) -> _Expansion: ...
 def solve(
     model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], iterations: int
 ) -> _Solution: ...

@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from . import (
+    app,
     basins,
     bifurcation,
     demo,
@@ -37,6 +38,7 @@ _COMMANDS = (
     forecast,
     discover,
     paper,
+    app,
 )
 
 

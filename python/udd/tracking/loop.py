@@ -14,6 +14,7 @@ from .look import Look, Motion, Pose
 from .marks import MISFIT
 from .pivot import Contact
 from .pose import Fit, align
+from .readout import Readout
 
 Array = NDArray[np.float64]
 CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
@@ -41,6 +42,7 @@ class Tracks:
     complete: list[Array]  # (4,) share of each mark's edges in view
     streak: list[float]  # blur length at the marks [pixels]
     flag: list[str]
+    method: list[str]  # "fast" or "refined", empty where the disk was not held
 
 
 @dataclass
@@ -53,6 +55,7 @@ class Known:
     exposure: float
     white: float  # brightness code of the bare disk
     contact: Contact | None
+    readout: Readout
 
 
 @dataclass(frozen=True)
@@ -65,10 +68,15 @@ class Held:
 
 
 def follow(
-    pictures: Iterable[Picture], known: Known, tick: Callable[[int], object] = lambda _: None
+    pictures: Iterable[Picture],
+    known: Known,
+    tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
 ) -> Tracks:
-    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held."""
-    tracks = Tracks([], [], [], [], [], [], [], [], [])
+    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held.
+
+    After each picture `tick` is told where the disk is in it, NaN where it is not held.
+    """
+    tracks = Tracks(*([] for _ in range(10)))
     past: list[Held] = []
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
@@ -76,9 +84,8 @@ def follow(
         last = picture.y
         _append(tracks, picture.t, flag, fit, pose, _streak(motion, known.look))
         if fit is not None:
-            rate = motion.turn / known.exposure if known.exposure > 0 else 0.0
-            past = [*past[-2:], Held(picture.t, pose, rate)]
-        tick(picture.index)
+            past = [*past[-2:], Held(picture.t, pose, motion.spin)]
+        tick(picture, pose)
     return tracks
 
 
@@ -96,12 +103,12 @@ def _one(
     if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
         motion = _motion(past, guess, picture.t, known)
-        fit = _hold(picture, known, pose, motion, CLOSE)
+        fit = hold(picture, known, pose, motion, CLOSE)
         if fit is not None:
             better = _motion(past, pose, picture.t, known)
             if abs(_streak(better, known.look) - _streak(motion, known.look)) > 0.3:
                 motion = better
-                fit = _hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
+                fit = hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
             return "", fit, pose, motion
     best = _anywhere(picture, known, guess, past)
     if best is None:
@@ -110,7 +117,7 @@ def _one(
     return "", fit, pose, motion
 
 
-def _hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
+def hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
     """Align and check; a mark that disagrees with three others is left out."""
     most_off = MOST_OFF + STREAK_OFF * _streak(motion, known.look)
     start = Pose(pose.centre, pose.angle)
@@ -170,7 +177,7 @@ def _anywhere(
             start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
         for motion in _motions(past, start, picture.t, known, fresh):
             pose = Pose(start.centre, start.angle)
-            fit = _hold(picture, known, pose, motion, FAR)
+            fit = hold(picture, known, pose, motion, FAR)
             if fit is not None:
                 score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
                 if best is None or score > best[0]:
@@ -188,12 +195,10 @@ def _motions(past: list[Held], pose: Pose, t: float, known: Known, fresh: bool) 
     step = 2 * STREAK_STEP / (abs(known.look.marks[0].place) * known.exposure)
     count = int(np.ceil(FASTEST / step))
     rates = step * np.arange(-count, count + 1)
+    speeds = [known.contact.velocity(pose.centre, r) if known.contact else 0j for r in rates]
     return [
-        Motion(
-            (known.contact.velocity(pose.centre, r) if known.contact else 0j) * known.exposure,
-            r * known.exposure,
-        )
-        for r in rates
+        Motion(v * known.exposure, r * known.exposure, rate=v, spin=r)
+        for v, r in zip(speeds, rates, strict=True)
     ]
 
 
@@ -220,7 +225,7 @@ def predict(past: list[Held], t: float, contact: Contact | None) -> Pose | None:
 def _motion(past: list[Held], pose: Pose, t: float, known: Known) -> Motion:
     """Movement during the exposure, from the derivative at `t` of the curve through the last poses."""
     points = [h for h in past[-2:] if t - h.t < 0.5]
-    if not points or known.exposure <= 0:
+    if not points:
         return Motion()
     t1, p1 = points[-1].t, points[-1].pose
     shift, turn = (pose.centre - p1.centre) / (t - t1), (pose.angle - p1.angle) / (t - t1)
@@ -233,7 +238,7 @@ def _motion(past: list[Held], pose: Pose, t: float, known: Known) -> Motion:
         turn = 2 * turn - points[-1].rate  # the mean rate over the step, and the rate at its beginning
     if known.contact is not None:
         shift = known.contact.velocity(pose.centre, turn)
-    return Motion(shift * known.exposure, turn * known.exposure)
+    return Motion(shift * known.exposure, turn * known.exposure, rate=shift, spin=turn)
 
 
 def _streak(motion: Motion, look: Look) -> float:
@@ -254,19 +259,27 @@ def _repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before:
 def _append(tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float) -> None:
     tracks.t.append(t)
     tracks.flag.append(flag)
-    tracks.centre.append(pose.centre)
-    tracks.angle.append(pose.angle)
-    tracks.streak.append(streak)
+    for column in (tracks.centre, tracks.angle, tracks.streak, tracks.method):
+        column.append(None)  # type: ignore[attr-defined]
+    for column in (tracks.information, tracks.leftover, tracks.chi2, tracks.complete):
+        column.append(None)  # type: ignore[arg-type]
+    put(tracks, -1, fit, pose, streak)
+    tracks.method[-1] = "" if fit is None else "fast"
+
+
+def put(tracks: Tracks, k: int, fit: Fit | None, pose: Pose, streak: float) -> None:
+    """Write what was found in a frame into its row."""
+    tracks.centre[k], tracks.angle[k], tracks.streak[k] = pose.centre, pose.angle, streak
     if fit is None:
-        tracks.information.append(np.full((3, 3), np.nan))
-        tracks.leftover.append(np.full((4, 2), np.nan))
-        tracks.chi2.append(np.full(4, np.nan))
-        tracks.complete.append(np.zeros(4))
+        tracks.information[k] = np.full((3, 3), np.nan)
+        tracks.leftover[k] = np.full((4, 2), np.nan)
+        tracks.chi2[k] = np.full(4, np.nan)
+        tracks.complete[k] = np.zeros(4)
         return
     used = fit.used[:, None]
-    tracks.information.append(fit.step.information)
-    tracks.leftover.append(np.where(used, fit.step.leftover, np.nan))
-    tracks.chi2.append(np.where(fit.used, fit.step.chi2, np.nan))
-    tracks.complete.append(
-        np.array([s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)])
+    tracks.information[k] = fit.step.information
+    tracks.leftover[k] = np.where(used, fit.step.leftover, np.nan)
+    tracks.chi2[k] = np.where(fit.used, fit.step.chi2, np.nan)
+    tracks.complete[k] = np.array(
+        [s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]
     )

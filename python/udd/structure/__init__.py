@@ -1,0 +1,20 @@
+"""The bifurcation structure: equilibria and cycles, and how they change with parameters."""
+
+from .branch import BifurcationPoint, Branch
+from .branches import continuation
+from .cascades import Cascade, cascade
+from .orbits import periodic_orbit
+from .rests import equilibria
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = [
+    "BifurcationPoint",
+    "Branch",
+    "Cascade",
+    "Equilibrium",
+    "PeriodicOrbit",
+    "cascade",
+    "continuation",
+    "equilibria",
+    "periodic_orbit",
+]
