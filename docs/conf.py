@@ -37,7 +37,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "udd"
 html_static_path = ["_static"]
 html_css_files = ["udd.css"]
-html_sidebars = {"**": [], "api/*": ["sidebar-nav-bs"]}
+html_sidebars = {"[!a]*": [], "api/*": ["sidebar-nav-bs"]}
 html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": True,

@@ -182,7 +182,7 @@ def spun_down(drives: NDArray[np.float64], start: list[float], time: float = 60.
     title="Spin-down: the drive is lowered, then raised again",
     caption="The full disk with b = 43.6 /m, 60 s at each drive; line: mean of Ω, band: its standard "
     "deviation. Lowered, the rotation "
-    "holds until it turns unstable (5.8 cm/s to first order, where it begins to part). Raised, the "
+    "holds until it turns unstable (below 5.92 cm/s by linear theory). Raised, the "
     "chaotic swings last until they "
     "happen to be caught by a rotating state: at high drives they are a transient. Grey: Ω = √(g W/k₀).",
 )
