@@ -153,7 +153,8 @@ def test_cycles_are_born_at_the_hopf_bifurcation(rotation: udd.Branch) -> None:
     assert "connection" in cycles.ends[1] or "period" in cycles.ends[1]
     # Near by the amplitude grows with the square root of the distance.
     near = udd.continuation(hopf, amplitude=1e-3, step=2e-3, longest=2e-3, most=6)
-    spread, distance = (near.high - near.low)[:, 0], near.values - hopf.value
+    low, high = near.extremes
+    spread, distance = (high - low)[:, 0], near.values - hopf.value
     assert spread[5] / spread[0] > 5.0
     assert spread[5] / spread[0] == pytest.approx(math.sqrt(distance[5] / distance[0]), rel=0.02)
 

@@ -10,6 +10,7 @@ from typing import Any
 from . import (
     basins,
     bifurcation,
+    continuation,
     demo,
     discover,
     film,
@@ -28,6 +29,7 @@ _COMMANDS = (
     lyapunov,
     poincare,
     bifurcation,
+    continuation,
     basins,
     sweep,
     film,

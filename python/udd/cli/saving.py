@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _DATA = (".nc", ".zarr")
-_PICTURES = (".png", ".svg", ".pdf")
+PICTURES = (".png", ".svg", ".pdf")
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:
     """Where to write."""
-    kinds = ", ".join((*_DATA, *_PICTURES))
+    kinds = ", ".join((*_DATA, *PICTURES))
     parser.add_argument(
         "--out",
         type=Path,
@@ -37,8 +37,8 @@ def add_out(parser: argparse.ArgumentParser) -> None:
 def checked(paths: list[Path]) -> None:
     """Refuse what cannot be written, before the work."""
     for path in paths:
-        if path.suffix not in (*_DATA, *_PICTURES):
-            raise UddError(f"{path}: the name must end in {', '.join((*_DATA, *_PICTURES))}")
+        if path.suffix not in (*_DATA, *PICTURES):
+            raise UddError(f"{path}: the name must end in {', '.join((*_DATA, *PICTURES))}")
         if not path.parent.is_dir():
             raise UddError(f"{path}: there is no folder {path.parent}")
         if path.suffix == ".zarr" and path.exists():
@@ -55,13 +55,20 @@ def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -
         elif path.suffix == ".zarr":
             _zarr(path, found)
         else:
-            from matplotlib.figure import Figure
+            save_picture(path, draw)
 
-            figure = Figure(figsize=(7.2, 4.4), layout="constrained")
-            draw(figure.add_subplot())
-            picture = BytesIO()
-            figure.savefig(picture, format=path.suffix[1:], dpi=150)
-            write_whole(path, picture.getvalue())
+
+def save_picture(path: Path, draw: Callable[[Axes], object]) -> None:
+    """Write a picture of one pair of axes, by the ending of its name."""
+    from matplotlib.figure import Figure
+
+    from udd.files import write_whole
+
+    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+    draw(figure.add_subplot())
+    picture = BytesIO()
+    figure.savefig(picture, format=path.suffix[1:], dpi=150)
+    write_whole(path, picture.getvalue())
 
 
 def _zarr(path: Path, found: xr.Dataset) -> None:
