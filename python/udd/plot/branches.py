@@ -181,10 +181,13 @@ def _draw(ax: Axes, branch: Branch, name: str, view: str, section: str | None) -
     rows = _curves(branch, name, view, section)
     every = np.concatenate([part for row in rows for part in row] or [np.zeros(1)])
     near = _NEAR * float(np.ptp(every)) if every.size else 0.0
+    # Between two places; at a bifurcation itself rounding would decide.
+    turning = np.isin(branch.arclength, [point.arclength for point in branch.points])
+    held = np.where(turning[:-1], branch.stable[1:], branch.stable[:-1])
     for stable, shade, style, width in ((True, _STABLE, "-", 1.6), (False, _UNSTABLE, (0, (3, 1.5)), 1.0)):
         segments = []
         for i in range(len(branch) - 1):
-            if bool(branch.stable[i]) != stable:
+            if bool(held[i]) != stable:
                 continue
             for here, there in zip(rows[i], rows[i + 1], strict=True):
                 if not len(there):

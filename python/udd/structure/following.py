@@ -131,8 +131,8 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
                 solution = solution_at(curve, place.u)
                 point = point_at(curve, parameter, kind, place, solution, arclength + sigma, bound)
                 way.points.append(point)
+                way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
                 if limits.until(point):
-                    way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
                     way.end = "the point that was wanted"
                     return way
         value = curve.value(there.u)
@@ -265,6 +265,7 @@ def _round(
             solution = solution_at(curve, place.u)
             error = _error(curve, here, sigma, place, gone, kind)
             way.points.append(point_at(curve, parameter, kind, place, solution, arclength + sigma, error))
+            way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
     arclength += gone
     value = curve.value(arriving.u)
     if not limits.low <= value <= limits.high:
