@@ -29,6 +29,7 @@ _MARKS = {
     "branch point": ("^", "#999999"),
     "kink": ("x", "#999999"),
 }
+_OPEN = 400  # lines that a piece may belong to
 _NEAR = 0.12  # crossings of neighbouring cycles are joined within this part of the picture's height
 
 
@@ -184,30 +185,38 @@ def _draw(ax: Axes, branch: Branch, name: str, view: str, section: str | None) -
     # Between two places; at a bifurcation itself rounding would decide.
     turning = np.isin(branch.arclength, [point.arclength for point in branch.points])
     held = np.where(turning[:-1], branch.stable[1:], branch.stable[:-1])
-    for stable, shade, style, width in ((True, _STABLE, "-", 1.6), (False, _UNSTABLE, (0, (3, 1.5)), 1.0)):
-        segments = []
-        for i in range(len(branch) - 1):
-            if bool(held[i]) != stable:
-                continue
+    for stable, shade, style, width in ((True, _STABLE, "-", 1.6), (False, _UNSTABLE, (0, (4, 2)), 0.9)):
+        lines: list[list[tuple[float, float]]] = []
+        for i in np.flatnonzero(held == stable):
             for here, there in zip(rows[i], rows[i + 1], strict=True):
                 if not len(there):
                     continue
                 same = len(here) == len(there)
                 others = there if same else [there[np.argmin(np.abs(there - a))] for a in here]
-                pairs = zip(here, others, strict=True)
-                x0, x1 = branch.values[i], branch.values[i + 1]
-                segments += [((x0, a), (x1, b)) for a, b in pairs if abs(a - b) <= near or near == 0.0]
-        ax.add_collection(
-            LineCollection(
-                segments,
-                colors=shade,
-                linewidths=width,
-                linestyles=[style],
-                zorder=3,
-                label="stable" if stable else "unstable",
-            )
+                for a, b in zip(here, others, strict=True):
+                    if abs(a - b) <= near or near == 0.0:
+                        _join(lines, (branch.values[i], a), (branch.values[i + 1], b))
+        drawn = LineCollection(
+            lines,
+            colors=shade,
+            linewidths=width,
+            linestyles=[style],
+            zorder=3 if stable else 2.5,
+            label="stable" if stable else "unstable",
         )
+        ax.add_collection(drawn)
     ax.autoscale_view()
+
+
+def _join(
+    lines: list[list[tuple[float, float]]], first: tuple[float, float], last: tuple[float, float]
+) -> None:
+    """Prolong the line that ends where this piece begins, or begin one: dashes run on along a line."""
+    for line in reversed(lines[-_OPEN:]):
+        if line[-1] == first:
+            line.append(last)
+            return
+    lines.append([first, last])
 
 
 def _mark(ax: Axes, given: Sequence[Branch], name: str, view: str, section: str | None) -> None:
@@ -225,7 +234,7 @@ def _mark(ax: Axes, given: Sequence[Branch], name: str, view: str, section: str 
                 linestyle="none",
                 marker=marker,
                 color=shade,
-                markersize=5.5,
+                markersize=4.5,
                 markeredgecolor="black" if marker != "x" else shade,
                 markeredgewidth=0.6,
                 zorder=5,

@@ -170,11 +170,12 @@ def _steps(axis: Floats) -> float:
 
 def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[PeriodicOrbit, float]]:
     """A cycle of each periodic attractor, from the middle of its stretch."""
-    labels = scan["attractor"].to_numpy()
-    periods = scan["period"].to_numpy()
+    kinds = np.stack([scan[name].to_numpy() for name in ("attractor", "period", "symmetric")], axis=-1)
+    periodic = (kinds[..., 0] > 0) & (kinds[..., 1] > 0)
     found = []
-    for label in np.unique(labels[(labels > 0) & (periods > 0)]):
-        places = np.argwhere((labels == label) & (periods > 0))
+    # An attractor keeps its label where it doubles or loses its symmetry.
+    for kind in np.unique(kinds[periodic], axis=0):
+        places = np.argwhere(periodic & (kinds == kind).all(axis=-1))
         path, start, v = places[len(places) // 2]
         value = float(scan[parameter].to_numpy()[v])
         state = [float(scan[name].to_numpy()[path, start, v, 0]) for name in model.state_names]

@@ -169,12 +169,12 @@ def _birth(curve: AnyCurve, place: Place, before: Place) -> str:
     """What it is that the branch begins or ends with."""
     value = curve.value(place.u)
     if isinstance(curve, RestCurve):
-        return f"a branch point near {value:.10g}"
+        return f"a branch point near {value:.5g}"
     size = float(np.ptp(curve.nodes(place.u) / curve.flow.size, axis=0).max())
     if size < _SHRUNK * float(np.ptp(curve.nodes(before.u) / curve.flow.size, axis=0).max()):
-        return f"a Hopf bifurcation near {value:.10g}"
+        return f"a Hopf bifurcation near {value:.5g}"
     kind = closes_earlier(curve, place.u)
-    return f"{kind or 'a branch point'} near {value:.10g}"
+    return f"{kind or 'a branch point'} near {value:.5g}"
 
 
 def _cut(curve: AnyCurve, here: Place, gone: float, way: Way, arclength: float, limits: Limits) -> float:
