@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from films import Case
 from numpy.typing import NDArray
+
 from udd.film import Film
 
 WRONG = (2e-3, 2e-3, 0.1)  # m, m, rad: an error beyond is wrong unless the frame is flagged
@@ -58,7 +59,10 @@ def score(
     """Compare the rows (t; Y, Z, beta; NaN: not given) with the film's truth."""
     row = matched(t, film, ())
     truth = film.state[row, 1:]
-    bad = np.isin(np.round(film.t[row] * 25).astype(int), [*case.defects.get("black", ()), *case.defects.get("repeated", ())])
+    bad = np.isin(
+        np.round(film.t[row] * 25).astype(int),
+        [*case.defects.get("black", ()), *case.defects.get("repeated", ())],
+    )
     held = film.held[row] & ~bad
     seen = np.isfinite(values).all(axis=1)
     use = seen & film.held[row]

@@ -57,10 +57,12 @@ def readout(
 
 
 def _speed(motion: Motion, look: Look) -> float:
-    return abs(motion.rate) + abs(motion.spin * look.places[0])
+    return abs(motion.rate) + abs(motion.spin) * abs(look.marks[0].place)
 
 
-def _compare(y: Plane, pose: Pose, motion: Motion, look: Look, view: NDArray[np.bool_]) -> tuple[float, float]:
+def _compare(
+    y: Plane, pose: Pose, motion: Motion, look: Look, view: NDArray[np.bool_]
+) -> tuple[float, float]:
     """Weighted product of disagreement and displacement per second of readout, and the latter's square."""
     here = Pose(pose.centre, pose.angle)
     fit = align(y, view, look, here, motion, STEPS, gain_slack=0.5)
@@ -81,7 +83,9 @@ def _compare(y: Plane, pose: Pose, motion: Motion, look: Look, view: NDArray[np.
         ]
     )
     # pixels that are known too well would drown the others
-    weight = np.minimum(1.0, 400.0 / np.maximum(np.abs(weight).max(axis=(1, 2)), 1e-9))[:, None, None] * weight
+    weight = (
+        np.minimum(1.0, 400.0 / np.maximum(np.abs(weight).max(axis=(1, 2)), 1e-9))[:, None, None] * weight
+    )
     weight /= 1 + (np.abs(left).max() / FAR) ** 2
     seen = weight @ maps
     normal = np.einsum("kai,kaj->ij", maps, seen)

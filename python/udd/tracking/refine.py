@@ -111,7 +111,9 @@ class Around:
             return None
         powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]
         c, a = powers @ self.centre[near], powers @ self.angle[near]
-        pose = Pose(complex(self.centre[k]), float(self.angle[k])) if held else Pose(complex(c[0]), float(a[0]))
+        pose = (
+            Pose(complex(self.centre[k]), float(self.angle[k])) if held else Pose(complex(c[0]), float(a[0]))
+        )
         h = self.interval
         return Local(
             pose, complex(c[1]) / h, float(a[1]) / h, 2 * complex(c[2]) / h**2, 2 * float(a[2]) / h**2, held

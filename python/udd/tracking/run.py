@@ -74,7 +74,7 @@ def track(
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
     refine : bool
-        Go over the film a second time, with each frame's blur known from its neighbours; without it is faster.
+        Go over the film a second time, with each frame's blur known from its neighbours.
     progress : bool
         Show a progress bar.
 
@@ -192,9 +192,7 @@ def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
         return second_pass(film.pictures(), known, tracks, lambda _: bar.update())
 
 
-def _camera(
-    tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None
-) -> Camera:
+def _camera(tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None) -> Camera:
     angle, centre = np.array(tracks.angle), np.array(tracks.centre)
     good = np.isfinite(angle)
     found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
