@@ -128,7 +128,7 @@ clean: ## remove .venv and everything that was built
 
 .venv/.browser: tests/browser/requirements.txt .venv/.udd
 	@command -v chromium chromium-browser google-chrome >/dev/null || \
-	  $$([ "$$(id -u)" = 0 ] || echo sudo) apt-get install --yes --no-install-recommends chromium
+	  { as=$$([ "$$(id -u)" = 0 ] || echo sudo); $$as apt-get update -qq && $$as apt-get install -qq --yes --no-install-recommends chromium; }
 	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --only-binary :all: -r $<
 	@touch $@
 
