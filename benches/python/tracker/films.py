@@ -48,7 +48,7 @@ CASES = (
     Case("lens", (0.25, 4.0, 0.01), {}, {"lens": 0.03}),
     Case("light uneven, flickers", (0.06, 0.7, 0.01), {}, {"gradient": 0.4, "flicker": 0.1}),
     Case("one mark missing", (0.06, 0.8, 0.02), {}, {"mark_strength": (1.0, 1.0, 1.0, 0.0)}),
-    Case("marks faded", (0.06, 0.8, 0.01), {}, {"mark_strength": (0.45, 0.5, 0.4, 0.45)}),
+    Case("marks faded", (0.06, 0.8, 0.01), {}, {"mark_strength": (0.6, 0.7, 0.6, 0.65)}),
     Case(
         "frames dropped, repeated, black",
         (0.05, 0.7, 0.03),

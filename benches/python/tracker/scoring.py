@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from udd.film import Film
 
 WRONG = (2e-3, 2e-3, 0.1)  # m, m, rad: an error beyond is wrong unless the frame is flagged
+SAID_WITHIN = 2  # frames after which it must be said that the disk has gone
 Array = NDArray[np.float64]
 
 
@@ -74,7 +75,7 @@ def score(
     if "mark_offsets" in case.defects or "mark_strength" in case.defects:
         e[:, 2] -= np.median(e[use, 2])  # where the angle's zero is, is a matter of the marks
     wrong = int((np.abs(e[seen]) > WRONG).any(axis=1).sum())
-    invented = int((seen & ~film.held[row]).sum())
+    invented = max(0, int((seen & ~film.held[row]).sum()) - SAID_WITHIN)
     fair = np.abs(e[use]).copy()
     free = e[use].copy()
     for k in range(2):

@@ -198,11 +198,9 @@ def _motions(past: list[Held], pose: Pose, t: float, known: Known, fresh: bool) 
     step = 2 * STREAK_STEP / (abs(known.look.marks[0].place) * known.exposure)
     count = int(np.ceil(FASTEST / step))
     rates = step * np.arange(-count, count + 1)
-    speeds = [known.contact.velocity(pose.centre, r) if known.contact else 0j for r in rates]
-    return [
-        Motion(v * known.exposure, r * known.exposure, rate=v, spin=r)
-        for v, r in zip(speeds, rates, strict=True)
-    ]
+    if known.contact is not None:
+        return [along_contact(known, pose, r) for r in rates]
+    return [Motion(0j, r * known.exposure, spin=r) for r in rates]
 
 
 def predict(past: list[Held], t: float, contact: Contact | None) -> Pose | None:
@@ -232,16 +230,28 @@ def _motion(past: list[Held], pose: Pose, t: float, known: Known) -> Motion:
         return Motion()
     t1, p1 = points[-1].t, points[-1].pose
     shift, turn = (pose.centre - p1.centre) / (t - t1), (pose.angle - p1.angle) / (t - t1)
+    change = 0.0  # of the rate of turning [rad/s^2]
     if len(points) == 2:
         t0, p0 = points[0].t, points[0].pose
         s0, a0 = (p1.centre - p0.centre) / (t1 - t0), (p1.angle - p0.angle) / (t1 - t0)
         lean = (t - t1) / (t - t0)
+        change = 2 * (turn - a0) / (t - t0)
         shift, turn = shift + (shift - s0) * lean, turn + (turn - a0) * lean
     else:
         turn = 2 * turn - points[-1].rate  # the mean rate over the step, and the rate at its beginning
-    if known.contact is not None:
-        shift = known.contact.velocity(pose.centre, turn)
-    return Motion(shift * known.exposure, turn * known.exposure, rate=shift, spin=turn)
+    if known.contact is None:
+        return Motion(shift * known.exposure, turn * known.exposure, rate=shift, spin=turn)
+    return along_contact(known, pose, turn, change)
+
+
+def along_contact(known: Known, pose: Pose, spin: float, change: float = 0.0) -> Motion:
+    """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
+    contact, open_for = known.contact, known.exposure
+    assert contact is not None
+    rate = contact.velocity(pose.centre, spin)
+    bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
+    half = 0.5 * open_for**2
+    return Motion(rate * open_for, spin * open_for, bending * half, change * half, rate, spin)
 
 
 def _streak(motion: Motion, look: Look) -> float:

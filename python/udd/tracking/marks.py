@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Box = tuple[int, int, int, int]  # rows from, to, columns from, to
 
+FAINT = 0.04  # of full light: a mark that differs by less from the disk is none
 MISFIT = 0.12  # pixels by which edges of real marks, lenses and codecs differ from the ideal shape
 
 
@@ -86,7 +87,11 @@ def locate(
     poses, locals_ = seen_at(look, pose, motion, y.shape[0])
     how = np.array([look.psf if psf is None else psf, look.noise, misfit, gain_slack, look.rim])
     found = _core.locate_marks(y, view, look.light, how, marks, poses, motion.row, locals_, keep)
-    return [None if s is None else _sighting(*s) for s in found]
+    faint = FAINT * float(look.light[-1])
+    return [
+        None if s is None or abs(mark.level) < faint else _sighting(*s)
+        for s, mark in zip(found, look.marks, strict=True)
+    ]
 
 
 def _sighting(

@@ -20,6 +20,9 @@ KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
 FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
 APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
 APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
+LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
+WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
+WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
 FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
 
 
@@ -52,11 +55,13 @@ def refine(
     known: Known,
     first: Tracks,
     tick: Callable[[int], object] = lambda _: None,
+    streaks_only: bool = False,
 ) -> Tracks:
     """Fit every frame again from what the first pass says about it and its neighbours.
 
     A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
-    the first pass lost between two that it held is tried from these.
+    the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
+    streaks stay as they are.
     """
     tracks = replace(
         first,
@@ -64,7 +69,7 @@ def refine(
     )
     around = Around(first)
     for k, picture in enumerate(pictures):
-        if k < len(first.t):
+        if k < len(first.t) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
             _again(picture, k, known, around, tracks)
         tick(picture.index)
     return tracks
@@ -86,8 +91,28 @@ def _again(picture: Picture, k: int, known: Known, around: Around, tracks: Track
     away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
     if away > (APART if here.held else FORESEEN_APART) + APART_BY_STREAK * streak:
         return
+    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.held:
+        return  # two pale streaks agree with much
     put(tracks, k, fit, pose, streak)
     tracks.flag[k], tracks.method[k] = "", "refined"
+
+
+def weak(tracks: Tracks) -> NDArray[np.bool_]:
+    """Frames with long streaks of too few marks, or of marks that disagree."""
+    used = np.array([np.isfinite(c).sum() for c in tracks.chi2])
+    off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.leftover])
+    long = np.array(tracks.streak) > LONG
+    return np.asarray(long & ((used < WEAK_MARKS) | (off > WEAK_OFF + 0.03 * np.array(tracks.streak))))
+
+
+def drop_weak(tracks: Tracks) -> None:
+    """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
+    for k in np.flatnonzero(weak(tracks)):
+        if tracks.flag[k] == "":
+            tracks.flag[k], tracks.method[k] = "lost: too few marks in a long streak", ""
+            tracks.centre[k], tracks.angle[k] = complex(np.nan, np.nan), np.nan
+            tracks.information[k] = np.full((3, 3), np.nan)
+            tracks.chi2[k], tracks.leftover[k] = np.full(4, np.nan), np.full((4, 2), np.nan)
 
 
 class Around:
@@ -96,7 +121,7 @@ class Around:
     def __init__(self, tracks: Tracks) -> None:
         self.t = np.array(tracks.t)
         self.centre, self.angle = np.array(tracks.centre), np.array(tracks.angle)
-        self.good = np.flatnonzero(np.isfinite(self.angle))
+        self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
     def at(self, k: int) -> Local | None:

@@ -17,7 +17,7 @@ from udd.measurement import DISK, Measurement, check_length
 from .decode import Film, Picture, TrackError
 from .disk import Outline
 from .exposure import at_middle
-from .find import sightings
+from .find import COLOURS, FEWEST, sightings
 from .glimpse import Glimpse
 from .lens import Lens
 from .look import Pose
@@ -26,13 +26,13 @@ from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
+from .refine import LONG, drop_weak
 from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
 from .scale import Scale, scale
 from .survey import Survey, slowest, survey
 
-FEWEST_SIGHTS = 3  # survey frames that must show all four marks
 VAGUE = 0.005  # of the disk's radius: a position known no better is not given
 VAGUE_SAYS = "vague: too blurred or hidden to be placed"
 GONE_SAYS = "gone: the disk has left the wheels"
@@ -132,22 +132,27 @@ def track_in_detail(
     distance = None if mark_distance is None else _length(mark_distance, "mark_distance")
     film = Film(video, fps=fps)
     look_over = survey(film)
-    sights = sightings(look_over.pictures)
+    sights, missing = sightings(look_over.pictures)
     seen = slowest(look_over.bursts, sights)
-    if len(seen) < FEWEST_SIGHTS:
+    if len(seen) < FEWEST:
         raise TrackError(
             f"{film.path}: no disk with marks in red, orange, blue and green (clockwise) was found: "
             f"{len(seen)} of {len(look_over.pictures)} frames looked at show all four"
         )
+    if missing is not None:
+        warnings.warn(
+            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=3
+        )
     known, rim = prepare(film, look_over, sights, seen)
     tracks = _follow(film, known, look_over.frames, progress, watch)
-    centre, angle = at_middle(
-        np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure
-    )
+    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
+    if known.contact is None:  # else the paths were curved, and poses stand in their middle
+        centre, angle = at_middle(np.array(tracks.t), centre, angle, known.exposure)
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     if refine:
         tracks = _again(film, known, tracks, progress)
+    drop_weak(tracks)
     size = scale(known.look.places, rim, radius, distance)
     camera = _camera(tracks, known, size, pivot)
     values, sigma, rho = metres(tracks, covariance(tracks), camera)
@@ -194,12 +199,18 @@ def _follow(
 
 
 def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
-    if not progress:
-        return second_pass(film.pictures(), known, tracks)
-    from tqdm import tqdm
+    streaks = [
+        s > LONG or flag.startswith("lost") for s, flag in zip(tracks.streak, tracks.flag, strict=True)
+    ]
+    for streaks_only in (False, True) if any(streaks) else (False,):
+        if not progress:
+            tracks = second_pass(film.pictures(), known, tracks, streaks_only=streaks_only)
+            continue
+        from tqdm import tqdm
 
-    with tqdm(total=len(tracks.t), unit="frame", desc=f"refine {film.path.name}") as bar:
-        return second_pass(film.pictures(), known, tracks, lambda _: bar.update())
+        with tqdm(total=len(tracks.t), unit="frame", desc=f"refine {film.path.name}") as bar:
+            tracks = second_pass(film.pictures(), known, tracks, lambda _: bar.update(), streaks_only)
+    return tracks
 
 
 def _camera(tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None) -> Camera:
