@@ -222,6 +222,31 @@ def test_a_neimark_sacker_bifurcation_is_found() -> None:
     assert point.frequency == pytest.approx(0.3, abs=1e-8)
 
 
+def test_where_rotation_becomes_stable_over_the_damping(rotation: udd.Branch) -> None:
+    curve = udd.locus(rotation.find("Hopf")[0], "B", (0.05, 0.9))
+    w, B = curve.values.T
+    assert B[0] == pytest.approx(0.05) and B[-1] == pytest.approx(0.9)
+    np.testing.assert_allclose(w, (1 - B) / (B * (1 + B)), rtol=1e-10)
+    np.testing.assert_allclose(curve.frequencies, np.sqrt((1 - B) / B), rtol=1e-9)
+    # Subcritical for every damping.
+    assert (curve.lyapunov_coefficients > 0).all()
+
+
+def test_the_fold_of_rotation_over_the_friction_at_rest() -> None:
+    start = next(rest for rest in udd.equilibria(udd.Disk(0.004)) if 1.2 < rest.state[0] < 1.65)
+    (fold,) = udd.continuation(start, "W", (0.003, 0.05)).find("fold")
+    W, k1 = udd.locus(fold, "k1", (0.08, 0.15)).values.T
+    np.testing.assert_allclose(W, 4 * k1**3 / (27 * 0.055**2 * 9.81), rtol=1e-10)
+
+
+def test_damping_moves_where_the_symmetry_breaks(figure_eight: udd.Branch) -> None:
+    curve = udd.locus(figure_eight.points[0], "B", (0.0, 0.04), most=12)
+    assert curve.ends == ("the bound 0", "the bound 0.04")
+    # The same from a branch at that damping.
+    there = udd.continuation(udd.periodic_orbit(udd.DLE(9.0, B=0.04)), "w", (5.0, 12.0))
+    assert curve.values[-1][0] == pytest.approx(there.find("symmetry breaking")[0].value, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

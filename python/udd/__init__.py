@@ -26,6 +26,7 @@ _PUBLIC = {
     "Fit": "udd.fitting",
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
+    "Locus": "udd.structure",
     "Measurement": "udd.measurement",
     "Model": "udd.models",
     "Pendulum": "udd.models",
@@ -49,6 +50,7 @@ _PUBLIC = {
     "errors": "udd.errors",
     "fit": "udd.fitting",
     "forecast": "udd.forecasting",
+    "locus": "udd.structure",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
     "paper": "udd.paper",
@@ -106,11 +108,13 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import Cascade as Cascade
     from udd.structure import Diagram as Diagram
     from udd.structure import Equilibrium as Equilibrium
+    from udd.structure import Locus as Locus
     from udd.structure import PeriodicOrbit as PeriodicOrbit
     from udd.structure import cascade as cascade
     from udd.structure import continuation as continuation
     from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria
+    from udd.structure import locus as locus
     from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec
     from udd.sweeping.sweeps import sweep as sweep

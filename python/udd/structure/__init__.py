@@ -4,6 +4,7 @@ from .branch import BifurcationPoint, Branch
 from .branches import continuation
 from .cascades import Cascade, cascade
 from .diagrams import Diagram, diagram
+from .loci import Locus, locus
 from .orbits import periodic_orbit
 from .rests import equilibria
 from .solutions import Equilibrium, PeriodicOrbit
@@ -14,10 +15,12 @@ __all__ = [
     "Cascade",
     "Diagram",
     "Equilibrium",
+    "Locus",
     "PeriodicOrbit",
     "cascade",
     "continuation",
     "diagram",
     "equilibria",
+    "locus",
     "periodic_orbit",
 ]

@@ -23,7 +23,7 @@ from .signs import Signs
 from .solutions import Equilibrium, PeriodicOrbit
 from .switching import born_at
 
-__all__ = ["branch_from", "continuation"]
+__all__ = ["bounds_of", "branch_from", "continuation"]
 
 
 def continuation(
@@ -107,7 +107,7 @@ def continuation(
         raise ModelError("say which parameter is varied")
     if direction not in ("both", "up", "down"):
         raise ModelError(f"direction must be both, up or down, not {direction!r}")
-    low, high = _bounds(bounds)
+    low, high = bounds_of(bounds)
     step = number("step", step, above=0.0)
     longest = max(number("longest", longest, above=0.0), step)
     if isinstance(start, BifurcationPoint):
@@ -139,7 +139,8 @@ def continuation(
     return branch_from(ways, model, parameter, "the start")
 
 
-def _bounds(bounds: Sequence[float]) -> tuple[float, float]:
+def bounds_of(bounds: Sequence[float]) -> tuple[float, float]:
+    """Checked bounds of a parameter."""
     try:
         low, high = (float(bound) for bound in bounds)
     except (TypeError, ValueError):
