@@ -6,9 +6,10 @@ import numpy as np
 
 from udd import relatives
 from udd.paper import device
+from udd.paper.branches import RELAXATION, hopf, rotation_of_disk
 from udd.paper.figures.clock import C, after_a_push, disk_periods, periods
 from udd.paper.figures.heights import limit, next_heights
-from udd.paper.figures.rotation import hopf_of_disk, spun_down
+from udd.paper.figures.rotation import spun_down
 from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
 from udd.sections import poincare
@@ -111,7 +112,8 @@ def spin_down(_lab: Lab) -> Verdict:
     omega, y, z = device.rotating(float(down[0]))
     spread = spun_down(down, [omega, y, z, 0.0])[:, 1]
     lost = down[spread > 1.0]
-    bound = hopf_of_disk(device.B / device.L)
+    point = hopf(rotation_of_disk(RELAXATION))
+    bound = float("nan") if point is None else point.value
     evidence = (
         "b = 43.6 /m: lowered in steps of 2 mm/s, a minute each, the rotation is lost at "
         f"{100 * lost[0]:.1f} cm/s; linear theory "
