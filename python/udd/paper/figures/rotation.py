@@ -123,7 +123,7 @@ def rotating_states(_lab: Lab) -> Figure:
 def relaxation_needed(_lab: Lab) -> Figure:
     """Hopf points of the full disk in the plane of drive and relaxation."""
     made, axes = panels(1, 1, 6.8, 4.6)
-    relaxation = np.geomspace(22.5, 85, 18)
+    relaxation = np.geomspace(22.5, 85, 14)
     for momentum, colour, words in (
         ("constraint", AFTER, "disk, constraint alone"),
         ("consistent", BEFORE, "disk, angular momentum too"),
