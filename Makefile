@@ -22,7 +22,7 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery bench-tracker
+.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,6 +42,12 @@ test-rust: ## only the tests of the Rust core; needs no Python
 
 test-python: .venv/.udd ## only the tests of the Python package
 	$(PY) -m pytest -n auto --dist loadfile
+
+test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" for some of it)
+	UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)
+
+bench-page: .venv/.browser ## the page's frames per second and its delay from slider to frame
+	$(PY) benches/python/page.py
 
 lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
 
@@ -118,6 +124,12 @@ clean: ## remove .venv and everything that was built
 
 .venv/.udd: .venv/.deps $(SOURCES)
 	MATURIN_PEP517_ARGS=--locked $(PY) -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable . --verbose
+	@touch $@
+
+.venv/.browser: tests/browser/requirements.txt .venv/.udd
+	@command -v chromium chromium-browser google-chrome >/dev/null || \
+	  { as=$$([ "$$(id -u)" = 0 ] || echo sudo); $$as apt-get update -qq && $$as apt-get install -qq --yes --no-install-recommends chromium; }
+	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --only-binary :all: -r $<
 	@touch $@
 
 # --- the same for `bench-peers`; a peer that cannot be installed here is a note in the table

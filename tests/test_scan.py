@@ -31,4 +31,6 @@ def test_a_group_lowers_chi2_as_least_squares_do(size: int) -> None:
     falls = [fall for _group, fall in found]
     assert falls == sorted(falls, reverse=True)
     # Normal equations of well-conditioned columns lose a few digits.
-    assert {tuple(s.candidate for s in group): fall for group, fall in found} == pytest.approx(expected, rel=1e-9)
+    assert {tuple(s.candidate for s in group): fall for group, fall in found} == pytest.approx(
+        expected, rel=1e-9
+    )

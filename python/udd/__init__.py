@@ -19,6 +19,7 @@ _PUBLIC = {
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
+    "Diagram": "udd.structure",
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
     "Equilibrium": "udd.structure",
@@ -39,6 +40,7 @@ _PUBLIC = {
     "cascade": "udd.structure",
     "continuation": "udd.structure",
     "covariant_vectors": "udd.spectra",
+    "diagram": "udd.structure",
     "discover": "udd.discovery",
     "effects": "udd.effects",
     "energy_books": "udd.energy",
@@ -102,10 +104,12 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import BifurcationPoint as BifurcationPoint
     from udd.structure import Branch as Branch
     from udd.structure import Cascade as Cascade
+    from udd.structure import Diagram as Diagram
     from udd.structure import Equilibrium as Equilibrium
     from udd.structure import PeriodicOrbit as PeriodicOrbit
     from udd.structure import cascade as cascade
     from udd.structure import continuation as continuation
+    from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria
     from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec

@@ -15,6 +15,7 @@ import numpy as np
 from films import Case
 from numpy.typing import NDArray
 from scoring import Score, score
+
 from udd.film import Film
 
 Array = NDArray[np.float64]

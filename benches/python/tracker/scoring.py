@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from films import Case
 from numpy.typing import NDArray
+
 from udd.film import Film
 
 WRONG = (2e-3, 2e-3, 0.1)  # m, m, rad: an error beyond is wrong unless the frame is flagged

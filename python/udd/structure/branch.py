@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -103,8 +104,6 @@ class Branch:
     stable : ndarray of bool, shape (n,)
     symmetric : bool
         Whether the solutions are their own mirror images.
-    low, high : ndarray, shape (n, dim)
-        The extremes of each component over the orbit's nodes.
     arclength : ndarray, shape (n,)
     points : tuple of BifurcationPoint
         In the order of the arclength.
@@ -121,8 +120,6 @@ class Branch:
     multipliers: Complex
     stable: NDArray[np.bool_]
     symmetric: bool
-    low: Floats
-    high: Floats
     arclength: Floats
     points: tuple[BifurcationPoint, ...]
     ends: tuple[str, str]
@@ -131,6 +128,35 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    @cached_property
+    def extremes(self) -> tuple[Floats, Floats]:
+        """The least and the largest value of each component on each orbit, two arrays of shape (n, dim)."""
+        from .shapes import extremes_of
+
+        pairs = [extremes_of(curve, place.u) for curve, place in self._places]
+        return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
+
+    def crossings(
+        self, section: str | None = None, direction: str | None = None
+    ) -> tuple[NDArray[np.intp], Floats]:
+        """Where the cycles cross a section.
+
+        Parameters
+        ----------
+        section, direction : str, optional
+            As :func:`udd.poincare` takes them; by default ``"z"`` (``"Z"``, ``"theta"``) upward.
+
+        Returns
+        -------
+        which : ndarray of int, shape (k,)
+            The places on the branch.
+        states : ndarray, shape (k, dim)
+            The states there; of cycles that are not symmetric those of the mirror image are not among them.
+        """
+        from .shapes import crossings_of
+
+        return crossings_of(self, section, direction)
 
     def solution(self, i: int) -> Equilibrium | PeriodicOrbit:
         """The equilibrium or cycle of one point of the branch."""
@@ -159,8 +185,8 @@ class Branch:
             "states": self.states.tolist(),
             "periods": self.periods.tolist(),
             "stable": self.stable.tolist(),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
+            "low": self.extremes[0].tolist(),
+            "high": self.extremes[1].tolist(),
             "points": [
                 {
                     "kind": point.kind,

@@ -213,24 +213,21 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
     values = np.array([curve.value(place.u) for curve, place, _, _ in entries])
     first = entries[0][0]
     symmetric = False
-    multipliers, states, periods, low, high = [], [], [], [], []
+    multipliers, states, periods = [], [], []
     for curve, place, signs, _ in entries:
         own = signs.values
         if isinstance(curve, CycleCurve):
             symmetric = bool((curve.mirror < 0).any())
             own = own**2 if symmetric else own
-            nodes = curve.flow.full(curve.nodes(place.u))
-            seen = np.vstack([nodes, curve.flow.full(curve.mirror * curve.nodes(place.u))])
+            state = curve.flow.full(curve.nodes(place.u)[0])
             periods.append(curve.span(place.u) * (2.0 if symmetric else 1.0))
         else:
-            nodes = seen = curve.flow.full(curve.state(place.u))[np.newaxis]
+            state = curve.flow.full(curve.state(place.u))
             mirror = curve.flow.mirror
             if mirror is not None:
                 symmetric = bool(np.allclose(mirror * curve.state(place.u), curve.state(place.u), atol=1e-12))
             periods.append(np.nan)
-        states.append(nodes[0])
-        low.append(seen.min(axis=0))
-        high.append(seen.max(axis=0))
+        states.append(state)
         key = -np.abs(own) if isinstance(curve, CycleCurve) else -own.real
         multipliers.append(own[np.argsort(key, kind="stable")])
     table = np.array(multipliers)
@@ -247,8 +244,6 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
         table,
         stable,
         symmetric,
-        np.array(low),
-        np.array(high),
         np.array([a for _, _, _, a in entries]),
         tuple(points),
         ends,

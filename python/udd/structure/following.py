@@ -131,8 +131,8 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
                 solution = solution_at(curve, place.u)
                 point = point_at(curve, parameter, kind, place, solution, arclength + sigma, bound)
                 way.points.append(point)
+                way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
                 if limits.until(point):
-                    way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
                     way.end = "the point that was wanted"
                     return way
         value = curve.value(there.u)
@@ -169,12 +169,12 @@ def _birth(curve: AnyCurve, place: Place, before: Place) -> str:
     """What it is that the branch begins or ends with."""
     value = curve.value(place.u)
     if isinstance(curve, RestCurve):
-        return f"a branch point near {value:.10g}"
+        return f"a branch point near {value:.5g}"
     size = float(np.ptp(curve.nodes(place.u) / curve.flow.size, axis=0).max())
     if size < _SHRUNK * float(np.ptp(curve.nodes(before.u) / curve.flow.size, axis=0).max()):
-        return f"a Hopf bifurcation near {value:.10g}"
+        return f"a Hopf bifurcation near {value:.5g}"
     kind = closes_earlier(curve, place.u)
-    return f"{kind or 'a branch point'} near {value:.10g}"
+    return f"{kind or 'a branch point'} near {value:.5g}"
 
 
 def _cut(curve: AnyCurve, here: Place, gone: float, way: Way, arclength: float, limits: Limits) -> float:
@@ -265,6 +265,7 @@ def _round(
             solution = solution_at(curve, place.u)
             error = _error(curve, here, sigma, place, gone, kind)
             way.points.append(point_at(curve, parameter, kind, place, solution, arclength + sigma, error))
+            way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
     arclength += gone
     value = curve.value(arriving.u)
     if not limits.low <= value <= limits.high:

@@ -45,12 +45,15 @@ def found_between(
         if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
             continue
         try:
+            if name == "fold" and "plus" not in changed:
+                found.append(("end", *turning(curve, a, step, before, after)))
+                continue
             sigma, place = locate(curve, a, step, name)
         except (Lost, ValueError):
             continue
         here = signs_at(curve, place)
         if name == "fold":
-            kind = "fold" if "plus" in changed else "end"
+            kind = "fold"
         elif name == "plus":
             # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
             kind = "branch point" if abs(here.fold) > _STILL else "fold"
@@ -67,6 +70,27 @@ def found_between(
                 continue  # two real ones: a neutral saddle
         found.append((kind, sigma, place))
     return sorted(found, key=lambda one: one[1])
+
+
+def turning(
+    curve: RestCurve | CycleCurve, a: Place, step: float, before: Signs, after: Signs
+) -> tuple[float, Place]:
+    """About where the parameter turns at a branch point, near which the equations are nearly singular."""
+    low, high = (0.0, before.fold), (step, after.fold)
+    sigma, place = 0.0, a
+    for _ in range(6):
+        middle = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
+        try:
+            u = correct(curve, a.u + middle * a.tangent, a.tangent)
+            place = Place(u, tangent_at(curve, u, a.tangent))
+        except Lost:
+            break
+        sigma, fold = middle, float(place.tangent[-1])
+        if fold * low[1] > 0.0:
+            low = (middle, fold)
+        else:
+            high = (middle, fold)
+    return sigma, place
 
 
 def _on_axis(pair: complex) -> bool:

@@ -24,7 +24,7 @@ __all__ = ["closed", "closes_earlier", "cycle_at", "flown", "periodic_orbit", "p
 _FINE = 64  # states looked at in a typical time
 _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
 _SAME = 1e-7  # two states within this part of the sizes are one
-_HALF = 1e-3  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
+_HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
 _RESIDUAL = 1e-9  # gaps that are as good as none
 _TURN = 2.0 * math.pi
 

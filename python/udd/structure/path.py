@@ -21,7 +21,7 @@ _MOST = 8  # Newton steps from a good guess
 _TURN = 0.95  # least cosine between one tangent and the next
 _MOVED = 0.25  # of a step, from the tangent to the curve
 _STRAIGHT = 0.995  # from here on the next step may be longer
-_DENSE = 100  # unknowns up to which a dense matrix is as fast
+_DENSE = 60  # unknowns up to which a dense matrix is as fast
 
 
 class Lost(Exception):

@@ -146,12 +146,11 @@ class _Decoder:
             if index < 0:  # the end: what did not decode
                 self.broken = height
                 return
-            planes = [
-                np.empty(shape, np.uint8) for shape in ((height, width), (rows, columns), (rows, columns))
-            ]
-            if not all(_fill(self.pipe, memoryview(p).cast("B")) for p in planes):
+            shapes = ((height, width), (rows, columns), (rows, columns))
+            y, u, v = (np.empty(shape, np.uint8) for shape in shapes)
+            if not all(_fill(self.pipe, plane.data.cast("B")) for plane in (y, u, v)):
                 break
-            yield Picture(index, t, *planes, damaged)
+            yield Picture(index, t, y, u, v, damaged)
         self.broken = 1  # it ended in the middle
 
 

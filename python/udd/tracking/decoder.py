@@ -107,7 +107,7 @@ def send(container: Any, stream: Any, since: float, out: IO[bytes]) -> None:
         y, u, v = planes
         out.write(HEAD.pack(index, t, *y.shape, *u.shape, damaged))
         for plane in (y, u, v):
-            out.write(memoryview(np.ascontiguousarray(plane)).cast("B"))
+            out.write(np.ascontiguousarray(plane).data.cast("B"))
     out.write(HEAD.pack(-1, 0.0, broken[0], 0, 0, 0, False))
 
 

@@ -13,7 +13,7 @@ from .pose import align
 from .survey import Moving
 
 SHARES = np.linspace(0.0, 1.0, 9)  # of the frame interval
-FASTEST = 18
+FASTEST = 12
 WORSE = 5.0  # times the least misfit
 STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
 

@@ -15,8 +15,8 @@ from .marks import MISFIT, Sighting, coverage, seen_at
 from .pose import align
 from .rigid import solve
 
-ROUNDS = 8
-MOST = 48  # frames to learn from
+ROUNDS = 6
+MOST = 40  # frames to learn from
 WHOLE = 0.97  # share of its edges that is in view for a mark to learn from
 HALF_SEEN = 0.5  # and that looks as expected
 STEADY = 0.005  # pixels; shapes that change less have settled

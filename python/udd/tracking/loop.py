@@ -26,6 +26,9 @@ MOST_TRIED = 3  # starting poses
 FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
 STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
 BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
+SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
+COPIED = 10  # codes by which a copy may differ
+UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
 FLAT = 6.0  # brightness contrast of a black frame
 
 
@@ -250,32 +253,34 @@ def _repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before:
     reach = abs(look.marks[0].place)
     if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
         return False
-    r, c, n = int(before.centre.imag), int(before.centre.real), int(1.3 * reach)
-    a = y[max(0, r - n) : r + n, max(0, c - n) : c + n]
-    b = last[max(0, r - n) : r + n, max(0, c - n) : c + n]
-    return a.size > 0 and float(np.abs(a.astype(np.int16) - b).mean()) < 0.1
+    changed, size = 0, 0
+    for place in look.lens.picture(before.centre + look.places * np.exp(1j * before.angle)):
+        r, c, n = int(place.imag), int(place.real), int(SURROUNDINGS * np.hypot(*look.marks[0].half))
+        part = slice(max(0, r - n), max(0, r + n)), slice(max(0, c - n), max(0, c + n))
+        # a codec does not copy exactly, but it moves no edge
+        changed += int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED))
+        size += y[part].size
+    return size > 0 and changed < UNCHANGED
 
 
 def _append(tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float) -> None:
     tracks.t.append(t)
     tracks.flag.append(flag)
-    for column in (tracks.centre, tracks.angle, tracks.streak, tracks.method):
-        column.append(None)  # type: ignore[attr-defined]
-    for column in (tracks.information, tracks.leftover, tracks.chi2, tracks.complete):
-        column.append(None)  # type: ignore[arg-type]
-    put(tracks, -1, fit, pose, streak)
-    tracks.method[-1] = "" if fit is None else "fast"
+    tracks.centre.append(pose.centre)
+    tracks.angle.append(pose.angle)
+    tracks.streak.append(streak)
+    tracks.information.append(np.full((3, 3), np.nan))
+    tracks.leftover.append(np.full((4, 2), np.nan))
+    tracks.chi2.append(np.full(4, np.nan))
+    tracks.complete.append(np.zeros(4))
+    tracks.method.append("" if fit is None else "fast")
+    if fit is not None:
+        put(tracks, -1, fit, pose, streak)
 
 
-def put(tracks: Tracks, k: int, fit: Fit | None, pose: Pose, streak: float) -> None:
+def put(tracks: Tracks, k: int, fit: Fit, pose: Pose, streak: float) -> None:
     """Write what was found in a frame into its row."""
     tracks.centre[k], tracks.angle[k], tracks.streak[k] = pose.centre, pose.angle, streak
-    if fit is None:
-        tracks.information[k] = np.full((3, 3), np.nan)
-        tracks.leftover[k] = np.full((4, 2), np.nan)
-        tracks.chi2[k] = np.full(4, np.nan)
-        tracks.complete[k] = np.zeros(4)
-        return
     used = fit.used[:, None]
     tracks.information[k] = fit.step.information
     tracks.leftover[k] = np.where(used, fit.step.leftover, np.nan)

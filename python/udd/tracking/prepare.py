@@ -24,6 +24,7 @@ from .survey import Moving, Survey, moving, repeats_last
 
 FEWEST = 3  # frames in motion from which marks are learned a second time
 SHARP = 60  # slow frames from which the rim is measured
+FOR_LENS = 90  # frames from which tilt and lens are measured
 LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 
@@ -62,7 +63,7 @@ def prepare(
         rolling = readout(frames, look, view, interval)
         look = replace(look, readout=rolling.value)
     for _ in range(LENS_ROUNDS):
-        lens = calibrate(places(look, frames, view), view.shape)
+        lens = calibrate(places(look, frames[:FOR_LENS], view), view.shape)
         if lens is None:
             break
         look = replace(look, lens=lens)

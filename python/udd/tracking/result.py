@@ -14,7 +14,7 @@ from .lens import PLAIN, Lens
 from .loop import Tracks
 
 Array = NDArray[np.float64]
-OUTSIDE = 0.02  # of the radius by which the contact must lie outside the disk
+OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
 NEAR_EDGE = 0.8  # of the radius; a disk that was last seen farther in is lost, not gone
 LONG = 1.0  # s: over a longer gap the rate may have done anything
 

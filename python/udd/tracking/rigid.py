@@ -37,9 +37,9 @@ def solve(
     information = np.array([_NOTHING if s is None else s.information for s in sightings])
     offset = np.array([_NOWHERE if s is None else s.offset for s in sightings])
     trusted = np.where(np.asarray(weights) > 0, weights, 0.0)[:, None, None] * information
-    weighted = trusted @ maps
-    normal = np.einsum("kai,kaj->ij", maps, weighted)
-    right = np.einsum("kai,ka->i", weighted, offset)
+    weighted = (trusted @ maps).reshape(-1, 3)
+    normal = maps.reshape(-1, 3).T @ weighted
+    right = weighted.T @ offset.ravel()
     reach = abs(marks[0].place)
     scale = np.diag([1.0, 1.0, 1 / reach])  # so that pixels compare with pixels
     eigen = np.linalg.eigvalsh(scale @ normal @ scale)
@@ -47,7 +47,7 @@ def solve(
         return None
     change = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
     leftover = offset - maps @ change
-    chi2 = np.einsum("ka,kab,kb->k", leftover, information, leftover)
+    chi2 = (leftover[:, None, :] @ information @ leftover[:, :, None])[:, 0, 0]
     unseen = np.array([s is None for s in sightings])
     leftover[unseen], chi2[unseen] = np.nan, np.nan
     return Step(change, normal, leftover, chi2)

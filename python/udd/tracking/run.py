@@ -77,7 +77,7 @@ def track(
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
     refine : bool
-        Go over the film a second time, with each frame's blur known from its neighbours; without it is faster.
+        Go over the film a second time, with each frame's blur known from its neighbours.
     progress : bool
         Show a progress bar.
 
