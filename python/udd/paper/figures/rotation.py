@@ -113,7 +113,7 @@ def rotating_states(_lab: Lab) -> Figure:
 
 @figure(
     "relaxation-needed",
-    paper="Section 5 D, for the full disk",
+    paper="Section 5 E, for the full disk",
     title="The relaxation that keeps the rotation stable",
     caption="Above the curves the full disk's rotating state is stable to small disturbances. The "
     "relaxation −b W Z may "
