@@ -77,7 +77,9 @@ def run(args: argparse.Namespace) -> Answer:
 
 def describe(found: Forecast) -> str:
     """A forecast in a few lines."""
-    factor, unit = (1e3, "mm") if "Z" in found.names else (1e3, "mrad")
+    factor, unit = {
+        "disk": (1e3, "mm"), "pendulum": (1e3, "mrad"), "own": (1e2, "% of the spread"),
+    }[found.measurement.kind]  # fmt: skip
     within = f"{factor * found.error:.3g} {unit}"
     reach = found.t[-1] - found.start
     lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]
