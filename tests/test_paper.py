@@ -15,7 +15,6 @@ from udd.paper import CLAIMS, FIGURES, device, films
 from udd.paper.figures.clock import C, D, periods
 from udd.paper.figures.heights import limit
 from udd.paper.lab import Lab
-from udd.paper.linear import eigenvalues
 from udd.paper.smoothing import smoothed
 
 # What becomes of each claim. Those that do not hold are known from elsewhere too: the friction law has no
@@ -55,16 +54,6 @@ def test_figure(key: str, tmp_path: Path) -> None:
     for ax in made.axes:
         assert ax.get_xlabel() or ax.get_ylabel()
         assert ax.has_data()
-
-
-@pytest.mark.parametrize("w", [0.5, 3.9, 20.0])
-@pytest.mark.parametrize("damping", [0.0, 0.2])
-def test_eigenvalues_are_the_roots_of_the_characteristic_cubic(w: float, damping: float) -> None:
-    model = udd.DLE(w, B=damping)
-    own = np.sort_complex(eigenvalues(model, device.rotating_dle(model), (1, 1, 1)))
-    roots = np.sort_complex(np.roots([1, 1 + damping * w, w * (1 + damping), 2 * w]))
-    # Central differences with steps of 1e-5 are good to about 1e-10 of the Jacobian.
-    np.testing.assert_allclose(own, roots, atol=1e-7)
 
 
 def test_the_rotating_state_is_at_rest_but_for_its_turning() -> None:

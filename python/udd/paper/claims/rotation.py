@@ -9,13 +9,10 @@ import numpy as np
 from udd.ensembles import ensemble
 from udd.models import DLE
 from udd.paper import device
-from udd.paper.figures.rotation import hopf_of_disk
+from udd.paper.branches import RELAXATION, hopf, relaxed, rotation_of_disk, rotation_of_dle
 from udd.paper.lab import Lab
-from udd.paper.linear import eigenvalues, growth
 from udd.paper.registry import Verdict, claim, judged
-
-_UNITS = (1.0, 1.0, 1.0)
-_SIZES = (4.0, 0.01, 0.01)
+from udd.structure import continuation
 
 
 def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarray:
@@ -34,19 +31,19 @@ def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarr
     "growing pair.",
 )
 def unstable_rotation(_lab: Lab) -> Verdict:
-    """The cubic's roots over six decades, and the rates' Jacobian."""
-    drives = np.geomspace(1e-3, 1e3, 400)
-    roots = [np.roots([1, 1, w, 2 * w]) for w in drives]
-    least = min(root.real.max() for root in roots)
-    shape = all((np.abs(root.imag) > 0).sum() == 2 and root.real.min() < 0 for root in roots)
-    own = eigenvalues(DLE(3.9), device.rotating_dle(DLE(3.9)), _UNITS)
-    gap = np.abs(np.sort_complex(own) - np.sort_complex(np.roots([1, 1, 3.9, 7.8]))).max()
+    """The branch of rotating states over six decades of the drive, against the cubic."""
+    branch = rotation_of_dle(0.0, 1e-3, 1e3)
+    pair = branch.multipliers.real.max(axis=1)
+    roots = [np.roots([1, 1, w, 2 * w]) for w in branch.values]
+    own = [np.sort_complex(one) for one in branch.multipliers]
+    gap = max(np.abs(one - np.sort_complex(root)).max() for one, root in zip(own, roots, strict=True))
+    real = branch.multipliers.real.min(axis=1)
     evidence = (
-        f"the pair's real part is positive from w = 1e-3 ({least:.1e}) to 1e3; the cubic's roots at 3.9 "
-        "are the "
-        f"Jacobian's eigenvalues to {gap:.0e}"
+        f"on the branch from w = 1e-3 to 1e3 the pair's real part is at least {pair.min():.1e}, the real "
+        "eigenvalue "
+        f"at most {real.max():.2f}; all agree with the cubic to {gap:.0e}"
     )
-    return judged(least > 0 and shape and gap < 1e-8, evidence)
+    return judged(bool(pair.min() > 0 and real.max() < 0 and not branch.stable.any()), evidence)
 
 
 @claim(
@@ -55,15 +52,16 @@ def unstable_rotation(_lab: Lab) -> Verdict:
     says="The full moment of inertia and friction do not make the rotating states stable (not shown there).",
 )
 def unstable_rotation_disk(_lab: Lab) -> Verdict:
-    """Growth rates of the full disk."""
-    drives = np.linspace(0.005, 0.3, 60)
-    rates = [growth(device.disk(float(W)), device.rotating(float(W)), _SIZES) for W in drives]
+    """Growth rates of the full disk along its branch."""
+    branch = rotation_of_disk(0.0, low=0.005)
+    rates = branch.multipliers.real.max(axis=1)
     k = int(np.argmin(rates))
     evidence = (
-        f"from 0.5 to 30 cm/s the growth rate is positive, least {rates[k]:.2f} /s at "
-        f"{100 * drives[k]:.1f} cm/s"
+        f"from {100 * branch.values.min():.1f} to {100 * branch.values.max():.0f} cm/s the growth rate is "
+        "positive, "
+        f"least {rates[k]:.2f} /s at {100 * branch.values[k]:.1f} cm/s"
     )
-    return judged(min(rates) > 0, evidence)
+    return judged(not branch.stable.any(), evidence)
 
 
 @claim(
@@ -89,31 +87,30 @@ def rotation_approximation(_lab: Lab) -> Verdict:
     says="With B = 0.2 the rotating states are stable above a minimal drive.",
 )
 def damping_stabilises(_lab: Lab) -> Verdict:
-    """Where the growth rate vanishes, against the closed form; and for the full disk."""
-    from scipy.optimize import brentq
-
-    def rate(w: float) -> float:
-        model = DLE(w, B=device.B)
-        return growth(model, device.rotating_dle(model), _UNITS)
-
-    found = brentq(rate, 2.0, 5.0, xtol=1e-12)
+    """The Hopf point on the branch, against the closed form; and for the full disk."""
+    branch = rotation_of_dle(device.B)
+    found, disk = hopf(branch), hopf(rotation_of_disk(RELAXATION))
+    if found is None or disk is None:
+        return judged(False, "no Hopf bifurcation was found")
     closed = device.hopf_drive(device.B)
-    disk = hopf_of_disk(device.B / device.L)
     evidence = (
-        f"the growth rate vanishes at w = {found:.8f}; closed form (1 − B)/(B (1 + B)) = {closed:.8f}. "
-        "The full disk with "
-        f"b = B/L = {device.B / device.L:.1f} /m: W = {100 * disk:.2f} cm/s"
+        f"Hopf bifurcation at w = {found.value:.10f} with the frequency {found.frequency:.8f}; closed forms "
+        f"(1 − B)/(B (1 + B)) = {closed:.10f} and √((1 − B)/B) = 2. The full disk with b = B/L = "
+        f"{RELAXATION:.1f} /m: "
+        f"W = {100 * disk.value:.3f} cm/s"
     )
-    return judged(abs(found - closed) < 1e-7 and rate(found + 0.1) < 0 < rate(found - 0.1), evidence)
+    above = bool(branch.stable[branch.values > found.value].all())
+    below = bool(branch.stable[branch.values < found.value].any())
+    return judged(abs(found.value - closed) < 1e-10 and above and not below, evidence)
 
 
 @functools.cache
-def _kept_below() -> tuple[float, int, int]:
+def _kept_below() -> tuple[int, int]:
     """Of starts close to the rotating state, 1 % below the minimal drive, how many are still there."""
     w = 0.99 * device.hopf_drive(device.B)
     near = np.random.default_rng(0).normal(size=(200, 3)) * 0.05 + [np.sqrt(w), np.sqrt(w), 0]
     ends = ensemble(DLE(w, B=device.B), 10_000.0, near, rtol=1e-8).end
-    return w, int(_is_rotating(ends, w, 0.1).sum()), len(near)
+    return int(_is_rotating(ends, w, 0.1).sum()), len(near)
 
 
 @claim(
@@ -122,27 +119,26 @@ def _kept_below() -> tuple[float, int, int]:
     says="The rotation's stability to finite disturbances may extend even below the minimal drive.",
 )
 def stable_below(_lab: Lab) -> Verdict:
-    """No start near it stays below the minimal drive; above it a finite basin."""
-    w, kept, of = _kept_below()
-    model = DLE(w, B=device.B)
-    rate = growth(model, device.rotating_dle(model), _UNITS)
-    caught = []
-    for z in np.arange(0.0, 4.0, 0.1):
-        start = [*device.rotating_dle(DLE(3.7, B=device.B))[:2], -z]
-        end = ensemble(DLE(3.7, B=device.B), 1500.0, start).end
-        caught.append(bool(_is_rotating(end, 3.7, 0.05)))
-    basin = 0.1 * (caught.index(False) - 1) if False in caught else float("nan")
+    """The Hopf bifurcation is subcritical: what surrounds the rotation is above, and unstable."""
+    point = hopf(rotation_of_dle(device.B))
+    if point is None:
+        return judged(False, "no Hopf bifurcation was found")
+    cycles = continuation(point, bounds=(2.0, 4.0))
+    kept, of = _kept_below()
     evidence = (
-        f"1 % below w_H the growth rate is {rate:+.4f}, and of {of} starts within 0.05 of the rotation "
-        f"{kept} are there at "
-        f"t = 10,000. Above, at w = 3.7, starts down to z = −{basin:.1f} go to it"
+        f"the Hopf bifurcation is {point.criticality} (first Lyapunov coefficient "
+        f"{point.lyapunov_coefficient:.3e}): "
+        f"the cycles born there live at w = {cycles.values.min():.4f} to {cycles.values.max():.2f} and "
+        f"{'some are stable' if cycles.stable.any() else 'are unstable'}. 1 % below w_H, of {of} starts "
+        "within 0.05 of the "
+        f"rotation {kept} are there at t = 10,000"
     )
     otherwise = (
-        "finite disturbances are survived above w_H only: the Hopf bifurcation is subcritical, an "
-        "unstable cycle "
-        "bounds the basin there and none guards the rotation below"
+        "finite disturbances are survived above w_H only, where the unstable cycle bounds the rotation's "
+        "basin; "
+        "below, there is nothing to keep it"
     )
-    return judged(kept > 0, evidence, otherwise=otherwise)
+    return judged(kept > 0 or bool(cycles.stable.any()), evidence, otherwise=otherwise)
 
 
 @functools.cache
@@ -188,14 +184,12 @@ def bistable(_lab: Lab) -> Verdict:
 )
 def not_from_rest(_lab: Lab) -> Verdict:
     """Starts at rest all over the disk, with the relaxation of the constraint."""
-    from udd.paper.figures.rotation import relaxed
-
     shares = {}
     for W in (0.06, 0.071, 0.088):
         random = np.random.default_rng(0)
         radius, angle = 0.04 * np.sqrt(random.uniform(0, 1, 300)), random.uniform(0, 2 * np.pi, 300)
         starts = np.stack([0 * radius, radius * np.sin(angle), radius * np.cos(angle), 0 * radius], axis=-1)
-        ends = ensemble(relaxed(W, device.B / device.L), 60.0, starts, rtol=1e-7).end
+        ends = ensemble(relaxed(W, RELAXATION), 60.0, starts, rtol=1e-7).end
         goal = device.rotating(W)[0]
         shares[W] = float((np.abs(np.abs(ends[:, 0]) - goal) < 0.05 * goal).mean())
     words = ", ".join(f"{share:.0%} at {100 * W:.1f} cm/s" for W, share in shares.items())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from udd import plot
 from udd.paper import device
@@ -28,7 +28,7 @@ def measured_phase(lab: Lab) -> Figure:
     made, axes = panels(1, 3, 12.6, 4.6, note=FILMED, projection="3d")
     for k, W in enumerate(device.DRIVES):
         plot.phase_space(lab.smoothed(f"{100 * W:.1f}"), axes[k])
-        axes[k].locator_params(axis="x", nbins=4)
+        _room(axes[k])
         titled(axes[k], k, f"W = {100 * W:.1f} cm/s")
     return made
 
@@ -44,6 +44,16 @@ def computed_phase(_lab: Lab) -> Figure:
     made, axes = panels(1, 3, 12.6, 4.6, projection="3d")
     for k, W in enumerate(device.DRIVES):
         plot.phase_space(settled(W), axes[k])
-        axes[k].locator_params(axis="x", nbins=4)
+        _room(axes[k])
         titled(axes[k], k, f"disk, W = {100 * W:.1f} cm/s")
     return made
+
+
+def _room(ax: Any) -> None:
+    """Fewer and smaller numbers, and names further out, lest they overlap."""
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.get_major_locator().set_params(nbins=4)
+        axis.labelpad = 6
+        axis.label.set_size("small")
+    ax.tick_params(labelsize="small", pad=1)
+    ax.set_box_aspect(None, zoom=0.8)

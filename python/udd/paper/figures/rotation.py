@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd import effects
-from udd.models import DLE, Disk
+from udd.models import DLE
 from udd.paper import device
+from udd.paper.branches import RELAXATION, hopf, relaxed, rotation_of_disk, rotation_of_dle
 from udd.paper.canvas import panels, titled
 from udd.paper.lab import Lab
-from udd.paper.linear import eigenvalues, growth
 from udd.paper.registry import figure
 from udd.plot.style import AFTER, BEFORE, FAINT, MEASURED, label, tidy
 from udd.trajectory import simulate
@@ -22,25 +20,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIZES = (4.0, 0.01, 0.01)  # of Omega, Y, Z
-_B = device.B / device.L  # the paper's B in 1/m
-
 
 def _eigenvalue_panel(ax: Axes, damping: float) -> None:
     """Real parts solid, imaginary parts dashed."""
-    w = np.linspace(0.02, 8, 200)
-    models = [DLE(float(one), B=damping) for one in w]
-    found = np.array([eigenvalues(model, device.rotating_dle(model), (1, 1, 1)) for model in models])
+    branch = rotation_of_dle(damping)
+    w = branch.values
+    found = np.array([one[np.argsort(np.abs(one.imag))] for one in branch.multipliers])
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.plot(w, found[:, 0].real, color=MEASURED, linewidth=1.6, label="the real eigenvalue")
     ax.plot(w, found[:, 1].real, color=AFTER, linewidth=1.6, label="the pair, real part")
-    ax.plot(
-        w, found[:, 1:].imag, color=AFTER, linewidth=1.2, linestyle="--", label="the pair, imaginary part"
-    )
+    for sign, words in ((1, "the pair, imaginary part"), (-1, None)):
+        part = sign * np.abs(found[:, 1].imag)
+        ax.plot(w, part, color=AFTER, linewidth=1.2, linestyle="--", label=words)
     ax.set_xlabel("drive w [1]")
     ax.set_ylabel("eigenvalue λ [1]")
-    handles, words = ax.get_legend_handles_labels()
-    ax.legend(handles[:3], words[:3], frameon=False, loc="lower left", fontsize="small")
+    ax.legend(loc="lower left", fontsize="small", edgecolor="none", framealpha=1)
     tidy(ax)
 
 
@@ -89,12 +83,6 @@ def damped_rotation(_lab: Lab) -> Figure:
     return made
 
 
-def relaxed(W: float, b: float, momentum: str = "constraint") -> Disk:
-    """The disk with a relaxation of the rolling constraint, followed past its edge."""
-    model = device.disk(W, beyond=True)
-    return model.with_effects([effects.relaxation(b=b, momentum=momentum)]) if b else model
-
-
 @figure(
     "rotating-states",
     paper="Section 3 C, Video 4",
@@ -107,7 +95,7 @@ def rotating_states(_lab: Lab) -> Figure:
     """Clockwise and anticlockwise, with and without the relaxation."""
     made, axes = panels(1, 2, 10.4, 4.2)
     W = 0.088
-    for k, b in enumerate((_B, 0.0)):
+    for k, b in enumerate((RELAXATION, 0.0)):
         for sense, colour, words in ((1, AFTER, "clockwise"), (-1, BEFORE, "anticlockwise")):
             omega, y, _z = device.rotating(W, sense)
             run = simulate(relaxed(W, b), np.arange(0, 12, 0.005), [omega, y, 0.004, 0], method="taylor")
@@ -123,18 +111,9 @@ def rotating_states(_lab: Lab) -> Figure:
     return made
 
 
-def lowest_relaxation(W: float, momentum: str) -> float:
-    """The relaxation b [1/m] above which the disk's rotation at drive W is stable."""
-    from scipy.optimize import brentq
-
-    state = device.rotating(W)
-    found: float = brentq(lambda b: growth(relaxed(W, b, momentum), state, _SIZES), 0.5, 150.0, xtol=1e-9)
-    return found
-
-
 @figure(
     "relaxation-needed",
-    paper="Section 5 D, for the full disk",
+    paper="Section 5 E, for the full disk",
     title="The relaxation that keeps the rotation stable",
     caption="Above the curves the full disk's rotating state is stable to small disturbances. The "
     "relaxation −b W Z may "
@@ -144,19 +123,20 @@ def lowest_relaxation(W: float, momentum: str) -> float:
 def relaxation_needed(_lab: Lab) -> Figure:
     """Hopf points of the full disk in the plane of drive and relaxation."""
     made, axes = panels(1, 1, 6.8, 4.6)
-    drives = np.linspace(0.02, 0.15, 40)
+    relaxation = np.geomspace(22.5, 85, 14)
     for momentum, colour, words in (
         ("constraint", AFTER, "disk, constraint alone"),
         ("consistent", BEFORE, "disk, angular momentum too"),
     ):
-        needed = [lowest_relaxation(float(W), momentum) for W in drives]
-        axes[0].plot(100 * drives, needed, color=colour, linewidth=1.8, label=words)
+        found = [hopf(rotation_of_disk(float(b), momentum)) for b in relaxation]
+        drives = [np.nan if point is None else point.value for point in found]
+        axes[0].plot(100 * np.array(drives), relaxation, color=colour, linewidth=1.8, label=words)
     damping = np.linspace(0.04, 0.5, 200)
     closed = np.array([device.hopf_drive(float(one)) for one in damping]) * device.L / device.TAU
-    inside = (closed > drives[0]) & (closed < drives[-1])
+    inside = (closed > 0.02) & (closed < 0.15)
     axes[0].plot(100 * closed[inside], damping[inside] / device.L, "--", color=MEASURED, label="DLE")
-    axes[0].axhline(_B, color=FAINT, linewidth=1)
-    axes[0].annotate("the paper's B = 0.2", (15, _B), (0, 4), textcoords="offset points", ha="right")
+    axes[0].axhline(RELAXATION, color=FAINT, linewidth=1)
+    axes[0].annotate("the paper's B = 0.2", (15, RELAXATION), (0, 4), textcoords="offset points", ha="right")
     axes[0].set_xlabel("drive W [cm/s]")
     axes[0].set_ylabel("relaxation b [1/m]")
     axes[0].set_ylim(bottom=0)
@@ -169,7 +149,7 @@ def spun_down(drives: NDArray[np.float64], start: list[float], time: float = 60.
     """Mean and spread of Omega at each drive, which is changed step by step; shape (drives, 2) [rad/s]."""
     state, rows = np.asarray(start), []
     for W in drives:
-        run = simulate(relaxed(float(W), _B), np.arange(0, time, 0.02), state, method="taylor")
+        run = simulate(relaxed(float(W), RELAXATION), np.arange(0, time, 0.02), state, method="taylor")
         late = run.Omega[len(run.t) // 2 :]
         rows.append((late.mean(), late.std()))
         state = run.state[-1] + [0.0, 1e-6, 1e-6, 0.0]  # nothing is ever quite at rest
@@ -210,13 +190,3 @@ def spin_down(_lab: Lab) -> Figure:
     axes[0].legend(frameon=False, loc="upper left")
     tidy(axes[0])
     return made
-
-
-def hopf_of_disk(b: float, momentum: str = "constraint") -> float:
-    """The drive W [m/s] above which the full disk's rotation is stable."""
-    from scipy.optimize import brentq
-
-    found: float = brentq(
-        lambda W: growth(relaxed(W, b, momentum), device.rotating(W), _SIZES), 0.01, 0.3, xtol=1e-9
-    )
-    return found if math.isfinite(found) else math.nan
