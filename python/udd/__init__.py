@@ -13,17 +13,23 @@ from typing import TYPE_CHECKING, Any
 # imported before it is used, so that `import udd` stays fast. The names must not be those of other modules.
 _PUBLIC = {
     "DLE": "udd.models",
+    "BifurcationPoint": "udd.structure",
+    "Branch": "udd.structure",
+    "Cascade": "udd.structure",
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
+    "Diagram": "udd.structure",
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
+    "Equilibrium": "udd.structure",
     "Fit": "udd.fitting",
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
     "Measurement": "udd.measurement",
     "Model": "udd.models",
     "Pendulum": "udd.models",
+    "PeriodicOrbit": "udd.structure",
     "Section": "udd.sections",
     "Spectrum": "udd.spectra",
     "SweepSpec": "udd.sweeping",
@@ -31,20 +37,27 @@ _PUBLIC = {
     "UddError": "udd.errors",
     "basins": "udd.branching",
     "bifurcation": "udd.branching",
+    "cascade": "udd.structure",
+    "continuation": "udd.structure",
     "covariant_vectors": "udd.spectra",
+    "diagram": "udd.structure",
     "discover": "udd.discovery",
     "effects": "udd.effects",
     "energy_books": "udd.energy",
     "ensemble": "udd.ensembles",
+    "equilibria": "udd.structure",
     "errors": "udd.errors",
     "fit": "udd.fitting",
     "forecast": "udd.forecasting",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
+    "paper": "udd.paper",
+    "periodic_orbit": "udd.structure",
     "plot": "udd.plot",
     "poincare": "udd.sections",
     "prune": "udd.discovery",
     "read_measurement": "udd.measurement",
+    "relatives": "udd.relatives",
     "render": "udd.film",
     "simulate": "udd.trajectory",
     "sweep": "udd.sweeping",
@@ -56,7 +69,9 @@ __all__ = [*_PUBLIC]
 if TYPE_CHECKING:  # the same for type checkers
     from udd import effects as effects
     from udd import errors as errors
+    from udd import paper as paper
     from udd import plot as plot
+    from udd import relatives as relatives
     from udd.branching.diagram import bifurcation as bifurcation
     from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery
@@ -86,6 +101,17 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.spectra import Spectrum as Spectrum
     from udd.spectra import covariant_vectors as covariant_vectors
     from udd.spectra import lyapunov_spectrum as lyapunov_spectrum
+    from udd.structure import BifurcationPoint as BifurcationPoint
+    from udd.structure import Branch as Branch
+    from udd.structure import Cascade as Cascade
+    from udd.structure import Diagram as Diagram
+    from udd.structure import Equilibrium as Equilibrium
+    from udd.structure import PeriodicOrbit as PeriodicOrbit
+    from udd.structure import cascade as cascade
+    from udd.structure import continuation as continuation
+    from udd.structure import diagram as diagram
+    from udd.structure import equilibria as equilibria
+    from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec
     from udd.sweeping.sweeps import sweep as sweep
     from udd.tracking import track as track

@@ -69,6 +69,20 @@ class _Crossings(TypedDict):
     t_end: _Floats
     outcome: NDArray[np.uint8]
 
+class _Pieces(TypedDict):
+    x: _Floats
+    by_state: _Floats
+    by_parameter: _Floats
+    rate: _Floats
+
+class _Expansion(TypedDict):
+    rate: _Floats
+    by_state: _Floats
+    by_parameter: _Floats
+    surfaces: _Floats
+    second: _Floats
+    third: _Floats
+
 class _Solution(TypedDict):
     states: _Floats
     sets: list[tuple[list[float], list[float], float]]
@@ -96,6 +110,34 @@ class Dense:
     def span(self) -> tuple[float, float]: ...
     def __call__(self, t: _Floats) -> _Floats: ...
 
+def mark_coverage(
+    mark: _Floats,
+    pose: _Floats,
+    motion: _Floats,
+    psf: float,
+    window: tuple[int, int, int, int],
+    local: _Floats,
+) -> _Floats: ...
+def locate_marks(
+    codes: NDArray[np.uint8],
+    view: NDArray[np.bool_],
+    light: _Floats,
+    look: _Floats,
+    marks: _Floats,
+    poses: _Floats,
+    motion: _Floats,
+    locals: _Floats,
+    keep: bool = False,
+) -> list[
+    tuple[
+        tuple[float, float],
+        tuple[float, float, float, float],
+        tuple[float, float, float, float],
+        tuple[int, int, int, int],
+        tuple[_Floats, _Floats] | None,
+    ]
+    | None
+]: ...
 def formula_bodies(name: str, spec: tuple[str, str, list[str], list[str]]) -> list[str]: ...
 def has_series(model: Model) -> bool: ...
 def effect_library() -> list[_Effect]: ...
@@ -150,6 +192,17 @@ def sections(
     threads: int,
     progress: Callable[[int], object] | None = None,
 ) -> _Crossings: ...
+def shoot(
+    model: Model,
+    values: _Floats,
+    starts: _Floats,
+    t: _Floats,
+    spans: _Floats,
+    wanted: list[int],
+    rtol: float,
+    atol: float,
+) -> _Pieces: ...
+def expansion(model: Model, t: float, x: list[float], all: bool) -> _Expansion: ...
 def solve(
     model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], iterations: int
 ) -> _Solution: ...

@@ -8,7 +8,9 @@ mod interrupt;
 mod jobs;
 mod lyapunov;
 mod model;
+mod picture;
 mod section;
+mod shooting;
 mod simulate;
 
 use pyo3::prelude::*;
@@ -22,7 +24,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     lyapunov::register(module)?;
     section::register(module)?;
     ensemble::register(module)?;
+    shooting::register(module)?;
     estimate::register(module)?;
+    picture::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;
     Ok(())

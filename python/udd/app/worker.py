@@ -120,7 +120,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
         raise TrackError(f"the film's frames of {film.size[0]} x {film.size[1]} pixels are too large")
     if film.promised > limits.FRAMES:
         raise TrackError(f"the film has {film.promised} frames; at most {limits.FRAMES} are tracked here")
-    missing = film.promised - film.packets()
+    missing = film.promised - film.packets
     if missing > _CUT * film.promised:
         raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
     tell({"say": "looking over the film"})

@@ -11,7 +11,7 @@ from .answer import Answer, telling
 from .fit import options
 from .inputs import add_input, check_early, measurement_of, model_of
 from .options import new
-from .saving import add_out, checked, save_picture
+from .saving import add_out, checked, save_figure
 
 if TYPE_CHECKING:
     from udd.forecasting import Forecast
@@ -117,7 +117,7 @@ def _write(path: Path, found: Forecast) -> None:
             ax.get_legend().remove()
         if ax is not axes[-1]:
             ax.set_xlabel("")
-    save_picture(path, figure)
+    save_figure(path, figure)
 
 
 def _csv(found: Forecast) -> str:

@@ -57,14 +57,19 @@ def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -
         elif path.suffix == ".zarr":
             _zarr(path, found)
         else:
-            from matplotlib.figure import Figure
-
-            figure = Figure(figsize=(7.2, 4.4), layout="constrained")
-            draw(figure.add_subplot())
-            save_picture(path, figure)
+            save_picture(path, draw)
 
 
-def save_picture(path: Path, figure: Figure) -> None:
+def save_picture(path: Path, draw: Callable[[Axes], object]) -> None:
+    """Write a picture of one pair of axes, of the kind that the name's ending says."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+    draw(figure.add_subplot())
+    save_figure(path, figure)
+
+
+def save_figure(path: Path, figure: Figure) -> None:
     """Write a figure, of the kind that the name's ending says."""
     from udd.files import write_whole
 

@@ -27,6 +27,7 @@ from .heldout import (
 from .located import fit_curve, fit_formula
 from .results import Alternative
 from .scan import Scan, Scored, physical, scan, scan_ripples
+from .together import together
 
 #: Chance that a record without any effect is said to have one, over all candidates together.
 ALPHA = 1e-3
@@ -45,7 +46,7 @@ _FORMULAS = 3  # for each, fitted in full
 
 @dataclass(frozen=True)
 class Step:
-    """An addition that was accepted: one candidate, a pair, or a curve.
+    """An addition that was accepted: one candidate, two or three together, or a curve.
 
     Attributes
     ----------
@@ -233,6 +234,11 @@ def _of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
     return trial if fitted.converged else None
 
 
+def _fitted(trials: list[Trial | None]) -> list[Trial]:
+    """Those that could be fitted."""
+    return [t for t in trials if t]
+
+
 def _states_first(curves: list[Curve]) -> list[Curve]:
     """The likeliest first, but curves over time, which take up anything slow, after those as likely."""
     late = 2 * NATS
@@ -324,7 +330,7 @@ class Search:
         return replace(max(found, key=Look.strongest), looks=looks)
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
+        """The best thing to add that passes: an effect of the library, some of them together, or a curve.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
@@ -336,55 +342,61 @@ class Search:
         likely = _states_first([c for c in look.curves if c.p * look.looks < ALPHA])[:_CURVES]
         return (
             self._accept(current, singles, look)
-            or self._pair(current, look)
+            or self._group(current, look, 2)
+            or self._group(current, look, 3)
             or self._accept(current, self._curves(current, likely), look)
         )
 
     def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
         """Formulas that may explain the data as well as what the library has."""
-        trials: list[Trial | None] = []
+        trials: list[Trial] = []
         for curve in look.curves[:1]:
-            for written in self._formulas(current, curve):
-                if curve.evidence + written.nats > known - NATS:
-                    self.tell(f"trying {written.text}")
-                    trials.append(_of_formula(current.part, curve, written))
-        return [t for t in trials if t]
+            written = self._formulas(current, curve)
+            trials += self._written(
+                current, curve, [f for f in written if curve.evidence + f.nats > known - NATS]
+            )
+        return trials
+
+    def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
+        """Formulas for a curve, fitted."""
+        self._trying([f.text for f in formulas])
+        return _fitted(together(lambda written: _of_formula(current.part, curve, written), formulas))
+
+    def _trying(self, titles: list[str]) -> None:
+        if titles:
+            self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
     def _formulas(self, current: State, curve: Curve) -> list[Formula]:
         return formulas_for(curve, int(np.isfinite(current.part.misfit).sum())).formulas[:_FORMULAS]
 
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
-        trials = []
-        for s in passing[:_TRIED]:
-            self.tell(f"trying {s.candidate.title}")
-            trials.append(_of_library(current.part, [s.candidate], list(s.amplitudes)))
-        return [t for t in trials if t]
+        best = passing[:_TRIED]
+        self._trying([s.candidate.title for s in best])
+        return _fitted(together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best))
 
-    def _pair(self, current: State, look: Look) -> tuple[Step, State] | None:
-        best = look.library.pairs()
-        trials = []
-        for a, b, fall in best[:_TRIED]:
-            columns = len(a.amplitudes) + len(b.amplitudes)
-            same = a.candidate.effect.name == b.candidate.effect.name
-            if same or chi2.sf(fall, columns) * len(best) >= ALPHA:
-                continue
-            self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
-            trials.append(_of_library(current.part, [a.candidate, b.candidate], [0.0] * columns))
-        return self._accept(current, [t for t in trials if t], replace(look, looks=len(best)))
+    def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
+        """Several effects at once that pass only together."""
+        best = look.library.groups(size)
+        likely = [
+            [s.candidate for s in group]
+            for group, fall in best[:_TRIED]
+            if len({s.candidate.effect.name for s in group}) == size
+            and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
+        ]
+        self._trying([" with ".join(c.title for c in group) for group in likely])
+        nothing = [[0.0 for c in group for _name in c.amplitude_names] for group in likely]
+        trials = together(lambda k: _of_library(current.part, likely[k], nothing[k]), range(len(likely)))
+        return self._accept(current, _fitted(trials), replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
-        trials: list[Trial | None] = []
-        for curve in likely:
-            self.tell(f"trying {curve.title}")
-            located = _of_curve(current.part, curve)
-            if located is None or located.curve is None:
-                continue
+        trials: list[Trial] = []
+        self._trying([curve.title for curve in likely])
+        for located in _fitted(together(lambda curve: _of_curve(current.part, curve), likely)):
             trials.append(located)
-            for written in self._formulas(current, located.curve):
-                self.tell(f"trying {written.text}")
-                trials.append(_of_formula(current.part, located.curve, written))
-        return [t for t in trials if t]
+            if located.curve is not None:
+                trials += self._written(current, located.curve, self._formulas(current, located.curve))
+        return trials
 
     def _prune(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
         """Leave out effects that a later one makes needless.

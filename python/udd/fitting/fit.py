@@ -219,17 +219,14 @@ def _estimate_noise(
     for _ in range(_NOISE_ROUNDS):
         result = solve(measurements, problem, point)
         point, before = result.point, problem.noise
-        omega = point.states[:, 0]
-        if isinstance(problem.models[0], OwnModel):
-            omega = np.zeros(len(omega))  # a user's state need not be a speed that blurs
         if result.leverage > FOLLOWS:
             return False, problem, point
-        noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
-        if measurements[0].sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):
+        noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
+        if measurements[0].sigma is not None and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return False, problem, point
         if not problem.likeliest and measurements[0].sigma is None and measurements[0].kind in _FAITHFUL:
             noise = replace(noise, factor=np.maximum(noise.factor, _FAITHFUL[measurements[0].kind]))
         problem = replace(problem, noise=noise)
-        if before.like(noise, problem.record, omega):
+        if before.like(noise, problem.record, result.blurring):
             break
     return True, problem, point

@@ -6,6 +6,7 @@ results do not already hold, and no global matplotlib setting is changed.
 
 from __future__ import annotations
 
+from .branches import branches, diagram
 from .crossings import poincare, return_map
 from .curves import curve
 from .evidence import errors, evidence
@@ -21,7 +22,9 @@ from .whiten import whiteness
 __all__ = [
     "basins",
     "bifurcation",
+    "branches",
     "curve",
+    "diagram",
     "errors",
     "evidence",
     "forecast",

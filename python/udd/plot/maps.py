@@ -53,7 +53,7 @@ def bifurcation(
     parameter = result.attrs.get("parameter")
     if parameter is None or "point" not in result.dims:
         raise UddError("this is no bifurcation diagram: udd.bifurcation makes one")
-    name = _component(result, component)
+    name = shown_component(result, component)
     if colour not in (None, "path", "attractor"):
         raise UddError(f'colour must be "path" or "attractor", not {colour!r}')
     if colour == "attractor" and "attractor" not in result:
@@ -165,7 +165,8 @@ def _ends(result: xr.Dataset, titles: list[str]) -> xr.DataArray:
     return ends
 
 
-def _component(result: xr.Dataset, component: str | None) -> str:
+def shown_component(result: xr.Dataset, component: str | None) -> str:
+    """The component that is drawn: the one asked for, or the first that varies."""
     own = [str(name) for name, array in result.data_vars.items() if "point" in array.dims]
     if component is not None:
         if component not in own:
@@ -208,7 +209,7 @@ def _layers(
         masks = [seen & (np.arange(len(paths)) == k)[:, None, None, None] for k in range(len(paths))]
         return [(_SHADES[k], name, masks[k]) for k, name in enumerate(paths)]
     if colour == "attractor":
-        labels = result["attractor"].transpose(*result[_component(result, None)].dims[:3]).to_numpy()
+        labels = result["attractor"].transpose(*result[shown_component(result, None)].dims[:3]).to_numpy()
         numbers = np.unique(labels)
         return [
             (

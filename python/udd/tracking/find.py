@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,14 +38,18 @@ class Sight:
     area: float  # mean area of a mark [pixels]
 
 
-def chroma(picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Strength and hue [degrees, -90 ... 270] of the colour at half resolution."""
-    import cv2
-
-    u = picture.u.astype(np.float32) - 128
-    v = picture.v.astype(np.float32) - 128
-    strength, hue = cv2.cartToPolar(u, v, angleInDegrees=True)
-    return np.asarray(strength), np.where(hue > 285, hue - 360, hue)
+@cache
+def _names() -> NDArray[np.uint8]:
+    """Number of the colour, 1 to 4 (0: none), for each pair of colour differences, (256, 256) by U and V."""
+    difference = np.arange(256.0) - 128
+    u, v = difference[:, None], difference[None, :]
+    hue = np.degrees(np.arctan2(v, u)) % 360
+    hue = np.where(hue > 285, hue - 360, hue)
+    strong = np.hypot(u, v) > LEAST_CHROMA
+    names = np.zeros((256, 256), dtype=np.uint8)
+    for k, colour in enumerate(COLOURS):
+        names[strong & (hue > HUES[colour][0]) & (hue <= HUES[colour][1])] = k + 1
+    return names
 
 
 def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
@@ -62,10 +67,9 @@ def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
 
 def coloured(picture: Picture) -> list[Blobs]:
     """Blobs of each of the four colours, by broad hues."""
-    strength, hue = chroma(picture)
-    strong = strength > LEAST_CHROMA
+    name = _names().ravel()[(picture.u.astype(np.uint16) << 8) | picture.v]
     least = max(6, picture.u.size // 20000)
-    return [blobs(strong & (hue > HUES[c][0]) & (hue <= HUES[c][1]), least) for c in COLOURS]
+    return [blobs(name == k + 1, least) for k in range(len(COLOURS))]
 
 
 def squares(patches: list[Blobs], slack: float = 0.12) -> list[tuple[float, Sight]]:

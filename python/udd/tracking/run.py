@@ -26,13 +26,16 @@ from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
-from .result import Camera, metres, recount
+from .refine import refine as second_pass
+from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
+from .scale import Scale, scale
 from .survey import Survey, slowest, survey
 
 FEWEST_SIGHTS = 3  # survey frames that must show all four marks
 VAGUE = 0.005  # of the disk's radius: a position known no better is not given
 VAGUE_SAYS = "vague: too blurred or hidden to be placed"
+GONE_SAYS = "gone: the disk has left the wheels"
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 
 
@@ -51,7 +54,10 @@ def track(
     video: str | os.PathLike[str],
     *,
     disk_radius: float = 0.08,
+    mark_distance: float | None = None,
+    fps: float | None = None,
     pivot: tuple[float, float] | None = None,
+    refine: bool = True,
     progress: bool = False,
 ) -> Measurement:
     """Measure the motion of a disk with four coloured marks in a film.
@@ -62,9 +68,16 @@ def track(
         A film by a camera at rest, showing the whole disk with square marks red, orange, blue,
         green (clockwise) near its rim.
     disk_radius : float
-        Radius of the disk [m]; it sets the scale.
+        Radius of the disk [m]; with the marks' distance it sets the scale.
+    mark_distance : float, optional
+        Distance of the marks' centres from the disk's centre [m]. If not given, 65/80 of the radius where
+        the film agrees with that to 1.5 %, otherwise the rim alone sets the scale.
+    fps : float, optional
+        Frames per second, where the film's header does not tell the truth (slow motion).
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
+    refine : bool
+        Go over the film a second time, with each frame's blur known from its neighbours.
     progress : bool
         Show a progress bar.
 
@@ -92,25 +105,32 @@ def track(
     >>> m = udd.track("run.mp4", disk_radius=0.08)  # doctest: +SKIP
     >>> m.to_csv("run.csv")  # doctest: +SKIP
     """
-    return track_in_detail(video, disk_radius=disk_radius, pivot=pivot, progress=progress).measurement
+    return track_in_detail(
+        video,
+        disk_radius=disk_radius,
+        mark_distance=mark_distance,
+        fps=fps,
+        pivot=pivot,
+        refine=refine,
+        progress=progress,
+    ).measurement
 
 
 def track_in_detail(
     video: str | os.PathLike[str],
     *,
     disk_radius: float = 0.08,
+    mark_distance: float | None = None,
+    fps: float | None = None,
     pivot: tuple[float, float] | None = None,
+    refine: bool = True,
     progress: bool = False,
     watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
     """As `track`, with everything that was found on the way, in pixels; `watch` is told of each frame."""
-    try:
-        radius = float(disk_radius)
-    except (TypeError, ValueError):
-        raise TrackError(f"disk_radius must be a number of metres, not {disk_radius!r}") from None
-    if not (math.isfinite(radius) and radius > 0):
-        raise TrackError(f"disk_radius must be positive and finite, not {disk_radius!r}")
-    film = Film(video)
+    radius = _length(disk_radius, "disk_radius")
+    distance = None if mark_distance is None else _length(mark_distance, "mark_distance")
+    film = Film(video, fps=fps)
     look_over = survey(film)
     sights = sightings(look_over.pictures)
     seen = slowest(look_over.bursts, sights)
@@ -126,12 +146,19 @@ def track_in_detail(
     )
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
-    camera = _camera(tracks, known, rim, radius, pivot)
+    if refine:
+        tracks = _again(film, known, tracks, progress)
+    size = scale(known.look.places, rim, radius, distance)
+    camera = _camera(tracks, known, size, pivot)
     values, sigma, rho = metres(tracks, covariance(tracks), camera)
+    gone = left_the_wheels(values, radius, camera.pivot_sigma)
+    for table in (values, sigma, rho):
+        table[gone] = np.nan
     vague = np.hypot(sigma[:, 0], sigma[:, 1]) > VAGUE * radius
     for table in (values, sigma, rho):
         table[vague] = np.nan
     tracks.flag = [VAGUE_SAYS if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
+    tracks.flag = [GONE_SAYS if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
     meta = _meta(film, look_over, tracks, known, camera, radius, doubtful)
     measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
     try:
@@ -139,6 +166,16 @@ def track_in_detail(
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}") from None
     return Tracking(measurement, tracks, known, camera, rim)
+
+
+def _length(value: float, name: str) -> float:
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TrackError(f"{name} must be a number of metres, not {value!r}") from None
+    if not (math.isfinite(length) and length > 0):
+        raise TrackError(f"{name} must be positive and finite, not {value!r}")
+    return length
 
 
 def _follow(
@@ -156,17 +193,23 @@ def _follow(
         return follow(film.pictures(), known, tick)
 
 
-def _camera(
-    tracks: Tracks, known: Known, rim: Outline, radius: float, given: tuple[float, float] | None
-) -> Camera:
-    scale = rim.radius / radius
+def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
+    if not progress:
+        return second_pass(film.pictures(), known, tracks)
+    from tqdm import tqdm
+
+    with tqdm(total=len(tracks.t), unit="frame", desc=f"refine {film.path.name}") as bar:
+        return second_pass(film.pictures(), known, tracks, lambda _: bar.update())
+
+
+def _camera(tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None) -> Camera:
     angle, centre = np.array(tracks.angle), np.array(tracks.centre)
     good = np.isfinite(angle)
     found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
-    drive = complex(np.nan, np.nan) if found is None else complex(np.conj(found.drive) / scale)
+    drive = complex(np.nan, np.nan) if found is None else complex(np.conj(found.drive) / size.value)
 
     def camera(place: complex, sigma: float, origin: str) -> Camera:
-        return Camera(scale, rim.sigma / radius, place, sigma, origin, drive)
+        return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive)
 
     if given is not None:
         place = complex(float(given[0]), float(given[1]))
@@ -174,7 +217,7 @@ def _camera(
             raise TrackError(f"pivot must be two finite numbers, not {given!r}")
         return camera(complex(known.look.lens.plane(place)), 0.0, "given")
     if found is not None:
-        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / scale, "rolling constraint")
+        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / size.value, "rolling constraint")
     guess = support(known.view)
     if guess is None:
         raise TrackError(
@@ -209,8 +252,11 @@ def _meta(
         "frames_lost": lost,
         "turns_doubtful": doubtful,
         "exposure": known.exposure,
+        "readout": known.readout.value,
+        "readout_sigma": known.readout.sigma,
         "px_per_m": camera.scale,
         "px_per_m_sigma": camera.scale_sigma,
+        "px_per_m_from": camera.scale_from,
         "pivot_u": camera.pivot.real,
         "pivot_v": camera.pivot.imag,
         "pivot_sigma": camera.pivot_sigma,

@@ -1,0 +1,162 @@
+"""`udd continuation`: branches of equilibria and cycles over a parameter."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from udd.errors import UddError
+
+from .answer import Answer, as_json
+from .chosen import add_models, model_of
+from .options import new, numbers
+from .saving import PICTURES, save_picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from udd.models import Model
+    from udd.structure import Branch, Equilibrium, PeriodicOrbit
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Follow equilibria or a cycle over a parameter, through folds, and locate bifurcations."
+    parser = new(commands, "continuation", run, summary)
+    parser.add_argument("parameter", help="what is varied, such as w, W or relaxation.b")
+    parser.add_argument("--from", dest="first", type=float, required=True, help="least value")
+    parser.add_argument("--to", dest="last", type=float, required=True, help="largest value")
+    parser.add_argument(
+        "--at", type=float, help="value at which the start is looked for (default: the middle)"
+    )
+    parser.add_argument("--of", choices=("cycle", "equilibria"), default="cycle", help="what is followed")
+    parser.add_argument(
+        "--state", metavar="X,X,X", help="state near the cycle (default: run until it settles)"
+    )
+    parser.add_argument("--period", type=float, help="about the cycle's period (default: found)")
+    parser.add_argument(
+        "--born", type=int, default=0, metavar="N", help="follow branches born on the way, N generations"
+    )
+    parser.add_argument(
+        "--cascade", type=int, metavar="N", help="follow N period doublings from the first one on"
+    )
+    parser.add_argument("--most", type=int, default=2000, help="points at most (default 2000)")
+    parser.add_argument("--component", help="component of the state in the picture")
+    parser.add_argument(
+        "--view",
+        choices=("extremes", "section", "period"),
+        default="extremes",
+        help="what of a cycle is drawn (default extremes)",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="file to write, by its ending: .json, .png, .svg, .pdf; repeatable",
+    )
+    add_models(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    for path in args.out:
+        if path.suffix not in (".json", *PICTURES):
+            raise UddError(f"{path}: the name must end in .json, {', '.join(PICTURES)}")
+        if not path.parent.is_dir():
+            raise UddError(f"{path}: there is no folder {path.parent}")
+    if not args.first < args.last:
+        raise UddError(f"--from must be below --to, not {args.first:g} and {args.last:g}")
+    at = 0.5 * (args.first + args.last) if args.at is None else args.at
+    model = model_of(args, {args.parameter: at})
+    model = model.with_parameters({args.parameter: at})
+    branches = _branches(args, model)
+    data: dict[str, Any] = {
+        "model": repr(model),
+        "parameter": args.parameter,
+        "branches": [branch.as_dict() for branch in branches],
+    }
+    lines = [_text(branch) for branch in branches]
+    if args.cascade is not None:
+        found, said = _cascade(args, branches)
+        data["cascade"] = found
+        lines.append(said)
+    _save(args, branches, data)
+    data["files"] = args.out
+    return Answer("\n".join([*lines, *(f"written: {path}" for path in args.out)]), data)
+
+
+def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
+    from udd.structure import continuation, equilibria, periodic_orbit
+
+    bounds = (args.first, args.last)
+    starts: list[Equilibrium | PeriodicOrbit] = []
+    if args.of == "equilibria":
+        starts += equilibria(model)
+        if not starts:
+            raise UddError("there is no equilibrium to follow")
+    else:
+        guess = None if args.state is None else numbers([args.state], "--state")
+        starts.append(periodic_orbit(model, guess, period=args.period))
+    branches = [continuation(start, args.parameter, bounds, most=args.most) for start in starts]
+    new = branches
+    for _ in range(args.born):
+        born = []
+        for point in (point for branch in new for point in branch.points):
+            if point.kind in ("Hopf", "symmetry breaking", "period doubling", "branch point"):
+                born.append(continuation(point, bounds=bounds, most=args.most))
+        branches, new = branches + born, born
+    return branches
+
+
+def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str, Any], str]:
+    from udd.structure import cascade
+
+    points = [point for branch in branches for point in branch.points]
+    ways = [p for p in points if p.kind == "period doubling"] or [
+        p for p in points if p.kind == "symmetry breaking"
+    ]
+    if not ways:
+        raise UddError("there is no period doubling or symmetry breaking from which a cascade could go on")
+    found = cascade(ways[0], bounds=(args.first, args.last), n=args.cascade)
+    data = {
+        "values": found.values.tolist(),
+        "errors": found.errors.tolist(),
+        "ratios": found.ratios.tolist(),
+        "limit": found.limit,
+    }
+    lines = [f"period doublings over {found.parameter}:"]
+    for k, (value, error) in enumerate(zip(found.values, found.errors, strict=True)):
+        ratio = f"   ratio {found.ratios[k - 2]:.6g}" if k >= 2 else ""
+        lines.append(f"  {value:.12g} (error below {error:.1g}){ratio}")
+    lines.append(f"  they accumulate at {found.limit:.10g}")
+    return data, "\n".join(lines)
+
+
+def _text(branch: Branch) -> str:
+    name = branch.parameter
+    what = "equilibria" if branch.kind == "equilibrium" else "cycles"
+    what = f"symmetric {what}" if branch.symmetric else what
+    lines = [
+        f"{what}, {name} = {branch.values.min():.6g} to {branch.values.max():.6g}, {len(branch)} points, "
+        f"{100 * float(branch.stable.mean()):.0f} % of them stable; ends: {'; '.join(branch.ends)}"
+    ]
+    lines += [f"  {str(point)[1:-1]}" for point in branch.points]
+    return "\n".join(lines)
+
+
+def _save(args: argparse.Namespace, branches: list[Branch], data: dict[str, Any]) -> None:
+    from udd.files import write_whole
+
+    def draw(ax: Axes) -> None:
+        from udd.plot import branches as draw_branches
+
+        draw_branches(branches, ax, component=args.component, view=args.view)
+
+    for path in args.out:
+        if path.suffix == ".json":
+            write_whole(path, as_json(data).encode())
+        else:
+            save_picture(path, draw)

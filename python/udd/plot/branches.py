@@ -1,0 +1,266 @@
+"""Branches of equilibria and cycles over a parameter, with their bifurcation points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd.errors import UddError
+
+from .style import AXES, FAINT, new_axes, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from udd.structure import Branch
+    from udd.structure.diagrams import Diagram
+
+_STABLE, _UNSTABLE = "#000000", "#cc3311"
+_MARKS = {
+    "fold": ("v", "#0072b2"),
+    "fold at a kink": (">", "#0072b2"),
+    "Hopf": ("s", "#009e73"),
+    "symmetry breaking": ("D", "#cc79a7"),
+    "period doubling": ("o", "#e69f00"),
+    "Neimark-Sacker": ("p", "#56b4e9"),
+    "branch point": ("^", "#999999"),
+    "kink": ("x", "#999999"),
+}
+_OPEN = 400  # lines that a piece may belong to
+_NEAR = 0.12  # crossings of neighbouring cycles are joined within this part of the picture's height
+
+
+def branches(
+    result: Branch | Sequence[Branch],
+    ax: Axes | None = None,
+    *,
+    component: str | None = None,
+    view: str = "section",
+    section: str | None = None,
+) -> Axes:
+    """Branches over the parameter: stable ones solid, unstable ones dashed, bifurcation points marked.
+
+    Parameters
+    ----------
+    result : Branch or sequence of Branch
+        Of :func:`udd.continuation`.
+    ax : Axes, optional
+    component : str, optional
+        Which component of the state; by default the first.
+    view : {"section", "extremes", "period"}
+        Of cycles: where they cross a section, between which values the component moves, or their periods.
+    section : str, optional
+        The section, upward; by default that of :func:`udd.poincare`.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        No branches, or a component or view that there is not.
+
+    Examples
+    --------
+    >>> import udd
+    >>> branch = udd.continuation(udd.periodic_orbit(udd.DLE(8.0)), "w", (6.8, 8.2))
+    >>> udd.plot.branches(branch, view="extremes").get_xlabel()
+    'w'
+    """
+    from udd.structure import Branch
+
+    given = [result] if isinstance(result, Branch) else list(result)
+    if not given or not all(isinstance(branch, Branch) for branch in given):
+        raise UddError("these are no branches: udd.continuation makes them")
+    if view not in ("section", "extremes", "period"):
+        raise UddError(f'view must be "section", "extremes" or "period", not {view!r}')
+    model, parameter = given[0].model, given[0].parameter
+    name = model.state_names[0] if component is None else component
+    if name not in model.state_names:
+        raise UddError(f"the state has no {name!r}; it has {', '.join(model.state_names)}")
+    ax = new_axes(ax)
+    for branch in given:
+        _draw(ax, branch, name, view, section)
+    _mark(ax, given, name, view, section)
+    unit = model.units[parameter]
+    ax.set_xlabel(f"{parameter} [{unit}]" if unit else parameter)
+    if view == "period":
+        ax.set_ylabel("period [1]" if model.kind == "dle" else "period [s]")
+    else:
+        ax.set_ylabel(_axis(model, name)[0])
+    tidy(ax, grid=False)
+    _legend(ax)
+    return ax
+
+
+def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = None) -> Axes:
+    """The one diagram: what motions do up and down, hysteresis shaded, branches and their points over it.
+
+    Parameters
+    ----------
+    result : Diagram
+        Of :func:`udd.diagram`.
+    ax : Axes, optional
+    component : str, optional
+        Which component of the state; by default the first that varies.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UddError
+        The result is no diagram, or has no such component.
+
+    Examples
+    --------
+    >>> import numpy as np, udd
+    >>> found = udd.diagram(udd.DLE(8.0), "w", np.linspace(7.0, 7.4, 5), n=24)
+    >>> udd.plot.diagram(found).get_ylabel()
+    'ω [1]'
+    """
+    from udd.structure.diagrams import Diagram
+
+    from .maps import bifurcation, shown_component
+
+    if not isinstance(result, Diagram):
+        raise UddError(f"this is no diagram, which udd.diagram makes, but {type(result).__name__}")
+    name = shown_component(result.scan, component)
+    ax = bifurcation(result.scan, ax, component=name)
+    low, high = ax.get_ylim()
+    section = str(result.scan.attrs.get("section", "")) or None
+    if result.branches:
+        branches(result.branches, ax, component=name, section=section)
+    # Branches may go far beyond what motions do.
+    ax.set_ylim(low - 0.15 * (high - low), high + 0.15 * (high - low))
+    first, last = result.scan[result.parameter].to_numpy()[[0, -1]]
+    ax.set_xlim(first, last)
+    return ax
+
+
+def _axis(model: Any, name: str) -> tuple[str, float]:
+    if name in AXES:
+        words, unit, factor = AXES[name]
+        return f"{words} [{unit}]", factor
+    units = dict(zip(model.state_names, model.state_units, strict=True))
+    return f"{name} [{units.get(name) or '1'}]", 1.0
+
+
+def _curves(branch: Branch, name: str, view: str, section: str | None) -> list[list[NDArray[Any]]]:
+    """For each place on the branch the values that are drawn there, of the mirror image too."""
+    column, factor = branch.model.state_names.index(name), _axis(branch.model, name)[1]
+    if view == "period" and branch.kind == "cycle":
+        return [[np.array([period])] for period in branch.periods]
+    sign = _mirrored(branch, column)
+    if branch.kind == "equilibrium" or view == "extremes":
+        ends = [branch.states] if branch.kind == "equilibrium" else list(branch.extremes)
+        rows = np.array([end[:, column] for end in ends]).T * factor
+        return [[row, *([sign * row] if sign else [])] for row in rows]
+    which, states = branch.crossings(section)
+    values = [factor * states[which == i, column] for i in range(len(branch))]
+    return [[np.sort(row), *([np.sort(sign * row)] if sign else [])] for row in values]
+
+
+def _mirrored(branch: Branch, column: int) -> float:
+    """The sign of a component in the mirror image that is drawn too, 0 where there is none."""
+    flow = branch._places[0][0].flow
+    if flow.mirror is None or branch.symmetric or column not in flow.kept:
+        return 0.0
+    return float(flow.mirror[list(flow.kept).index(column)])
+
+
+def _draw(ax: Axes, branch: Branch, name: str, view: str, section: str | None) -> None:
+    from matplotlib.collections import LineCollection
+
+    if view == "period" and branch.kind != "cycle":
+        return
+    rows = _curves(branch, name, view, section)
+    every = np.concatenate([part for row in rows for part in row] or [np.zeros(1)])
+    near = _NEAR * float(np.ptp(every)) if every.size else 0.0
+    # Between two places; at a bifurcation itself rounding would decide.
+    turning = np.isin(branch.arclength, [point.arclength for point in branch.points])
+    held = np.where(turning[:-1], branch.stable[1:], branch.stable[:-1])
+    for stable, shade, style, width in ((True, _STABLE, "-", 1.6), (False, _UNSTABLE, (0, (4, 2)), 0.9)):
+        lines: list[list[tuple[float, float]]] = []
+        for i in np.flatnonzero(held == stable):
+            for here, there in zip(rows[i], rows[i + 1], strict=True):
+                if not len(there):
+                    continue
+                same = len(here) == len(there)
+                others = there if same else [there[np.argmin(np.abs(there - a))] for a in here]
+                for a, b in zip(here, others, strict=True):
+                    if abs(a - b) <= near or near == 0.0:
+                        _join(lines, (branch.values[i], a), (branch.values[i + 1], b))
+        drawn = LineCollection(
+            lines,
+            colors=shade,
+            linewidths=width,
+            linestyles=[style],
+            zorder=3 if stable else 2.5,
+            label="stable" if stable else "unstable",
+        )
+        ax.add_collection(drawn)
+    ax.autoscale_view()
+
+
+def _join(
+    lines: list[list[tuple[float, float]]], first: tuple[float, float], last: tuple[float, float]
+) -> None:
+    """Prolong the line that ends where this piece begins, or begin one: dashes run on along a line."""
+    for line in reversed(lines[-_OPEN:]):
+        if line[-1] == first:
+            line.append(last)
+            return
+    lines.append([first, last])
+
+
+def _mark(ax: Axes, given: Sequence[Branch], name: str, view: str, section: str | None) -> None:
+    for branch in given:
+        column, factor = branch.model.state_names.index(name), _axis(branch.model, name)[1]
+        for point in branch.points:
+            marker, shade = _MARKS.get(point.kind, ("*", FAINT))
+            if view == "period":
+                heights = [point.period] if branch.kind == "cycle" else []
+            else:
+                heights = _heights(branch, point, column, factor, view, section)
+            ax.plot(
+                [point.value] * len(heights),
+                heights,
+                linestyle="none",
+                marker=marker,
+                color=shade,
+                markersize=4.5,
+                markeredgecolor="black" if marker != "x" else shade,
+                markeredgewidth=0.6,
+                zorder=5,
+                label=point.kind,
+            )
+
+
+def _heights(
+    branch: Branch, point: Any, column: int, factor: float, view: str, section: str | None
+) -> list[float]:
+    """Where a bifurcation point is marked: on every line of the branch, at the place next to it."""
+    i = int(np.argmin(np.abs(branch.arclength - point.arclength)))
+    sign = _mirrored(branch, column)
+    if branch.kind == "equilibrium":
+        own = [factor * float(point.solution.state[column])]
+    elif view == "extremes":
+        own = [factor * float(end[i, column]) for end in branch.extremes]
+    else:
+        which, states = branch.crossings(section)
+        own = [factor * float(value) for value in states[which == i, column]]
+    return own + ([sign * value for value in own] if sign else [])
+
+
+def _legend(ax: Axes) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    first = {text: handle for handle, text in zip(reversed(handles), reversed(labels), strict=True)}
+    if first:
+        words = sorted(first, key=labels.index)
+        ax.legend([first[text] for text in words], words, frameon=False, fontsize="small")

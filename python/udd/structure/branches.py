@@ -1,0 +1,252 @@
+"""Branches of equilibria and cycles over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd._validate import number
+from udd.errors import ModelError
+from udd.models import Model
+
+from .branch import BifurcationPoint, Branch
+from .cycle_curve import CycleCurve
+from .flow import Floats, Flow, flow_of
+from .following import AnyCurve, Limits, Way, follow
+from .path import Lost, Place, correct, tangent_at
+from .rest_curve import RestCurve
+from .signs import Signs
+from .solutions import Equilibrium, PeriodicOrbit
+from .switching import born_at
+
+__all__ = ["branch_from", "continuation"]
+
+
+def continuation(
+    start: Equilibrium | PeriodicOrbit | BifurcationPoint,
+    parameter: str | None = None,
+    bounds: Sequence[float] = (0.0, np.inf),
+    *,
+    direction: Literal["both", "up", "down"] = "both",
+    step: float = 0.02,
+    longest: float = 0.1,
+    most: int = 2000,
+    period: float | None = None,
+    until: str | Callable[[BifurcationPoint], bool] | None = None,
+    amplitude: float = 0.01,
+) -> Branch:
+    """Follow an equilibrium or a cycle over a parameter, through folds, and tell where it bifurcates.
+
+    Parameters
+    ----------
+    start : Equilibrium, PeriodicOrbit or BifurcationPoint
+        From :func:`udd.equilibria`, :func:`udd.periodic_orbit`, or from another branch: of a bifurcation
+        point the branch that is born there is followed (of a Hopf bifurcation the cycles, of a period
+        doubling those of twice the period, ...), away from it.
+    parameter : str, optional
+        One of ``model.parameters``; by default that of the bifurcation point.
+    bounds : (float, float)
+        The branch ends where the parameter leaves them.
+    direction : {"both", "up", "down"}
+        Whether the parameter rises or falls from the start on, or the branch is followed both ways.
+    step, longest : float
+        The first and the longest step, in arclength: states count in typical sizes, the parameter in units
+        of its value at the start.
+    most : int
+        Points at most, in either direction.
+    period : float, optional
+        A branch of cycles ends where the period exceeds this, by default 40 typical times, or 8
+        times that of the start.
+    until : str or callable, optional
+        A kind of bifurcation whose first point ends the branch, or what tells it of a
+        :class:`BifurcationPoint`.
+    amplitude : float
+        How far from a bifurcation point its new branch is looked for first.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    ModelError
+        A parameter or option that cannot be used; a point where no branch is born.
+
+    Notes
+    -----
+    The curve is followed by its arclength (H. B. Keller, 1977): a step along the tangent, then Newton's
+    method in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of
+    pairs of multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method
+    along the arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its
+    period, where losing the symmetry is a multiplier -1. Where an equilibrium meets a surface on which the
+    law has a kink, the branch lands on it and goes on with the other law's tangent.
+
+    Examples
+    --------
+    The symmetric figure-eight of the diffusionless Lorenz equations loses its symmetry:
+
+    >>> import udd
+    >>> branch = udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (6.5, 12.0))
+    >>> [(point.kind, round(point.value, 9)) for point in branch.points]
+    [('symmetry breaking', 7.096426431)]
+    """
+    if isinstance(start, BifurcationPoint):
+        parameter = start.parameter if parameter is None else parameter
+        if parameter != start.parameter:
+            raise ModelError(f"the branch born there is one over {start.parameter}, not {parameter}")
+    elif not isinstance(start, Equilibrium | PeriodicOrbit):
+        raise ModelError(
+            "the start must come from udd.equilibria, udd.periodic_orbit or a branch's points, "
+            f"not {type(start).__name__}"
+        )
+    if parameter is None:
+        raise ModelError("say which parameter is varied")
+    if direction not in ("both", "up", "down"):
+        raise ModelError(f"direction must be both, up or down, not {direction!r}")
+    low, high = _bounds(bounds)
+    step = number("step", step, above=0.0)
+    longest = max(number("longest", longest, above=0.0), step)
+    if isinstance(start, BifurcationPoint):
+        curve, place = born_at(start, number("amplitude", amplitude, above=0.0))
+        model = start.solution.model
+    else:
+        model = start.model
+        curve, place = _at(start, parameter)
+    value = curve.value(place.u)
+    if not low <= value <= high:
+        raise ModelError(
+            f"the start, at {parameter} = {value:.6g}, lies outside the bounds {low:g} to {high:g}"
+        )
+    own = curve.span(place.u) if isinstance(curve, CycleCurve) else 0.0
+    limit = max(40.0 * curve.flow.clock, 8.0 * own)
+    limit = limit if period is None else number("period", period, above=0.0)
+    wanted = _wanted(until)
+    limits = Limits(low, high, step, longest, int(most), limit, until=wanted)
+    if isinstance(start, BifurcationPoint):
+        return branch_from(
+            [follow(curve, place, parameter, limits)], model, parameter, f"born at a {start.kind}"
+        )
+    up = place if place.tangent[-1] >= 0 else Place(place.u, -place.tangent)
+    ways = []
+    if direction in ("both", "down"):
+        ways.append(follow(curve, Place(up.u, -up.tangent), parameter, limits))
+    if direction in ("both", "up"):
+        ways.append(follow(curve, up, parameter, limits))
+    return branch_from(ways, model, parameter, "the start")
+
+
+def _bounds(bounds: Sequence[float]) -> tuple[float, float]:
+    try:
+        low, high = (float(bound) for bound in bounds)
+    except (TypeError, ValueError):
+        raise ModelError(f"bounds must be two numbers, not {bounds!r}") from None
+    if not low < high:
+        raise ModelError(f"the first of the bounds must be below the second, not {low:g} and {high:g}")
+    return low, high
+
+
+def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[[BifurcationPoint], bool]:
+    if until is None:
+        return lambda point: False
+    if isinstance(until, str):
+        return lambda point: point.kind == until
+    return until
+
+
+def _free(model: Model) -> Model:
+    """The model whose runs do not end on the edge."""
+    return model.replace(edge="ignore") if hasattr(model, "edge") else model
+
+
+def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, Place]:
+    """The curve through a solution, and the place there."""
+    flow: Flow = flow_of(_free(start.model), np.atleast_2d(start.state))
+    index = flow.index(parameter)
+    value = float(flow.values[index])
+    curve: AnyCurve
+    if isinstance(start, Equilibrium):
+        scale = abs(value) or 1.0
+        curve = RestCurve(flow, flow.values, index, scale)
+        u = curve.pack(flow.reduced(start.state), value)
+    else:
+        if start._curve is None or start._unknowns is None:
+            raise ModelError("this cycle was not made by udd.periodic_orbit")
+        old = start._curve
+        curve = replace(
+            old,
+            flow=replace(old.flow, model=flow.model),
+            values=flow.values,
+            parameter=index,
+            scale=abs(value) or 1.0,
+            clock=old.span(start._unknowns),
+        )
+        u = curve.pack(old.nodes(start._unknowns), old.span(start._unknowns), value)
+        curve.fix_phase(u)
+    row: Floats = np.zeros(len(u))
+    row[-1] = 1.0
+    try:
+        u = correct(curve, u, row)
+        if isinstance(curve, CycleCurve):
+            curve.fix_phase(u)
+        return curve, Place(u, tangent_at(curve, u, row))
+    except Lost as error:
+        raise ModelError(f"the start cannot be followed: {error}") from None
+
+
+def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Branch:
+    """The branch made of one way, or of two that begin at the same place, the first of them turned round."""
+    entries: list[tuple[AnyCurve, Place, Signs, float]]
+    if len(ways) == 2:
+        back, on = ways
+        length = back.places[-1][3]
+        turned = [(c, Place(p.u, -p.tangent), s, length - a) for c, p, s, a in reversed(back.places)]
+        entries = [*turned[:-1], *((c, p, s, length + a) for c, p, s, a in on.places)]
+        points = [replace(p, arclength=length - p.arclength) for p in reversed(back.points)]
+        points += [replace(p, arclength=length + p.arclength) for p in on.points]
+        ends = (back.end, on.end)
+    else:
+        entries, points, ends = ways[0].places, ways[0].points, (begin, ways[0].end)
+    values = np.array([curve.value(place.u) for curve, place, _, _ in entries])
+    first = entries[0][0]
+    symmetric = False
+    multipliers, states, periods = [], [], []
+    for curve, place, signs, _ in entries:
+        own = signs.values
+        if isinstance(curve, CycleCurve):
+            symmetric = bool((curve.mirror < 0).any())
+            own = own**2 if symmetric else own
+            state = curve.flow.full(curve.nodes(place.u)[0])
+            periods.append(curve.span(place.u) * (2.0 if symmetric else 1.0))
+        else:
+            state = curve.flow.full(curve.state(place.u))
+            mirror = curve.flow.mirror
+            if mirror is not None:
+                symmetric = bool(np.allclose(mirror * curve.state(place.u), curve.state(place.u), atol=1e-12))
+            periods.append(np.nan)
+        states.append(state)
+        key = -np.abs(own) if isinstance(curve, CycleCurve) else -own.real
+        multipliers.append(own[np.argsort(key, kind="stable")])
+    table = np.array(multipliers)
+    cycle = isinstance(first, CycleCurve)
+    inside = np.abs(table) < 1 if cycle else table.real < 0
+    stable: NDArray[np.bool_] = np.all(inside, axis=1)
+    return Branch(
+        model,
+        parameter,
+        "cycle" if cycle else "equilibrium",
+        values,
+        np.array(states),
+        np.array(periods),
+        table,
+        stable,
+        symmetric,
+        np.array([a for _, _, _, a in entries]),
+        tuple(points),
+        ends,
+        first,
+        tuple((curve, place) for curve, place, _, _ in entries),
+    )

@@ -1,0 +1,147 @@
+"""Cascades of period doublings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from udd.errors import ModelError
+
+from .branch import BifurcationPoint, Branch
+from .branches import continuation
+from .flow import Floats
+from .solutions import PeriodicOrbit
+
+__all__ = ["Cascade", "cascade"]
+
+_KIND = "period doubling"
+_CLOSER = (
+    2.5  # by about so much the doubled orbits differ less from one doubling to the next (Feigenbaum's alpha)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Cascade:
+    """Period doublings that follow one another.
+
+    Attributes
+    ----------
+    parameter : str
+    points : tuple of BifurcationPoint
+        The doublings.
+    branches : tuple of Branch
+        The cycles that lead to each of them.
+    """
+
+    parameter: str
+    points: tuple[BifurcationPoint, ...]
+    branches: tuple[Branch, ...]
+
+    @property
+    def values(self) -> Floats:
+        """The parameter's value at each doubling, shape (n,)."""
+        return np.array([point.value for point in self.points])
+
+    @property
+    def errors(self) -> Floats:
+        """Bounds of these values' errors, shape (n,)."""
+        return np.array([point.error for point in self.points])
+
+    @property
+    def ratios(self) -> Floats:
+        """The ratios of successive spacings, shape (n - 2,): they tend to Feigenbaum's 4.669201609."""
+        spacing = np.diff(self.values)
+        return spacing[:-1] / spacing[1:]
+
+    @property
+    def limit(self) -> float:
+        """Where the doublings accumulate, extrapolated from the last three (Aitken); NaN of fewer."""
+        if len(self.points) < 3:
+            return float("nan")
+        a, b, c = self.values[-3:]
+        return float(c - (c - b) ** 2 / ((c - b) - (b - a)))
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{value:.11g}" for value in self.values)
+        ratios = ", ".join(f"{ratio:.5g}" for ratio in self.ratios)
+        return f"<Cascade over {self.parameter}: {values}; ratios {ratios}; limit {self.limit:.9g}>"
+
+
+def cascade(
+    start: PeriodicOrbit | BifurcationPoint,
+    parameter: str | None = None,
+    bounds: Sequence[float] = (0.0, np.inf),
+    *,
+    n: int = 6,
+    direction: Literal["up", "down"] = "down",
+) -> Cascade:
+    """Follow a cascade of period doublings.
+
+    Parameters
+    ----------
+    start : PeriodicOrbit or BifurcationPoint
+        A cycle before its first doubling, or a period doubling or symmetry breaking from
+        :func:`udd.continuation`.
+    parameter : str, optional
+        The parameter that is varied; by default that of the bifurcation point.
+    bounds : (float, float)
+        The cascade ends where the parameter leaves them.
+    n : int
+        How many doublings are wanted, at least 1.
+    direction : {"up", "down"}
+        Which way from the cycle; a bifurcation point knows its own.
+
+    Returns
+    -------
+    Cascade
+
+    Raises
+    ------
+    ModelError
+        Where no doubling follows: the message says which was the last.
+
+    Notes
+    -----
+    Each doubled cycle is followed from its birth until it doubles itself, with steps that become shorter as
+    the cycles do. See :func:`udd.continuation`.
+
+    Examples
+    --------
+    >>> import udd
+    >>> found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=3)
+    >>> found.values.round(6).tolist()
+    [5.394713, 5.086062, 5.02182]
+    """
+    if n < 1:
+        raise ModelError(f"at least one doubling must be wanted, not {n}")
+    points: list[BifurcationPoint] = []
+    branches: list[Branch] = []
+    if isinstance(start, BifurcationPoint) and start.kind == _KIND:
+        points.append(start)
+    closer = 1.0
+    while len(points) < n:
+        if not points:
+            branch = continuation(start, parameter, bounds, direction=direction, until=_KIND)
+        else:
+            closer *= _CLOSER
+            branch = continuation(
+                points[-1],
+                bounds=bounds,
+                until=_KIND,
+                period=4.0 * points[-1].period,
+                step=0.01 / closer,
+                longest=0.05 / closer,
+                amplitude=0.01 / closer,
+            )
+        found = branch.find(_KIND)
+        if not found:
+            last = f"after that at {points[-1].value:.10g}" if points else "from the start"
+            raise ModelError(
+                f"{len(points)} of {n} doublings are found: {last} the branch ends at {branch.ends[-1]}"
+            )
+        branches.append(branch)
+        points.append(found[0])
+    return Cascade(points[0].parameter, tuple(points), tuple(branches))

@@ -1,0 +1,163 @@
+"""Cycles as a curve over a parameter: multiple shooting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .flow import Flight, Floats, Flow
+from .path import _DENSE
+
+__all__ = ["CycleCurve"]
+
+
+@lru_cache(maxsize=16)
+def _pattern(m: int, r: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of the matrix of the equations.
+
+    In this order: the pieces' derivatives, the nodes after them, the span, the parameter, and the phase.
+    """
+    n = m * r
+    own, each = np.arange(n), np.arange(n).reshape(m, r)
+    rows = [np.repeat(own, r), own, own, own, np.full(r, n)]
+    after = np.roll(each, -1, axis=0).ravel()
+    columns = [np.repeat(each, r, axis=0).ravel(), after, np.full(n, n), np.full(n, n + 1), np.arange(r)]
+    return np.concatenate(rows), np.concatenate(columns)
+
+
+@dataclass(eq=False)
+class CycleCurve:
+    """Scaled nodes of an orbit that closes after the time `span`, and that time, and the parameter.
+
+    The orbit is cut into pieces of equal time. What comes out of the last one, seen in the mirror where
+    `mirror` has signs and turned by `shift`, must be where the first one starts: a symmetric cycle is
+    followed over half its period. The phase is fixed by the plane through a reference across its flow.
+
+    Attributes
+    ----------
+    flow : Flow
+    values : ndarray
+        The model's parameters, of which the one with the index `parameter` is varied.
+    scale : float
+        The unit of the parameter in the unknowns.
+    clock : float
+        The unit of time in the unknowns.
+    pieces : int
+    mirror : ndarray (r,)
+        Signs, all of them +1 where there is no mirror.
+    shift : ndarray (r,)
+        What is added at the end: turns of angles.
+    reference, across : ndarray (r,)
+        The plane that the first node lies in.
+    """
+
+    flow: Flow
+    values: Floats
+    parameter: int
+    scale: float
+    clock: float
+    pieces: int
+    mirror: Floats
+    shift: Floats
+    reference: Floats
+    across: Floats
+    loose: float = 1.0
+    seen: tuple[Floats, Flight] | None = field(default=None, init=False)
+
+    def pack(self, nodes: Floats, span: float, value: float) -> Floats:
+        """Unknowns from nodes (m, r), the time and the parameter's value."""
+        weight = 1.0 / np.sqrt(self.pieces)
+        scaled = (nodes / self.flow.size * weight).ravel()
+        return np.append(scaled, [span / self.clock, value / self.scale])
+
+    def nodes(self, u: Floats) -> Floats:
+        """The nodes (m, r)."""
+        nodes: Floats = u[:-2].reshape(self.pieces, -1) * self.flow.size * np.sqrt(self.pieces)
+        return nodes
+
+    def span(self, u: Floats) -> float:
+        """The time until the orbit closes."""
+        return float(u[-2] * self.clock)
+
+    def value(self, u: Floats) -> float:
+        """The parameter's value."""
+        return float(u[-1] * self.scale)
+
+    def values_at(self, u: Floats) -> Floats:
+        """All parameters."""
+        values = self.values.copy()
+        values[self.parameter] = self.value(u)
+        return values
+
+    def fix_phase(self, u: Floats) -> None:
+        """Take this orbit's first node for the reference."""
+        self.reference = self.nodes(u)[0]
+        rate = self.rate_at(self.values_at(u), self.reference)
+        self.across = rate / np.linalg.norm(rate / self.flow.size) / self.flow.size**2
+
+    def rate_at(self, values: Floats, x: Floats) -> Floats:
+        """The rate at a reduced state."""
+        rate: Floats = self.flow.with_values(values).rates(0.0, self.flow.full(x))[self.flow.kept]
+        return rate
+
+    def flight(self, u: Floats) -> Flight:
+        """Where the pieces end, with derivatives by the parameter."""
+        if self.seen is None or not np.array_equal(self.seen[0], u):
+            spans = np.full(self.pieces, self.span(u) / self.pieces)
+            found = self.flow.fly(
+                self.values_at(u), self.nodes(u), spans, (self.parameter,), loose=self.loose
+            )
+            self.seen = u.copy(), found
+        return self.seen[1]
+
+    def equations(self, u: Floats) -> tuple[Floats, Floats | sparse.csr_array]:
+        """Scaled gaps between the pieces and the phase, and their derivatives."""
+        m, r, size = self.pieces, self.flow.dim, self.flow.size
+        weight = 1.0 / np.sqrt(m)
+        nodes, found = self.nodes(u), self.flight(u)
+        turn = np.ones((m, r))
+        turn[-1] = self.mirror
+        ends = found.x * turn
+        ends[-1] += self.shift
+        gaps = (ends - np.roll(nodes, -1, axis=0)) / size
+        by_state = found.by_state * turn[:, :, None] * size / size[:, None] / weight
+        by_span = found.rate * turn / size * (self.clock / m)
+        by_value = found.by_parameter[:, :, 0] * turn / size * self.scale
+        phase = float(self.across @ (nodes[0] - self.reference))
+        residual = np.append(gaps.ravel(), phase)
+        n = m * r
+        if n <= _DENSE:
+            dense = np.zeros((n + 1, n + 2))
+            for i in range(m):
+                rows, after = slice(i * r, i * r + r), ((i + 1) % m) * r
+                dense[rows, rows] += by_state[i]
+                dense[rows, after : after + r] -= np.eye(r) / weight
+            dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
+            dense[n, :r] = self.across * size / weight
+            return residual, dense
+        minus = np.full(n, -1.0 / weight)
+        row = self.across * size / weight
+        data = np.concatenate([by_state.ravel(), minus, by_span.ravel(), by_value.ravel(), row])
+        return residual, sparse.csr_array((data, _pattern(m, r)), shape=(n + 1, n + 2))
+
+    def closing(self, u: Floats) -> Floats:
+        """The derivative (r, r) of the map from the first node to where the orbit closes."""
+        product = np.eye(self.flow.dim)
+        for matrix in self.flight(u).by_state:
+            product = matrix @ product
+        return self.mirror[:, None] * product
+
+    def across_flow(self, u: Floats) -> Floats:
+        """The same (r - 1, r - 1) across the flow, in scaled coordinates: what multipliers come from."""
+        size = self.flow.size
+        scaled = self.closing(u) * size / size[:, None]
+        rate = self.rate_at(self.values_at(u), self.nodes(u)[0]) / size
+        # An orthonormal basis whose first vector is along the flow, which the map leaves as it is.
+        basis, _ = np.linalg.qr(np.column_stack([rate, np.eye(self.flow.dim)]))
+        rest = basis[:, 1:]
+        result: Floats = rest.T @ scaled @ rest
+        return result

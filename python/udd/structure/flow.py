@@ -1,0 +1,152 @@
+"""The flow of a model in the coordinates that matter, with its derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.branching.coordinates import coordinates_of
+from udd.errors import ModelError
+from udd.models import Model
+
+__all__ = ["Flight", "Floats", "Flow", "flow_of"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Where pieces of orbits end.
+
+    States (m, r), derivatives by the starts (m, r, r) and by up to two parameters (m, r, 2), rates (m, r).
+    """
+
+    x: Floats
+    by_state: Floats
+    by_parameter: Floats
+    rate: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """A model without the angles that nothing depends on.
+
+    Attributes
+    ----------
+    model : Model
+        Its parameters' values are those of the start; every call brings its own.
+    kept : ndarray of int (r,)
+        The components of the state on which the rates depend.
+    size : ndarray (r,)
+        What is large for each of them.
+    clock : float
+        A typical time.
+    mirror : ndarray (r,) or None
+        The signs of the model's symmetry, if it has one.
+    rtol, atol : float
+        Tolerances of the runs; `atol` is relative to the sizes.
+    """
+
+    model: Model
+    kept: NDArray[np.intp]
+    size: Floats
+    clock: float
+    mirror: Floats | None
+    rtol: float = 1e-13
+    atol: float = 1e-15
+    _made: dict[bytes, Model] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The parameters' names."""
+        return list(self.model.parameters)
+
+    @cached_property
+    def values(self) -> Floats:
+        """The parameters' values."""
+        return np.array(list(self.model.parameters.values()))
+
+    @property
+    def dim(self) -> int:
+        """The number of components kept."""
+        return len(self.kept)
+
+    def index(self, parameter: str) -> int:
+        """The place of a parameter."""
+        if parameter not in self.names:
+            raise ModelError(
+                f"{type(self.model).__name__} has no parameter {parameter!r}; it has {', '.join(self.names)}"
+            )
+        return self.names.index(parameter)
+
+    def reduced(self, state: Floats) -> Floats:
+        """States (..., dim of the model) without the angles left out."""
+        return np.ascontiguousarray(np.asarray(state, dtype=np.float64)[..., self.kept])
+
+    def full(self, x: Floats) -> Floats:
+        """Reduced states as states of the model: the angles left out are zero."""
+        state = np.zeros((*x.shape[:-1], len(self.model.state_names)))
+        state[..., self.kept] = x
+        return state
+
+    def fly(
+        self, values: Floats, x: Floats, spans: Floats, wanted: tuple[int, ...] = (), loose: float = 1.0
+    ) -> Flight:
+        """Follow pieces from `x` (m, r), each for its span; `values` (p,) are the parameters of all.
+
+        `loose` multiplies the tolerances.
+        """
+        count = len(x)
+        rows = np.tile(values, (count, 1))
+        atol = self.atol * float(np.min(self.size)) * loose
+        found = _core.shoot(
+            self.model, rows, self.full(x), np.zeros(count), spans, list(wanted), self.rtol * loose, atol
+        )
+        kept = self.kept
+        return Flight(
+            found["x"][:, kept],
+            found["by_state"][:, kept][:, :, kept],
+            found["by_parameter"][:, kept],
+            found["rate"][:, kept],
+        )
+
+    def with_values(self, values: Floats) -> Model:
+        """The model with these parameters; made once for values that come several times in a row."""
+        key = values.tobytes()
+        if key not in self._made:
+            self._made.clear()
+            self._made[key] = self.model.with_parameters(dict(zip(self.names, values.tolist(), strict=True)))
+        return self._made[key]
+
+
+def flow_of(model: Model, states: Floats, rtol: float = 1e-13) -> Flow:
+    """The flow of a model near these states (n, dim).
+
+    Raises
+    ------
+    ModelError
+        The rates depend on time, or the model has too few states.
+    """
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    # A component that happens to be small is no smaller than a tenth of the largest.
+    seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
+    found = coordinates_of(model, seen)
+    # At states of no particular kind; the same in every process.
+    finite = np.where(np.isfinite(found.size), found.size, 1.0)
+    probes = finite * np.random.default_rng(2).uniform(-0.9, 0.9, (8, len(finite)))
+    now, later = (model.rates(np.full(8, t), probes) for t in (0.0, 0.7371 * found.clock))
+    if not np.array_equal(now, later):
+        raise ModelError(
+            "the rates depend on time: cycles and equilibria of such a model are those of one with the "
+            "forcing's phase as a state"
+        )
+    kept = np.flatnonzero(np.isfinite(found.size))
+    mirror = found.mirrors[0][kept] if found.mirrors else None
+    if mirror is not None and (mirror > 0).all():
+        mirror = None
+    return Flow(model, kept, finite[kept], found.clock, mirror, rtol)

@@ -1,0 +1,282 @@
+"""Following a branch in one direction, with what happens on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from udd.errors import IntegrationError
+
+from .branch import BifurcationPoint, Branch
+from .cycle_curve import CycleCurve
+from .flow import Floats
+from .kinks import corner_ahead
+from .locating import error_of, found_between, point_at
+from .orbits import closes_earlier, cycle_at, pieces_for
+from .path import Lost, Place, advance, correct, tangent_at
+from .rest_curve import RestCurve
+from .rests import rest_at
+from .signs import Signs, signs_at
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = ["Limits", "Way", "follow", "solution_at", "solutions_at"]
+
+AnyCurve = RestCurve | CycleCurve
+
+_NAMES = {
+    "fold": "fold",
+    "branch point": "plus",
+    "symmetry breaking": "minus",
+    "period doubling": "minus",
+    "Hopf": "torus",
+    "Neimark-Sacker": "torus",
+}
+_WATCHED = 6  # points in which a branch shows that it comes to a connection,
+_CONVERGED = 1e-11  # by this relative change of its parameter
+_ASIDE = 1e-9  # from a corner, in scaled unknowns
+_SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How far a branch is followed.
+
+    `step` and `longest` are arclengths in scaled unknowns; `until` tells of a bifurcation point whether it
+    is the last that is wanted.
+    """
+
+    low: float
+    high: float
+    step: float
+    longest: float
+    most: int
+    period: float
+    detect: bool = True
+    until: Callable[[BifurcationPoint], bool] = field(default=lambda point: False)
+
+
+@dataclass
+class Way:
+    """What was met on the way: points of the branch with their arclength, bifurcations, why it ends."""
+
+    places: list[tuple[AnyCurve, Place, Signs, float]]
+    points: list[BifurcationPoint]
+    end: str = ""
+
+
+def solution_at(curve: AnyCurve, u: Floats) -> Equilibrium | PeriodicOrbit:
+    """The equilibrium or cycle with these unknowns."""
+    if isinstance(curve, RestCurve):
+        return rest_at(curve.flow, curve.values_at(u), curve.state(u))
+    return cycle_at(curve, u)
+
+
+def solutions_at(branch: Branch, value: float) -> list[Equilibrium | PeriodicOrbit]:
+    """The branch's solutions at a value of its parameter."""
+    found = []
+    for i in range(len(branch) - 1):
+        a, b = branch.values[i], branch.values[i + 1]
+        if not min(a, b) <= value <= max(a, b) or (value == b and i + 2 < len(branch)):
+            continue
+        curve, place = branch._places[i if abs(value - a) <= abs(value - b) else i + 1]
+        row = np.zeros(len(place.u))
+        row[-1] = 1.0
+        guess = place.u.copy()
+        if abs(place.tangent[-1]) > 1e-3:
+            guess = guess + place.tangent * ((value / curve.scale - guess[-1]) / place.tangent[-1])
+        guess[-1] = value / curve.scale
+        if isinstance(curve, CycleCurve):
+            curve.fix_phase(place.u)
+        try:
+            found.append(solution_at(curve, correct(curve, guess, row, patience=20)))
+        except (Lost, IntegrationError):
+            continue
+    return found
+
+
+def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin: str = "") -> Way:
+    """Follow a branch from `start` in the direction of its tangent."""
+    here, step, arclength = start, limits.step, 0.0
+    signs = signs_at(curve, here)
+    way = Way([(curve, here, signs, 0.0)], [])
+    while True:
+        if len(way.places) > limits.most:
+            way.end = "as many points as were wanted"
+            return way
+        if isinstance(curve, RestCurve):
+            corner = corner_ahead(curve, here, step)
+            if corner is not None:
+                here, signs, arclength = _round(curve, corner, way, parameter, limits, arclength, here)
+                step = min(step, limits.step)
+                if way.end:
+                    return way
+                continue
+        try:
+            there, gone, step = advance(curve, here, step, limits.longest)
+            after = signs_at(curve, there)
+        except (Lost, IntegrationError) as error:
+            way.end = f"lost: {error}"
+            return way
+        if limits.detect:
+            for kind, sigma, place in found_between(curve, here, gone, signs, after):
+                if kind == "end":
+                    # The parameter turns where no multiplier passes 1: the branch meets itself there.
+                    way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
+                    way.end = _birth(curve, place, here)
+                    return way
+                bound = _error(curve, here, sigma, place, gone, kind)
+                solution = solution_at(curve, place.u)
+                point = point_at(curve, parameter, kind, place, solution, arclength + sigma, bound)
+                way.points.append(point)
+                way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
+                if limits.until(point):
+                    way.end = "the point that was wanted"
+                    return way
+        value = curve.value(there.u)
+        if not limits.low <= value <= limits.high:
+            way.end = f"{parameter} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
+            return way
+        arclength += gone
+        if isinstance(curve, CycleCurve):
+            if curve.span(there.u) * (2.0 if (curve.mirror < 0).any() else 1.0) > limits.period:
+                way.places.append((curve, there, after, arclength))
+                way.end = f"the period exceeds {limits.period:.6g}"
+                return way
+            # A new plane for the phase, and a finer mesh where the orbit has grown long.
+            curve, there = _prepared(curve, there)
+            after = replace(after, fold=float(there.tangent[-1]))
+        here, signs = there, after
+        way.places.append((curve, here, signs, arclength))
+        if isinstance(curve, CycleCurve) and (near := _connection(way)) is not None:
+            way.end = f"a connection near {near:.13g}: the period grows without bound"
+            return way
+        if len(way.places) > 8 and _back(way.places[0], here, curve, step):
+            way.end = "the branch is closed"
+            return way
+
+
+def _error(curve: AnyCurve, here: Place, sigma: float, place: Place, gone: float, kind: str) -> float:
+    try:
+        return error_of(curve, here, sigma, place, gone, _NAMES[kind])
+    except (Lost, IntegrationError):
+        return float("nan")
+
+
+def _birth(curve: AnyCurve, place: Place, before: Place) -> str:
+    """What it is that the branch begins or ends with."""
+    value = curve.value(place.u)
+    if isinstance(curve, RestCurve):
+        return f"a branch point near {value:.5g}"
+    size = float(np.ptp(curve.nodes(place.u) / curve.flow.size, axis=0).max())
+    if size < _SHRUNK * float(np.ptp(curve.nodes(before.u) / curve.flow.size, axis=0).max()):
+        return f"a Hopf bifurcation near {value:.5g}"
+    kind = closes_earlier(curve, place.u)
+    return f"{kind or 'a branch point'} near {value:.5g}"
+
+
+def _cut(curve: AnyCurve, here: Place, gone: float, way: Way, arclength: float, limits: Limits) -> float:
+    """Add the point where the branch meets the bound."""
+    beyond = curve.value(here.u + gone * here.tangent)
+    bound = limits.high if beyond > limits.high else limits.low
+    row, guess = np.zeros(len(here.u)), here.u.copy()
+    row[-1] = 1.0
+    if here.tangent[-1] != 0.0:
+        guess = guess + here.tangent * ((bound / curve.scale - guess[-1]) / here.tangent[-1])
+    guess[-1] = bound / curve.scale
+    try:
+        u = correct(curve, guess, row)
+        place = Place(u, tangent_at(curve, u, here.tangent))
+        way.places.append(
+            (curve, place, signs_at(curve, place), arclength + float(np.linalg.norm(u - here.u)))
+        )
+    except (Lost, IntegrationError):
+        pass  # the last point is inside
+    return bound
+
+
+def _prepared(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Place]:
+    """The curve with its phase fixed here, and cut into enough pieces; the tangent in its new equations."""
+    flow, m = curve.flow, curve.pieces
+    wanted = pieces_for(flow, curve.span(place.u))
+    if 2 * wanted > 3 * m:
+        times = -(-wanted // m)
+        nodes, values = [curve.nodes(place.u)], curve.values_at(place.u)
+        share = np.full(m, curve.span(place.u) / (m * times))
+        for _ in range(times - 1):
+            nodes.append(flow.fly(values, nodes[-1], share).x)
+        fine = replace(curve, pieces=m * times)
+        packed = np.stack(nodes, axis=1).reshape(m * times, flow.dim)
+        u = fine.pack(packed, curve.span(place.u), curve.value(place.u))
+        along = np.zeros((m, times, flow.dim))
+        along[:, 0] = place.tangent[:-2].reshape(m, flow.dim)
+        row = np.append(along.ravel(), place.tangent[-2:])
+        fine.fix_phase(u)
+        return fine, Place(u, tangent_at(fine, u, row))
+    fresh = replace(curve)
+    fresh.seen = curve.seen
+    fresh.fix_phase(place.u)
+    return fresh, Place(place.u, tangent_at(fresh, place.u, place.tangent))
+
+
+def _connection(way: Way) -> float | None:
+    """Where the parameter has come to a stand while the period goes on growing."""
+    if len(way.places) < _WATCHED:
+        return None
+    last = [
+        (curve, place.u) for curve, place, _, _ in way.places[-_WATCHED:] if isinstance(curve, CycleCurve)
+    ]
+    values = [curve.value(u) for curve, u in last]
+    spans = [curve.span(u) for curve, u in last]
+    still = max(values) - min(values) < _CONVERGED * max(abs(value) for value in values)
+    growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > 1.05 * spans[0]
+    return values[-1] if still and growing else None
+
+
+def _back(first: tuple[AnyCurve, Place, Signs, float], here: Place, curve: AnyCurve, step: float) -> bool:
+    """Whether the branch has come back to where it began."""
+    start = first[1]
+    if len(start.u) != len(here.u):
+        return False
+    return bool(np.linalg.norm(start.u - here.u) < 0.5 * step and start.tangent @ here.tangent > 0.9)
+
+
+def _round(
+    curve: RestCurve,
+    corner: tuple[Place, Place, int],
+    way: Way,
+    parameter: str,
+    limits: Limits,
+    arclength: float,
+    here: Place,
+) -> tuple[Place, Signs, float]:
+    """Go round a corner, where an equilibrium lies on a surface of the law."""
+    arriving, leaving, _ = corner
+    gone = float(np.linalg.norm(arriving.u - here.u))
+    before = signs_at(curve, here)
+    # On the corner itself rounding would choose the side of the law.
+    at = signs_at(curve, Place(arriving.u - _ASIDE * arriving.tangent, arriving.tangent))
+    after = signs_at(curve, Place(leaving.u + _ASIDE * leaving.tangent, leaving.tangent))
+    if limits.detect:
+        short = gone - _ASIDE
+        for kind, sigma, place in found_between(curve, here, short, before, at) if short > 0 else []:
+            solution = solution_at(curve, place.u)
+            error = _error(curve, here, sigma, place, gone, kind)
+            way.points.append(point_at(curve, parameter, kind, place, solution, arclength + sigma, error))
+            way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
+    arclength += gone
+    value = curve.value(arriving.u)
+    if not limits.low <= value <= limits.high:
+        way.end = f"{parameter} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
+        return here, before, arclength
+    kind = "fold at a kink" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "kink"
+    solution = solution_at(curve, arriving.u)
+    error = 8.0 * float(np.finfo(float).eps) * abs(value)
+    point = point_at(curve, parameter, kind, arriving, solution, arclength, error)
+    way.points.append(point)
+    way.places.append((curve, arriving, at, arclength))
+    if limits.until(point):
+        way.end = "the point that was wanted"
+    return leaving, after, arclength

@@ -1,0 +1,166 @@
+"""Where exactly a branch bifurcates between two of its points."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import optimize
+
+from .branch import BifurcationPoint
+from .cycle_curve import CycleCurve
+from .path import Lost, Place, correct, tangent_at
+from .rest_curve import RestCurve
+from .signs import Signs, signs_at
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = ["error_of", "found_between", "locate", "point_at"]
+
+_TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
+_STILL = 1e-5  # a tangent with less of the parameter
+_COARSE = 100.0  # by this factor runs are less accurate where the error is told
+
+
+def changes(before: Signs, after: Signs) -> list[str]:
+    """Which functions change their signs."""
+    names = []
+    for name in ("fold", "plus", "minus", "torus"):
+        a, b = getattr(before, name), getattr(after, name)
+        if a * b < 0.0:
+            names.append(name)
+    return names
+
+
+def found_between(
+    curve: RestCurve | CycleCurve, a: Place, step: float, before: Signs, after: Signs
+) -> list[tuple[str, float, Place]]:
+    """Kinds of bifurcation, distances from `a`, and points, in order.
+
+    `a` is followed by a point at the distance `step`, where the functions are `after`.
+    """
+    changed = changes(before, after)
+    rest = isinstance(curve, RestCurve)
+    found = []
+    for name in changed:
+        if name == "plus" and "fold" in changed:
+            continue
+        if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
+            continue
+        try:
+            if name == "fold" and "plus" not in changed:
+                found.append(("end", *turning(curve, a, step, before, after)))
+                continue
+            sigma, place = locate(curve, a, step, name)
+        except (Lost, ValueError):
+            continue
+        here = signs_at(curve, place)
+        if name == "fold":
+            kind = "fold"
+        elif name == "plus":
+            # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
+            kind = "branch point" if abs(here.fold) > _STILL else "fold"
+        elif name == "minus":
+            symmetric = isinstance(curve, CycleCurve) and bool((curve.mirror < 0).any())
+            kind = "symmetry breaking" if symmetric else "period doubling"
+        else:
+            pair = here.pair
+            if rest and abs(pair.imag) * curve.flow.clock > _TURNING and _on_axis(pair):
+                kind = "Hopf"
+            elif not rest and abs(np.angle(pair)) > _TURNING and abs(abs(pair) - 1.0) < 1e-5:
+                kind = "Neimark-Sacker"
+            else:
+                continue  # two real ones: a neutral saddle
+        found.append((kind, sigma, place))
+    return sorted(found, key=lambda one: one[1])
+
+
+def turning(
+    curve: RestCurve | CycleCurve, a: Place, step: float, before: Signs, after: Signs
+) -> tuple[float, Place]:
+    """About where the parameter turns at a branch point, near which the equations are nearly singular."""
+    low, high = (0.0, before.fold), (step, after.fold)
+    sigma, place = 0.0, a
+    for _ in range(6):
+        middle = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
+        try:
+            u = correct(curve, a.u + middle * a.tangent, a.tangent)
+            place = Place(u, tangent_at(curve, u, a.tangent))
+        except Lost:
+            break
+        sigma, fold = middle, float(place.tangent[-1])
+        if fold * low[1] > 0.0:
+            low = (middle, fold)
+        else:
+            high = (middle, fold)
+    return sigma, place
+
+
+def _on_axis(pair: complex) -> bool:
+    return abs(pair.real) < 1e-6 * abs(pair.imag)
+
+
+def locate(curve: RestCurve | CycleCurve, a: Place, step: float, name: str) -> tuple[float, Place]:
+    """The zero of one of the functions between `a` and the point at the distance `step` after it.
+
+    Raises
+    ------
+    Lost, ValueError
+        The curve cannot be followed there, or the function does not change its sign.
+    """
+    cache: dict[float, Place] = {}
+
+    def at(sigma: float) -> float:
+        u = correct(curve, a.u + sigma * a.tangent, a.tangent)
+        cache[sigma] = Place(u, tangent_at(curve, u, a.tangent))
+        return float(getattr(signs_at(curve, cache[sigma]), name))
+
+    sigma = float(optimize.brentq(at, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
+    if sigma not in cache:
+        at(sigma)
+    return sigma, cache[sigma]
+
+
+def error_of(
+    curve: RestCurve | CycleCurve, a: Place, sigma: float, place: Place, step: float, name: str
+) -> float:
+    """How far the value moves when runs are less accurate."""
+    value = curve.value(place.u)
+    rounding = 8.0 * np.finfo(float).eps * abs(value)
+    if isinstance(curve, RestCurve):
+        return rounding
+
+    def at(distance: float) -> tuple[float, float]:
+        u = correct(curve, a.u + distance * a.tangent, a.tangent)
+        there = Place(u, tangent_at(curve, u, a.tangent))
+        return float(getattr(signs_at(curve, there), name)), curve.value(u)
+
+    aside = 1e-3 * step
+    (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
+    curve.loose, curve.seen = _COARSE, None
+    try:
+        moved, there = at(sigma)
+    finally:
+        curve.loose, curve.seen = 1.0, None
+    here, _ = at(sigma)
+    shift = (moved - here) * (last - first) / (high - low) if high != low else 0.0
+    return rounding + abs(there - value) + abs(shift)
+
+
+def point_at(
+    curve: RestCurve | CycleCurve,
+    parameter: str,
+    kind: str,
+    place: Place,
+    solution: Equilibrium | PeriodicOrbit,
+    arclength: float,
+    error: float,
+) -> BifurcationPoint:
+    """The point with what belongs to its kind."""
+    frequency = coefficient = float("nan")
+    pair = signs_at(curve, place).pair
+    if kind == "Hopf" and isinstance(solution, Equilibrium):
+        frequency, coefficient = pair.imag, solution.lyapunov_coefficient
+    if kind == "Neimark-Sacker" and isinstance(curve, CycleCurve):
+        frequency = float(np.angle(pair)) / curve.span(place.u)
+    value = curve.value(place.u)
+    return BifurcationPoint(
+        kind, parameter, value, error, solution, arclength, frequency, coefficient, curve, place
+    )

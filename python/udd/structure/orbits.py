@@ -1,0 +1,271 @@
+"""One cycle of a model, by multiple shooting."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from udd._validate import array, number
+from udd.errors import IntegrationError, ModelError
+from udd.models import Model
+from udd.orbits import default_start
+from udd.trajectory import simulate
+
+from .cycle_curve import CycleCurve
+from .flow import Floats, Flow, flow_of
+from .path import Lost, correct
+from .solutions import PeriodicOrbit
+
+__all__ = ["closed", "closes_earlier", "cycle_at", "flown", "periodic_orbit", "pieces_for"]
+
+_FINE = 64  # states looked at in a typical time
+_CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
+_SAME = 1e-7  # two states within this part of the sizes are one
+_HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
+_RESIDUAL = 1e-9  # gaps that are as good as none
+_TURN = 2.0 * math.pi
+
+
+def periodic_orbit(
+    model: Model,
+    guess: ArrayLike | None = None,
+    *,
+    period: float | None = None,
+    settle: float | None = None,
+    longest: float | None = None,
+) -> PeriodicOrbit:
+    """A cycle of a model, with its Floquet multipliers and its symmetry.
+
+    Parameters
+    ----------
+    model : Model
+        Its rates must not depend on time. The disk's edge is ignored.
+    guess : array_like, shape (dim,) or (n, dim), optional
+        A state near the cycle, or states on it at equal distances of time over one period, which must then
+        be given. By default the search starts where :func:`udd.lyapunov` does.
+    period : float, optional
+        About its period. By default the run from the guess tells it: the first time that it comes back, or
+        nearly back, be it to the mirror image.
+    settle : float, optional
+        For so long the model is run from the guess before, to get near a stable cycle; by default 0, or 600
+        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess.
+    longest : float, optional
+        The longest period looked for, by default 40 typical times.
+
+    Returns
+    -------
+    PeriodicOrbit
+
+    Raises
+    ------
+    ModelError
+        A model whose rates depend on time, a guess of the wrong shape, or one from which Newton's method
+        finds no cycle.
+
+    Notes
+    -----
+    The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
+    Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
+    Newton's method closes the gaps. Where the law has kinks, runs land on them. A cycle that is its own
+    mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's close
+    returns there are unstable ones.
+
+    Examples
+    --------
+    The figure-eight of the diffusionless Lorenz equations:
+
+    >>> import udd
+    >>> orbit = udd.periodic_orbit(udd.DLE(10.0))
+    >>> print(round(orbit.period, 10), orbit.symmetric, orbit.stable)
+    3.3583222491 True True
+    """
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    dim = len(model.state_names)
+    given = array("guess", default_start(model) if guess is None else guess)
+    if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
+        raise ModelError(f"the guess must be states of {dim} components, not of shape {given.shape}")
+    free = model.replace(edge="ignore") if hasattr(model, "edge") else model
+    flow = flow_of(free, np.atleast_2d(given))
+    if given.ndim == 2 and len(given) > 1:
+        if period is None:
+            raise ModelError("states over a period need the period")
+        span = number("period", period, above=0.0)
+        nodes = flow.reduced(given)
+        return _polished(model, flow, nodes, span, np.ones(flow.dim), _shift_of(flow, nodes, span))
+    aside = 600.0 * flow.clock if guess is None else 0.0
+    aside = number("settle", aside if settle is None else settle, least=0.0)
+    start = given.reshape(dim)
+    if aside > 0.0:
+        start = simulate(free, [0.0, aside], start, method="auto").state[-1]
+    limit = number("longest", 40.0 * flow.clock if longest is None else longest, above=0.0)
+    if period is not None:
+        span, mirrored = number("period", period, above=0.0), False
+    else:
+        span, mirrored = _return_time(flow, free, start, limit)
+    pieces = pieces_for(flow, span)
+    run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
+    ends = flow.reduced(run.state)
+    mirror = flow.mirror if mirrored and flow.mirror is not None else np.ones(flow.dim)
+    return _polished(model, flow, ends[:-1], span, mirror, _turns(flow, mirror * ends[-1] - ends[0]))
+
+
+def pieces_for(flow: Flow, span: float) -> int:
+    """Into how many pieces an orbit of this length is cut."""
+    return max(3, math.ceil(2.0 * span / flow.clock))
+
+
+def cycle_at(curve: CycleCurve, u: Floats) -> PeriodicOrbit:
+    """The cycle that solves a curve's equations."""
+    flow, values = curve.flow, curve.values_at(u)
+    multipliers = np.linalg.eigvals(curve.across_flow(u)).astype(complex)
+    symmetric = bool((curve.mirror < 0).any())
+    if symmetric:
+        multipliers = multipliers**2
+    multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
+    residual, _ = curve.equations(u)
+    nodes = flow.full(curve.nodes(u))
+    period = curve.span(u) * (2.0 if symmetric else 1.0)
+    model = flow.with_values(values)
+    gap = float(np.abs(residual).max())
+    return PeriodicOrbit(model, nodes[0], period, multipliers, symmetric, nodes, gap, curve, u)
+
+
+def _polished(
+    model: Model, flow: Flow, nodes: Floats, span: float, mirror: Floats, shift: Floats
+) -> PeriodicOrbit:
+    """The cycle that Newton's method finds, in its simplest form."""
+    curve, u = closed(flow, nodes, span, mirror, shift)
+    curve, u = _simplest(curve, u)
+    found = cycle_at(curve, u)
+    # The model as it was given: its edge too.
+    return replace(found, model=model)
+
+
+def closed(
+    flow: Flow, nodes: Floats, span: float, mirror: Floats, shift: Floats
+) -> tuple[CycleCurve, Floats]:
+    """The curve at whose present parameters the orbit closes, and the unknowns there."""
+    # The parameter is held: any that does not vanish will do.
+    held = int(np.argmax(flow.values != 0.0))
+    scale = abs(float(flow.values[held])) or 1.0
+    curve = CycleCurve(
+        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes[0], np.zeros(flow.dim)
+    )
+    guess = curve.pack(nodes, span, float(flow.values[held]))
+    curve.fix_phase(guess)
+    row = np.zeros(len(guess))
+    row[-1] = 1.0
+    try:
+        u = correct(curve, guess, row, patience=30)
+    except (Lost, IntegrationError) as error:
+        about = span * (2 if (mirror < 0).any() else 1)
+        raise ModelError(f"no cycle of period {about:.6g} is found near the guess: {error}") from None
+    residual, _ = curve.equations(u)
+    ends = curve.nodes(u)
+    rest = np.abs(curve.rate_at(flow.values, ends[0]) * flow.clock / flow.size).max()
+    if np.abs(residual).max() > _RESIDUAL or rest < 1e-9 or curve.span(u) < 1e-6 * flow.clock:
+        raise ModelError("no cycle is found near the guess: the orbit shrinks to a state of rest")
+    return curve, u
+
+
+def closes_earlier(curve: CycleCurve, u: Floats) -> str:
+    """Of which bifurcation an orbit is that closes after half its time already, if it does."""
+    if (curve.mirror < 0).any():
+        return ""
+    flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
+    end = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))[-1]
+    ways = [(np.ones(flow.dim), "a period doubling")]
+    if flow.mirror is not None:
+        ways.append((flow.mirror, "a symmetry breaking"))
+    for mirror, kind in ways:
+        gap = mirror * end - start
+        if np.abs((gap + _turns(flow, gap)) / flow.size).max() < _HALF:
+            return kind
+    return ""
+
+
+def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
+    """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
+    flow, values = curve.flow, curve.values_at(u)
+    plain = np.ones(flow.dim)
+    span, start = curve.span(u), curve.nodes(u)[0]
+    ways = [(k, plain) for k in (2, 3, 5, 7)]
+    if flow.mirror is not None:
+        ways = [*ways, (2, flow.mirror), (3, flow.mirror)]
+    if (curve.mirror < 0).any():
+        # A third of a half, seen in the mirror: what is symmetric closes after odd parts only.
+        ways = [(k, curve.mirror) for k in (3, 5, 7)]
+    for parts, mirror in ways:
+        share = span / parts
+        pieces = pieces_for(flow, share)
+        nodes = flown(flow, values, start, share, pieces)
+        gap = mirror * nodes[-1] - start
+        shift = _turns(flow, gap)
+        if np.abs((gap + shift) / flow.size).max() < _SAME:
+            found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
+            return _simplest(*found)
+    return curve, u
+
+
+def replace_values(flow: Flow, values: Floats) -> Flow:
+    """The flow whose model has these values."""
+    return replace(flow, model=flow.with_values(values))
+
+
+def flown(flow: Flow, values: Floats, start: Floats, span: float, pieces: int) -> Floats:
+    """States (pieces + 1, r) at equal distances of time along an orbit."""
+    states = [start]
+    for _ in range(pieces):
+        states.append(flow.fly(values, states[-1][np.newaxis], np.array([span / pieces])).x[0])
+    return np.array(states)
+
+
+def _turns(flow: Flow, gap: Floats) -> Floats:
+    """Whole turns of angles that undo a gap; zero for what is no angle."""
+    names = [flow.model.state_names[k] for k in flow.kept]
+    angle = np.array([name in flow.model.angles for name in names])
+    return np.where(angle, -_TURN * np.round(gap / _TURN), 0.0)
+
+
+def _shift_of(flow: Flow, nodes: Floats, span: float) -> Floats:
+    share = np.array([span / len(nodes)])
+    end = flow.fly(flow.values, nodes[-1:], share).x[0]
+    return _turns(flow, end - nodes[0])
+
+
+def _return_time(flow: Flow, model: Model, start: Floats, longest: float) -> tuple[float, bool]:
+    """When the run from a state comes back, and whether it is its mirror image that comes back."""
+    count = math.ceil(_FINE * longest / flow.clock)
+    times = np.linspace(0.0, longest, count + 1)
+    states = flow.reduced(simulate(model, times, start, rtol=1e-10, atol=1e-13, method="auto").state)
+    images = [(np.ones(flow.dim), False)] + ([] if flow.mirror is None else [(flow.mirror, True)])
+    returns = []
+    for mirror, mirrored in images:
+        gap = mirror * states - states[0]
+        gap = gap + np.array([_turns(flow, one) for one in gap])
+        away = np.linalg.norm(gap / flow.size, axis=1)
+        # A minimum lies between samples; the distance there, of a straight line between neighbours.
+        for i in range(1, count):
+            if not (away[i] <= away[i - 1] and away[i] < away[i + 1] and away[: i + 1].max() > 4 * _CLOSE):
+                continue
+            before, after = gap[i - 1] / flow.size, gap[i + 1] / flow.size
+            line = after - before
+            part = float(np.clip(-(before @ line) / (line @ line), 0.0, 1.0)) if line.any() else 0.5
+            time = times[i - 1] + part * (times[i + 1] - times[i - 1])
+            # Curved between samples: near the minimum the gap's part across the line is what counts.
+            middle = gap[i] / flow.size
+            across = middle - line * ((middle @ line) / (line @ line)) if line.any() else middle
+            returns.append((float(np.linalg.norm(across)), float(time), mirrored))
+    if not returns:
+        raise ModelError(f"the run from the guess does not come back within {longest:.4g}")
+    best = min(away for away, _, _ in returns)
+    if best > 10 * _CLOSE:
+        raise ModelError(
+            f"the run from the guess does not come near its start within {longest:.4g}: give the period"
+        )
+    _, time, mirrored = min((r for r in returns if r[0] <= max(3.0 * best, 1e-3)), key=lambda r: r[1])
+    return time, mirrored

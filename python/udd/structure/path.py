@@ -1,0 +1,123 @@
+"""Following a curve of solutions by its arclength."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from udd.errors import IntegrationError
+
+from .flow import Floats
+
+__all__ = ["Curve", "Lost", "Place", "advance", "correct", "tangent_at"]
+
+_ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
+_NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
+_MOST = 8  # Newton steps from a good guess
+_TURN = 0.95  # least cosine between one tangent and the next
+_MOVED = 0.25  # of a step, from the tangent to the curve
+_STRAIGHT = 0.995  # from here on the next step may be longer
+_DENSE = 60  # unknowns up to which a dense matrix is as fast
+
+
+class Lost(Exception):
+    """Newton's method did not converge."""
+
+
+class Curve(Protocol):
+    """`n` equations for `n + 1` scaled unknowns."""
+
+    def equations(self, u: Floats) -> tuple[Floats, Floats | sparse.csr_array]:
+        """Residuals (n,) and their derivatives (n, n + 1)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point of the curve and the direction in which it goes on."""
+
+    u: Floats
+    tangent: Floats
+
+
+def solve(matrix: Floats | sparse.csr_array, row: Floats, right: Floats) -> Floats:
+    """The solution of the equations below which one more row stands."""
+    result: Floats
+    if isinstance(matrix, np.ndarray):
+        full = np.vstack([matrix, row])
+        try:
+            result = np.linalg.solve(full, right)
+        except np.linalg.LinAlgError:
+            result = np.linalg.lstsq(full, right, rcond=None)[0]
+        return result
+    square = sparse.vstack([matrix, sparse.csr_array(row[np.newaxis])], format="csc")
+    try:
+        result = splu(square).solve(right)
+    except RuntimeError:
+        raise Lost("the equations are singular") from None
+    return result
+
+
+def correct(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> Floats:
+    """The point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
+
+    Raises
+    ------
+    Lost
+    """
+    u, before = guess.copy(), np.inf
+    for _ in range(patience):
+        try:
+            residual, matrix = curve.equations(u)
+        except IntegrationError as error:
+            raise Lost(str(error)) from None
+        step = solve(matrix, row, np.append(-residual, row @ (guess - u)))
+        size = float(np.abs(step).max())
+        if not np.isfinite(size) or size > 1e3:
+            raise Lost("Newton's method diverges")
+        u = u + step
+        if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
+            return u
+        before = size
+    raise Lost("Newton's method does not converge")
+
+
+def tangent_at(curve: Curve, u: Floats, along: Floats) -> Floats:
+    """The unit tangent at a point, in the sense of `along`."""
+    _, matrix = curve.equations(u)
+    t = solve(matrix, along, np.append(np.zeros(len(u) - 1), 1.0))
+    unit: Floats = t / np.linalg.norm(t)
+    return unit
+
+
+def advance(
+    curve: Curve, here: Place, step: float, longest: float, shortest: float = 1e-8
+) -> tuple[Place, float, float]:
+    """The next point along the curve, its distance, and the step to be tried next.
+
+    Raises
+    ------
+    Lost
+        No step longer than `shortest` finds one.
+    """
+    reason = "the curve turns too sharply"
+    while step >= shortest:
+        try:
+            guess = here.u + step * here.tangent
+            u = correct(curve, guess, here.tangent)
+            tangent = tangent_at(curve, u, here.tangent)
+        except (Lost, IntegrationError) as error:
+            step, reason = 0.5 * step, str(error)
+            continue
+        turn = float(tangent @ here.tangent)
+        # A curve that turns no more does not move further: it would be another one.
+        if turn < _TURN or np.linalg.norm(u - guess) > _MOVED * step:
+            step *= 0.5
+            continue
+        # Where the curve is nearly straight steps may grow.
+        return Place(u, tangent), step, min(step * (1.5 if turn > _STRAIGHT else 1.0), longest)
+    raise Lost(reason)

@@ -1,0 +1,118 @@
+"""All equilibria of a model."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import optimize
+from scipy.stats import qmc
+
+from udd._validate import array
+from udd.errors import ModelError
+from udd.models import Model
+
+from .flow import Floats, Flow, flow_of
+from .normal_forms import first_lyapunov_coefficient
+from .rest_curve import expansion
+from .solutions import Equilibrium, kind_of_rest
+
+__all__ = ["equilibria", "rest_at"]
+
+_SAME = 1e-7  # two within this part of the typical sizes are one
+_REST = 1e-9  # rates, in typical sizes per typical time, that are as good as none
+_REACHES = (0.3, 1.0, 3.0, 10.0)  # boxes in which the search starts, in typical sizes
+
+
+def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128) -> list[Equilibrium]:
+    """The equilibria of a model.
+
+    Parameters
+    ----------
+    model : Model
+        Its rates must not depend on time.
+    near : array_like, shape (dim,) or (n, dim), optional
+        States from which the search starts besides those that it chooses itself.
+    starts : int
+        From so many states the search starts, spread over boxes of 0.3 to 10 times the size of the motion.
+
+    Returns
+    -------
+    list of Equilibrium
+        The most stable first. Those of a model with a symmetry come in mirror images, or are their own.
+
+    Raises
+    ------
+    ModelError
+        A model whose rates depend on time.
+
+    Notes
+    -----
+    Each start is refined by Powell's hybrid method with exact derivatives (`scipy.optimize.root`); what
+    comes out is kept where nothing moves. An equilibrium with a small basin of that method, or far outside
+    the boxes, can be missed: give a state `near` it. For the DLE the rotating states are
+    ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk ``Omega^2 = g W/k(Omega)``, ``Y = W/Omega``, where
+    angles that nothing depends on go on turning.
+
+    Examples
+    --------
+    >>> import udd
+    >>> for rest in udd.equilibria(udd.DLE(3.0, B=0.2)):
+    ...     print(rest.state.round(6) + 0.0, rest.kind)
+    [-1.732051 -1.732051  0.      ] saddle-focus
+    [1.732051 1.732051 0.      ] saddle-focus
+    [0. 0. 5.] saddle
+    """
+    if not isinstance(model, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    dim = len(model.state_names)
+    given = np.zeros((0, dim)) if near is None else np.atleast_2d(array("near", near))
+    if given.ndim != 2 or given.shape[1] != dim:
+        raise ModelError(f"near must be states of {dim} components, not of shape {given.shape}")
+    flow = flow_of(model, given if len(given) else np.ones((1, dim)))
+    guesses = [*flow.reduced(given)]
+    box = qmc.Sobol(flow.dim, seed=3).random(max(int(starts), len(_REACHES)))
+    for k, reach in enumerate(_REACHES):
+        guesses += [*((2.0 * box[k :: len(_REACHES)] - 1.0) * reach * flow.size)]
+    found: list[Floats] = []
+    for guess in guesses:
+        x = _refined(flow, guess)
+        if x is None:
+            continue
+        for image in (x,) if flow.mirror is None else (x, flow.mirror * x):
+            if all(np.abs((image - known) / flow.size).max() > _SAME for known in found):
+                found.append(image + 0.0)
+    rests = [rest_at(flow, flow.values, x) for x in found]
+    return sorted(rests, key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
+
+
+def rest_at(flow: Flow, values: Floats, x: Floats) -> Equilibrium:
+    """What there is to say of an equilibrium."""
+    here = expansion(flow, values, x, higher=True)
+    eigenvalues = np.linalg.eigvals(here.by_state).astype(complex)
+    eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
+    residual = float(np.abs(here.rate * flow.clock / flow.size).max())
+    coefficient = first_lyapunov_coefficient(here.by_state, here.second, here.third)
+    model = flow.with_values(values)
+    return Equilibrium(model, flow.full(x), eigenvalues, kind_of_rest(eigenvalues), residual, coefficient)
+
+
+def _refined(flow: Flow, guess: Floats) -> Floats | None:
+    unit = flow.clock / flow.size
+
+    def rates(scaled: Floats) -> Floats:
+        found = flow.model.rates(0.0, flow.full(scaled * flow.size))[flow.kept]
+        scaled_rates: Floats = found * unit
+        return scaled_rates
+
+    def slopes(scaled: Floats) -> Floats:
+        by_state = expansion(flow, flow.values, scaled * flow.size).by_state
+        return by_state * unit[:, None] * flow.size
+
+    with np.errstate(all="ignore"):
+        try:
+            found = optimize.root(rates, guess / flow.size, jac=slopes, options={"xtol": 1e-14})
+        except (ModelError, ValueError):
+            return None
+        near = np.abs(found.fun).max() < _REST * max(1.0, np.abs(found.x).max())
+        regular = near and np.linalg.cond(slopes(found.x)) < 1e12
+    return found.x * flow.size if regular else None

@@ -1,0 +1,72 @@
+"""What changes its sign where a branch bifurcates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .cycle_curve import CycleCurve
+from .flow import Floats
+from .path import Place
+from .rest_curve import RestCurve
+
+__all__ = ["Signs", "signs_at"]
+
+
+@dataclass(frozen=True, eq=False)
+class Signs:
+    """Functions of a point on a branch, each zero at one kind of bifurcation.
+
+    Attributes
+    ----------
+    fold : float
+        The tangent's component along the parameter.
+    plus : float
+        Zero where a multiplier is +1, or an eigenvalue 0: folds and branch points.
+    minus : float
+        Zero where a multiplier is -1; NaN for equilibria.
+    torus : float
+        Zero where two multipliers have the product 1, or two eigenvalues the sum 0: Neimark-Sacker and Hopf
+        bifurcations where they are a complex pair.
+    surfaces : ndarray
+        Of equilibria: the functions of the law's switching surfaces.
+    values : ndarray of complex
+        Multipliers across the flow of the map that closes the orbit, or eigenvalues.
+    """
+
+    fold: float
+    plus: float
+    minus: float
+    torus: float
+    surfaces: Floats
+    values: np.ndarray
+
+    @property
+    def pair(self) -> complex:
+        """The complex number nearest to where a pair bifurcates, of positive imaginary part; 0 if none is."""
+        turning = self.values[self.values.imag > 0]
+        if not len(turning):
+            return 0j
+        away = np.abs(turning.real) if np.isnan(self.minus) else np.abs(np.abs(turning) - 1.0)
+        return complex(turning[np.argmin(away)])
+
+
+def signs_at(curve: RestCurve | CycleCurve, place: Place) -> Signs:
+    """The functions at a point; for cycles they come from the runs that the point was corrected with."""
+    fold = float(place.tangent[-1])
+    if isinstance(curve, RestCurve):
+        here = curve.at(place.u)
+        matrix = here.by_state * curve.flow.clock
+        values = np.linalg.eigvals(here.by_state).astype(complex)
+        pairs = [a + b for a, b in combinations(values * curve.flow.clock, 2)]
+        torus = float(np.prod(pairs).real) if pairs else float("nan")
+        return Signs(fold, float(np.linalg.det(matrix)), float("nan"), torus, here.surfaces, values)
+    across = curve.across_flow(place.u)
+    eye = np.eye(len(across))
+    values = np.linalg.eigvals(across).astype(complex)
+    pairs = [a * b - 1.0 for a, b in combinations(values, 2)]
+    torus = float(np.prod(pairs).real) if pairs else float("nan")
+    plus, minus = float(np.linalg.det(across - eye)), float(np.linalg.det(across + eye))
+    return Signs(fold, plus, minus, torus, np.zeros(0), values)

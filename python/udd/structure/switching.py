@@ -1,0 +1,119 @@
+"""From a bifurcation point to the branch that is born there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from udd.errors import IntegrationError, ModelError
+
+from .branch import BifurcationPoint
+from .cycle_curve import CycleCurve
+from .flow import Floats
+from .orbits import pieces_for
+from .path import Lost, Place, correct, tangent_at
+from .rest_curve import RestCurve, expansion
+
+__all__ = ["born_at"]
+
+
+def born_at(point: BifurcationPoint, amplitude: float) -> tuple[RestCurve | CycleCurve, Place]:
+    """The curve of the solutions that bifurcate at a point, and a place on it with the way that leads off.
+
+    Raises
+    ------
+    ModelError
+        A point where no branch is born, or where none is found.
+    """
+    curve, place = point._curve, point._place
+    if curve is None or place is None:
+        raise ModelError("this bifurcation point was not made by udd.continuation")
+    # Nearer and nearer to the point: the branch may bend away from its first direction.
+    made: tuple[RestCurve | CycleCurve, Floats, Floats]
+    for size in amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03]):
+        if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, CycleCurve):
+            made = _doubled(curve, place)
+        elif point.kind == "Hopf" and isinstance(curve, RestCurve):
+            made = _from_rest(curve, place)
+        elif point.kind == "branch point":
+            made = _crossing(curve, place)
+        else:
+            raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
+        new, base, row = made
+        try:
+            u = correct(new, base + size * row, row, patience=20)
+            if isinstance(new, CycleCurve):
+                new.fix_phase(u)
+            return new, Place(u, tangent_at(new, u, row))
+        except (Lost, IntegrationError):
+            continue
+    raise ModelError(f"the branch born at the {point.kind} is not found: try another amplitude")
+
+
+def _doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats]:
+    """Twice the time, and the direction in which the two rounds differ."""
+    u, m = place.u, curve.pieces
+    values, vectors = np.linalg.eig(curve.closing(u))
+    k = int(np.argmin(np.abs(values + 1.0)))
+    along = vectors[:, k].real
+    nodes = curve.nodes(u)
+    moves = [along]
+    for matrix in curve.flight(u).by_state[:-1]:
+        moves.append(matrix @ moves[-1])
+    first = np.array(moves)
+    both = np.vstack([nodes, curve.mirror * (nodes - curve.shift)])
+    away = np.vstack([first, -curve.mirror * first])
+    plain = np.ones(curve.flow.dim)
+    shift = curve.shift + curve.mirror * curve.shift
+    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift)
+    base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
+    new.fix_phase(base)
+    row = new.pack(away, 0.0, 0.0)
+    return new, base, row / np.linalg.norm(row)
+
+
+def _from_rest(curve: RestCurve, place: Place) -> tuple[CycleCurve, Floats, Floats]:
+    """An ellipse around the equilibrium."""
+    flow, values, x = curve.flow, curve.values_at(place.u), curve.state(place.u)
+    numbers, vectors = np.linalg.eig(expansion(flow, values, x).by_state)
+    turning = np.flatnonzero(numbers.imag > 0)
+    k = turning[np.argmin(np.abs(numbers[turning].real))]
+    period = 2.0 * np.pi / float(numbers[k].imag)
+    pieces = max(4, pieces_for(flow, period))
+    phases = np.exp(2j * np.pi * np.arange(pieces) / pieces)
+    away = np.outer(phases, vectors[:, k]).real
+    ones, zeros = np.ones(flow.dim), np.zeros(flow.dim)
+    new = CycleCurve(flow, curve.values, curve.parameter, curve.scale, period, pieces, ones, zeros, x, zeros)
+    base = new.pack(np.tile(x, (pieces, 1)), period, curve.value(place.u))
+    row = new.pack(away, 0.0, 0.0)
+    row /= np.linalg.norm(row)
+    # The plane across the ellipse where it begins: at rest there is no flow to lie across.
+    rate = expansion(flow, values, x).by_state @ away[0]
+    new.across = rate / np.linalg.norm(rate / flow.size) / flow.size**2
+    # The plane goes through the ellipse's own beginning; `away[0]` need not lie across its rate.
+    return _through(new, x, away[0]), base, row
+
+
+def _through(curve: CycleCurve, x: Floats, away: Floats) -> CycleCurve:
+    """The curve whose plane holds both the equilibrium and the first node beside it."""
+    scaled = curve.across * curve.flow.size
+    side = away / curve.flow.size
+    scaled = scaled - side * (scaled @ side) / (side @ side)
+    curve.across = scaled / np.linalg.norm(scaled) / curve.flow.size
+    curve.reference = x
+    return curve
+
+
+def _crossing(curve: RestCurve | CycleCurve, place: Place) -> tuple[RestCurve | CycleCurve, Floats, Floats]:
+    """The other of two directions that the equations leave free."""
+    _, matrix = curve.equations(place.u)
+    dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+    free = np.linalg.svd(dense)[2][-2:]
+    known = place.tangent
+    rest = free - np.outer(free @ known, known)
+    row = rest[np.argmax(np.linalg.norm(rest, axis=1))]
+    fresh = replace(curve)
+    if isinstance(fresh, CycleCurve):
+        fresh.fix_phase(place.u)
+    return fresh, place.u, row / np.linalg.norm(row)

@@ -1,0 +1,119 @@
+//! Pieces of orbits with their derivatives: what multiple shooting is made of.
+
+use std::array::from_fn;
+
+use rayon::prelude::*;
+
+use super::Stop;
+use crate::integrate::{Dop853, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
+use crate::model::{Family, System};
+use crate::scalar::{Dual, Isa, Scalar};
+use crate::tape::Tape;
+
+/// So many parameters can be differentiated by at once.
+pub const MOST_PARAMETERS: usize = 2;
+/// Directions of the derivatives: the state's components, of which there are at most four, then parameters.
+const DIRECTIONS: usize = 4 + MOST_PARAMETERS;
+/// More steps than this within one piece mean that something is wrong.
+const MOST_STEPS: u64 = 1_000_000;
+
+/// A number and its derivatives by the state at a piece's start and by the parameters.
+type Number = Dual<f64, DIRECTIONS>;
+
+/// Where a piece of an orbit starts: its parameters, its time and state, and how long it lasts.
+#[derive(Clone, Debug)]
+pub struct Piece<const D: usize> {
+    pub values: Vec<f64>,
+    pub t: f64,
+    pub x: [f64; D],
+    /// May be negative: backward in time.
+    pub span: f64,
+}
+
+/// Where a piece ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Flown<const D: usize> {
+    pub x: [f64; D],
+    /// `by_state[n][k]` is the derivative of component `n` by component `k` at the start.
+    pub by_state: [[f64; D]; D],
+    /// The same by the parameters asked for; zero where fewer are.
+    pub by_parameter: [[f64; MOST_PARAMETERS]; D],
+    /// The rate, which is the derivative by the span.
+    pub rate: [f64; D],
+}
+
+/// Follows pieces of orbits of one model, each with its own parameters and start.
+///
+/// Derivatives by the starts and by the parameters with the indices `wanted` are the dual part of the same
+/// run, whose steps obey the tolerance for every tangent too. Runs land on switching surfaces and ignore the wall.
+///
+/// # Errors
+/// That of the first piece that fails.
+pub fn pieces<F: Family<D>, const D: usize>(
+    family: &F,
+    pieces: &[Piece<D>],
+    wanted: &[usize],
+    tolerance: &Tolerance,
+    stop: &Stop,
+) -> Result<Vec<Flown<D>>, Failure> {
+    const { assert!(D + MOST_PARAMETERS <= DIRECTIONS) };
+    // What is differentiated by stays open even where it vanishes.
+    let all = |p: usize| pieces.iter().all(|piece| piece.values[p] == 0.0) && !wanted.contains(&p);
+    let width = pieces.first().map_or(0, |piece| piece.values.len());
+    let known: Vec<_> = (0..width).map(|p| all(p).then_some(0.0)).collect();
+    let tape = Tape::record(family, &known).ok();
+    pieces.par_iter().map(|piece| one(family, piece, wanted, (tape.as_ref(), tolerance), stop)).collect()
+}
+
+fn one<F: Family<D>, const D: usize>(
+    family: &F,
+    piece: &Piece<D>,
+    wanted: &[usize],
+    (tape, tolerance): (Option<&Tape<D>>, &Tolerance),
+    stop: &Stop,
+) -> Result<Flown<D>, Failure> {
+    let mut values: Vec<Number> = piece.values.iter().map(|&value| Dual::constant(value)).collect();
+    for (i, &p) in wanted.iter().enumerate() {
+        values[p] = Dual::variable(piece.values[p], D + i);
+    }
+    let system = family.build(&values);
+    match tape {
+        Some(tape) => {
+            let method = Taylor::new(tape, values, order(tolerance), Isa::best());
+            follow(method, system, piece, tolerance, stop)
+        }
+        None => follow(Dop853::default(), system, piece, tolerance, stop),
+    }
+}
+
+fn follow<M, K, const D: usize>(
+    method: K,
+    system: M,
+    piece: &Piece<D>,
+    tolerance: &Tolerance,
+    stop: &Stop,
+) -> Result<Flown<D>, Failure>
+where
+    M: System<Number, D>,
+    K: Method<Number, D>,
+{
+    let start: [Number; D] = from_fn(|n| Dual::variable(piece.x[n], n));
+    let end = piece.t + piece.span;
+    let norm = WithTangents(*tolerance);
+    let mut driver = Driver::by(method, system, piece.t, start, Some(piece.span), &norm);
+    while driver.t() != end {
+        stop.check()?;
+        driver.advance(end)?;
+        if driver.counts().accepted > MOST_STEPS {
+            return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
+        }
+    }
+    let x = driver.x();
+    let rate = driver.system().rates(Dual::constant(end), x, driver.sides());
+    Ok(Flown {
+        x: x.map(|x| x.re),
+        by_state: from_fn(|n| from_fn(|k| x[n].d[k])),
+        by_parameter: from_fn(|n| from_fn(|i| x[n].d[D + i])),
+        rate: rate.map(|rate| rate.re),
+    })
+}

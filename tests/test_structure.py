@@ -1,0 +1,242 @@
+"""Equilibria, cycles and their branches, against closed forms and independent integrators."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import optimize
+from scipy.integrate import solve_ivp
+
+import udd
+
+# Values that two or three independent integrators agree on, to the digits that are printed.
+PERIODS = {7.1: 3.98808575286, 10.0: 3.35832224912}
+SYMMETRY_BREAKING, PERIOD_THERE = 7.09642643066, 3.98909410283
+DOUBLING = 5.394713224
+
+
+@pytest.fixture(scope="module")
+def figure_eight() -> udd.Branch:
+    """The symmetric figure-eight of the DLE over the drive."""
+    return udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (5.0, 300.0), longest=1.0)
+
+
+@pytest.fixture(scope="module")
+def rotation() -> udd.Branch:
+    """The rotating state of the damped DLE over the drive."""
+    rests = udd.equilibria(udd.DLE(2.5, B=0.2))
+    return udd.continuation(next(rest for rest in rests if rest.state[0] > 0.1), "w", (0.5, 20.0))
+
+
+def test_equilibria_of_the_dle_are_those_of_the_closed_form() -> None:
+    rests = udd.equilibria(udd.DLE(3.0, B=0.2))
+    states = sorted(rest.state.tolist() for rest in rests)
+    root = math.sqrt(3.0)
+    # Newton's method converges to rounding.
+    np.testing.assert_allclose(states, [[-root, -root, 0], [0, 0, 5], [root, root, 0]], atol=1e-14)
+    focus = next(rest for rest in rests if rest.state[0] > 0.1)
+    # l^3 + (1 + B w) l^2 + w (1 + B) l + 2 w = 0
+    np.testing.assert_allclose(
+        np.sort_complex(focus.eigenvalues), np.sort_complex(np.roots([1, 1.6, 3.6, 6])), rtol=1e-12
+    )
+    assert {rest.kind for rest in rests} == {"saddle", "saddle-focus"}
+
+
+def test_the_disk_has_three_rotating_states_where_friction_falls_with_speed() -> None:
+    W = 0.0045
+    disk = udd.Disk(W)
+    found = sorted(rest.state[0] for rest in udd.equilibria(disk) if rest.state[0] > 0)
+
+    def power(omega: float) -> float:
+        return max(0.103 - 0.055 * omega, 0.012) * omega**2 - 9.81 * W
+
+    known = [optimize.brentq(power, a, b, xtol=1e-15) for a, b in ((0.1, 1.2), (1.3, 1.65), (1.66, 5.0))]
+    np.testing.assert_allclose(found, known, rtol=1e-12)
+
+
+@pytest.mark.parametrize("w", PERIODS)
+def test_the_period_of_the_figure_eight(w: float) -> None:
+    orbit = udd.periodic_orbit(udd.DLE(w))
+    assert orbit.symmetric and orbit.stable
+    assert orbit.period == pytest.approx(PERIODS[w], abs=1e-10)  # the reference's last digit is 1e-11
+
+
+def test_the_period_of_the_disks_asymmetric_pair() -> None:
+    orbit = udd.periodic_orbit(udd.Disk(0.071))
+    assert not orbit.symmetric and orbit.stable
+    assert orbit.period == pytest.approx(1.384045926, abs=1e-9)
+
+
+def test_multipliers_agree_with_another_integrators_differences() -> None:
+    orbit = udd.periodic_orbit(udd.DLE(10.0))
+
+    def end(x0: np.ndarray) -> np.ndarray:
+        run = solve_ivp(
+            lambda t, x: [x[1] - x[0], x[0] * x[2], 10.0 - x[0] * x[1]],
+            (0.0, orbit.period),
+            x0,
+            method="DOP853",
+            rtol=1e-13,
+            atol=1e-13,
+        )
+        return np.asarray(run.y[:, -1])
+
+    start, h = orbit.state, 1e-5
+    np.testing.assert_allclose(end(start), start, atol=1e-9)
+    monodromy = np.column_stack([(end(start + h * e) - end(start - h * e)) / (2 * h) for e in np.eye(3)])
+    expected = [1.0, *orbit.multipliers]
+    # Central differences of this step are good to 1e-8 or so.
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(monodromy)), np.sort_complex(expected), atol=1e-6
+    )
+    # The divergence is -1.
+    assert np.prod(orbit.multipliers).real == pytest.approx(math.exp(-orbit.period), rel=1e-9)
+
+
+def test_the_figure_eight_loses_its_symmetry(figure_eight: udd.Branch) -> None:
+    (point,) = figure_eight.points
+    assert point.kind == "symmetry breaking"
+    assert point.value == pytest.approx(SYMMETRY_BREAKING, abs=1e-9)  # the reference ends at 1e-11
+    assert point.period == pytest.approx(PERIOD_THERE, abs=1e-9)
+    assert point.error < 1e-9
+    stable = figure_eight.stable[np.abs(figure_eight.values - point.value) > 1e-6]
+    above = figure_eight.values[np.abs(figure_eight.values - point.value) > 1e-6] > point.value
+    np.testing.assert_array_equal(stable, above)
+
+
+def test_the_period_at_large_drives(figure_eight: udd.Branch) -> None:
+    # T sqrt(w) -> 10.603754512 + 0.1616/w; what is left falls with 1/w^2, 1e-5 at w = 300.
+    (orbit,) = figure_eight.at(300.0)
+    assert isinstance(orbit, udd.PeriodicOrbit)
+    assert orbit.period * math.sqrt(300.0) == pytest.approx(10.603754512 + 0.1616 / 300.0, abs=1e-5)
+
+
+def test_the_asymmetric_pair_doubles_and_doubles(figure_eight: udd.Branch) -> None:
+    found = udd.cascade(figure_eight.points[0], n=5)
+    assert found.values[0] == pytest.approx(DOUBLING, abs=1e-9)  # the reference's last digit
+    assert found.errors.max() < 1e-9
+    periods = np.array([point.period for point in found.points])
+    # Between doublings the period changes with the drive, most before the first.
+    np.testing.assert_allclose(periods[1:] / periods[:-1], 2.0, rtol=0.03)
+    for point in found.points:
+        assert isinstance(point.solution, udd.PeriodicOrbit)
+        assert point.solution.multipliers[0] == pytest.approx(-1.0, abs=1e-8)
+    # Of five doublings the last ratio is within 0.3 % of Feigenbaum's constant.
+    assert found.ratios[-1] == pytest.approx(4.669201609, rel=3e-3)
+    assert found.branches[0].ends[0] == "born at a symmetry breaking"
+
+
+@pytest.mark.parametrize("B", [0.1, 0.2, 0.5])
+def test_where_rotation_becomes_stable(B: float) -> None:
+    known = (1.0 - B) / (B * (1.0 + B))
+    rests = udd.equilibria(udd.DLE(0.8 * known, B=B))
+    branch = udd.continuation(next(r for r in rests if r.state[0] > 0.1), "w", (0.5 * known, 2.0 * known))
+    (hopf,) = branch.points
+    assert hopf.kind == "Hopf" and hopf.criticality == "subcritical"
+    assert hopf.value == pytest.approx(known, abs=1e-10)
+    assert hopf.frequency == pytest.approx(math.sqrt((1.0 - B) / B), abs=1e-9)
+
+
+def test_the_first_lyapunov_coefficient(rotation: udd.Branch) -> None:
+    assert rotation.find("Hopf")[0].lyapunov_coefficient == pytest.approx(2.003e-3, rel=5e-4)  # four digits
+
+
+def test_cycles_are_born_at_the_hopf_bifurcation(rotation: udd.Branch) -> None:
+    (hopf,) = rotation.find("Hopf")
+    cycles = udd.continuation(hopf, bounds=(0.5, 20.0), period=20.0)
+    # Subcritical: unstable, on the side where rotation is stable; they tend to a connection.
+    assert not cycles.stable.any()
+    assert (cycles.values[1:20] > hopf.value).all()
+    assert cycles.periods[0] == pytest.approx(math.pi, abs=1e-2)
+    assert cycles.ends == ("born at a Hopf", "the period exceeds 20")
+    # Near by the amplitude grows with the square root of the distance.
+    near = udd.continuation(hopf, amplitude=1e-3, step=2e-3, longest=2e-3, most=6)
+    low, high = near.extremes
+    spread, distance = (high - low)[:, 0], near.values - hopf.value
+    assert spread[5] / spread[0] > 5.0
+    assert spread[5] / spread[0] == pytest.approx(math.sqrt(distance[5] / distance[0]), rel=0.02)
+
+
+def test_a_branch_of_the_disk_goes_through_its_folds() -> None:
+    disk = udd.Disk(0.004)
+    start = next(rest for rest in udd.equilibria(disk) if 1.2 < rest.state[0] < 1.65)
+    branch = udd.continuation(start, "W", (0.0005, 0.05))
+    kinds = {point.kind: point.value for point in branch.points}
+    # k(Omega) Omega^2 = g W has its maximum at Omega = 2 k1/(3 k2), its minimum at the kink.
+    top, kink = 2 * 0.103 / (3 * 0.055), (0.103 - 0.012) / 0.055
+    assert kinds["fold"] == pytest.approx((0.103 - 0.055 * top) * top**2 / 9.81, abs=1e-12)
+    assert kinds["fold at a kink"] == pytest.approx(0.012 * kink**2 / 9.81, abs=1e-12)
+    assert sorted([branch.values[0], branch.values[-1]]) == pytest.approx([0.0005, 0.05])
+
+
+def test_the_disks_symmetric_cycle_loses_its_symmetry() -> None:
+    branch = udd.continuation(udd.periodic_orbit(udd.Disk(0.088)), "W", (0.07, 0.1))
+    (point,) = branch.points
+    assert point.kind == "symmetry breaking" and point.error < 1e-9
+    # The orbit is its own image half a period later, by another integrator's run over the edge too.
+    assert isinstance(point.solution, udd.PeriodicOrbit)
+    run = udd.simulate(
+        udd.Disk(point.value, edge="ignore"),
+        [0.0, point.period / 2],
+        point.solution.state,
+        method="dop853",
+        rtol=1e-12,
+        atol=1e-15,
+    )
+    np.testing.assert_allclose(run.state[-1][:3], point.solution.state[:3] * [-1, -1, 1], atol=1e-9)
+    assert udd.periodic_orbit(udd.Disk(point.value - 0.001)).symmetric is False
+    assert udd.periodic_orbit(udd.Disk(point.value + 0.001)).symmetric is True
+
+
+def test_a_pitchfork_of_equilibria_is_a_branch_point() -> None:
+    model = udd.Model(["x", "y"], {"x": "r*x - x^3", "y": "-y"}, {"r": -0.5})
+    rest = udd.equilibria(model)[0]
+    branch = udd.continuation(rest, "r", (-1.0, 1.0))
+    (point,) = branch.points
+    assert point.kind == "branch point" and point.value == pytest.approx(0.0, abs=1e-9)
+    born = udd.continuation(point, bounds=(-1.0, 1.0))
+    np.testing.assert_allclose(born.states[-1][0] ** 2, born.values[-1], atol=1e-10)
+
+
+def test_a_neimark_sacker_bifurcation_is_found() -> None:
+    # A rotation with a second oscillator that gains energy at mu = 0: the multipliers of the cycle are
+    # exp(2 pi (mu +- i s)).
+    model = udd.Model(
+        ["x", "y", "u", "v"],
+        {
+            "x": "x*(1 - x^2 - y^2) - y",
+            "y": "y*(1 - x^2 - y^2) + x",
+            "u": "mu*u - s*v - u*(u^2 + v^2)",
+            "v": "mu*v + s*u - v*(u^2 + v^2)",
+        },
+        {"mu": -0.2, "s": 0.3},
+    )
+    orbit = udd.periodic_orbit(model, [1.0, 0.0, 0.0, 0.0], period=6.2)
+    assert orbit.period == pytest.approx(2 * math.pi, abs=1e-10)
+    branch = udd.continuation(orbit, "mu", (-0.5, 0.5))
+    (point,) = branch.points
+    assert point.kind == "Neimark-Sacker"
+    assert point.value == pytest.approx(0.0, abs=1e-9)
+    assert point.frequency == pytest.approx(0.3, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: udd.equilibria(3), "a model is needed"),
+        (lambda: udd.periodic_orbit(udd.DLE(7.1), [1.0, 2.0]), "3 components"),
+        (lambda: udd.periodic_orbit(udd.DLE(7.1), [1.0, 2.0, 0.0], period=0.01), "no cycle"),
+        (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "q"), "no parameter 'q'"),
+        (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", (8, 9)), "outside the bounds"),
+        (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1))), "which parameter"),
+        (
+            lambda: udd.equilibria(udd.Model(["x", "y"], {"x": "sin(t)", "y": "-y"})),
+            "depend on time",
+        ),
+    ],
+)
+def test_bad_input_gets_a_sentence(call: object, message: str) -> None:
+    with pytest.raises(udd.UddError, match=message):
+        call()  # type: ignore[operator]
