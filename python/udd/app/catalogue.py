@@ -31,6 +31,27 @@ _RANGES: dict[str, dict[str, tuple[float, float, float, float, str]]] = {
     },
     "dle": {"w": (0.05, 12.0, 0.001, 1.0, ""), "B": (0.0, 0.9, 0.001, 1.0, "")},
 }
+#: Amplitudes with which an effect is seen at once, about a tenth of what else acts on the disk.
+_SHOWN = {
+    ("quadratic_drag", "c"): 4e-4,
+    ("cubic_drag", "c"): 8e-5,
+    ("coulomb", "c"): 0.005,
+    ("stribeck", "c"): 0.01,
+    ("relaxation", "b"): 6.0,
+    ("slip", "c"): 0.2,
+    ("radial_slip", "c"): 0.003,
+    ("load_drive", "a"): 0.05,
+    ("lateral_slip", "c"): 0.2,
+    ("wheel_ripple", "a"): 0.1,
+    ("drive_ripple", "a"): 0.1,
+    ("drive_drift", "a"): 0.002,
+    ("tilt", "a"): 0.02,
+    ("eccentric_mass", "a"): 0.02,
+    ("uneven_disk", "a"): 0.02,
+    ("cable_torque", "kappa"): 0.001,
+    ("constant_torque", "c"): 0.01,
+    ("radial_friction", "c"): 2.0,
+}
 _B = 43.6  # 1/m: the paper's B = 0.2 for the disk
 
 
@@ -119,8 +140,8 @@ def _effect_as_json(spec: Any) -> dict[str, Any]:
         "parameters": [
             {
                 "name": p.name,
-                "unit": p.unit,
-                "default": p.default,
+                "unit": text_of(pretty(p.unit)),
+                "default": _SHOWN.get((spec.name, p.name), p.default),
                 "least": _finite(p.range[0]),
                 "most": _finite(p.range[1]),
             }

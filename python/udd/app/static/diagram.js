@@ -171,9 +171,17 @@ export class Diagram {
     const j = this.page.about(this.page.home.model.kind).states.indexOf(name);
     const scale = this.page.scale(name);
     const f = this.found;
-    const shown = [];
-    if (f) for (let o = j; o < f.rows.length; o += f.dim) shown.push(scale * f.rows[o]);
-    const finite = shown.filter(Number.isFinite).sort((a, b) => a - b);
+    const shown = [], near = [];
+    const edge = this.page.edge;
+    if (f) {
+      for (let o = 0; o < f.rows.length; o += f.dim) {
+        const value = scale * f.rows[o + j];
+        shown.push(value);
+        // What is far beyond the edge need not be in the picture.
+        if (Number.isFinite(value) && Math.abs(f.rows[o + 1]) < 1.4 * edge) near.push(value);
+      }
+    }
+    const finite = near.sort((a, b) => a - b);
     const cut = (q) => finite[Math.min(finite.length - 1, Math.floor(q * finite.length))];
     const range = finite.length ? span([cut(0.001), cut(0.999)]) : [-1, 1];
     const c = this.axes.begin([low, high, ...range], "", t(`axis_${name}`), { bottom: false });
@@ -192,6 +200,12 @@ export class Diagram {
             if (Number.isFinite(y)) c.fillRect(x, this.axes.y(y) - size / 2, size, size);
           }
         }
+      }
+      if (j === 1 && Number.isFinite(edge)) {
+        c.setLineDash([6, 5]);
+        c.strokeStyle = "#9a9a9a";
+        for (const y of [-edge, edge]) line(c, 0, this.axes.y(scale * y), this.axes.width, this.axes.y(scale * y));
+        c.setLineDash([]);
       }
       this.cursor(this.axes, now);
       if (this.from && this.to) {

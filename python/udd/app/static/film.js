@@ -177,7 +177,7 @@ export class Loop {
       box.lastChild.append(note);
       return box;
     }));
-    this.movie(found.parts);
+    this.movie(found.parts, found.effects.length > 0);
     const errors = found.errors.map((e) => [e.horizon, e.before, ...(found.after ? [e.after] : []), e.floor]);
     const heads = [t("loop_horizon"), t("loop_before"), ...(found.after ? [t("loop_after")] : []), t("loop_floor")];
     $("errors").replaceChildren(table(t("loop_errors"), heads, errors));
@@ -195,7 +195,7 @@ export class Loop {
     $("report").src = this.part("report.html");
   }
 
-  movie(parts) {
+  movie(parts, more) {
     const part = parts.find(({ name }) => /^picture-\d+\.(mp4)$/.test(name)) ?? parts.find(({ name }) => name === "picture-1.svg");
     $("movie").replaceChildren();
     if (!part) return;
@@ -206,7 +206,14 @@ export class Loop {
       Object.assign(shown, { controls: true, loop: true, muted: true, autoplay: !matchMedia("(prefers-reduced-motion: reduce)").matches });
       shown.setAttribute("aria-label", part.title);
     } else shown.alt = part.title;
-    $("movie").append(shown);
+    const titles = document.createElement("div");
+    titles.className = "panels";
+    titles.append(...[t("loop_measured"), t("loop_known"), ...(more ? [t("loop_after")] : [])].map((text) => {
+      const title = document.createElement("span");
+      title.textContent = text;
+      return title;
+    }));
+    $("movie").append(titles, shown);
   }
 }
 

@@ -54,6 +54,11 @@ class Page {
     return SCALES[name] ?? 1;
   }
 
+  /** How far the disk's centre can be from the wheels; none without units. */
+  get edge() {
+    return this.home.model.kind === "disk" ? this.home.model.R : Infinity;
+  }
+
   // --- runs
 
   /** A run from a state: the trails and the maps begin anew. */

@@ -79,7 +79,7 @@ export class Axes extends Canvas {
     }
     c.textAlign = "right";
     c.textBaseline = "middle";
-    for (const [y, text] of ticks(y0, y1, (low - top) / (s * 2.2))) {
+    for (const [y, text] of ticks(y0, y1, Math.max(2.2, (low - top) / (s * 2.2)))) {
       const py = Math.round(this.y(y)) + 0.5;
       line(c, left, py, right, py);
       c.fillText(text, left - s * 0.35, py);

@@ -80,7 +80,7 @@ export class Sections {
     const value = column(names.indexOf(own));
     const range = span(value);
     const label = t(`axis_${own}`);
-    c = this.return.begin([...range, ...range], `${label}, ${t("return_now")}`, `${label}, ${t("return_next")}`);
+    c = this.return.begin([...range, ...range], t("return_now", { x: label }), t("return_next", { x: label }));
     c.strokeStyle = FAINT;
     this.return.clipped(() => {
       c.beginPath();
