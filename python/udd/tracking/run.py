@@ -24,7 +24,8 @@ from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
-from .refine import LONG, drop_weak
+from .readout import readout
+from .refine import LONG, Around, drop_weak
 from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .scale import Scale, scale
@@ -147,6 +148,8 @@ def track_in_detail(
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     if refine:
+        if known.readout.value:
+            known = _timed(known, look_over, tracks)
         tracks = _again(film, known, tracks, progress)
     drop_weak(tracks)
     size = scale(known.look.places, rim, radius, distance)
@@ -186,6 +189,20 @@ def _follow(film: Film, known: Known, frames: int, progress: bool) -> Tracks:
 
     with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}") as bar:
         return follow(film.pictures(), known, lambda _: bar.update())
+
+
+def _timed(known: Known, look_over: Survey, tracks: Tracks) -> Known:
+    """The readout once more, now that every frame's motion is known from its neighbours."""
+    around = Around(tracks)
+    frames = []
+    for picture in look_over.pictures:
+        here = around.at(picture.index) if picture.index < len(tracks.t) else None
+        if here is not None and here.held and not tracks.flag[picture.index]:
+            frames.append((picture.y, here.pose, here.motion(known.exposure)))
+    again = readout(frames, known.look, known.view, around.interval)
+    if not again.value:
+        return known
+    return replace(known, look=replace(known.look, readout=again.value), readout=again)
 
 
 def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
@@ -281,7 +298,7 @@ def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[ND
     film = Film(video)
     for picture in film.pictures():
         if picture.index in wanted:
-            found[picture.index] = _rgb(picture, film.full_range)
+            found[picture.index] = rgb(picture, film.full_range)
             if len(found) == len(wanted):
                 break
     lost = wanted - set(found)
@@ -298,17 +315,18 @@ def pictures_between(video: str | os.PathLike[str], t: NDArray[np.float64]) -> I
     for picture in film.pictures(float(t[0])):
         while want is not None and before is not None and picture.t > want:
             nearest = before if want - before.t < picture.t - want else picture
-            yield _rgb(nearest, film.full_range)
+            yield rgb(nearest, film.full_range)
             want = next(wanted, None)
         if want is None:
             return
         before = picture
     while want is not None and before is not None:
-        yield _rgb(before, film.full_range)
+        yield rgb(before, film.full_range)
         want = next(wanted, None)
 
 
-def _rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
+def rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
+    """One picture as an RGB array (height, width, 3)."""
     import cv2
 
     h, w = picture.y.shape
