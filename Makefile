@@ -83,7 +83,7 @@ bench-startup: .venv/.udd ## what importing udd takes in seconds, and a long swe
 bench-discovery: .venv/.udd ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(PY) benches/python/discovery $(ARGS)
 
-bench-tracker: .venv/.udd ## the tracker on films with every defect in turn (ARGS="--only clean,standard --fast --peers")
+bench-tracker: .venv/.udd ## the tracker on films with every defect in turn (ARGS="--only clean,standard --trackers udd,fast,HSV")
 	$(PY) benches/python/tracker $(ARGS)
 
 bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)

@@ -1,6 +1,6 @@
 """How well the tracker does at the limit of the camera: films with one defect each, the truth beside.
 
-    python benches/python/tracker [--only clean,standard] [--fast] [--peers] [--seed 1] [--json out.json]
+    python benches/python/tracker [--only clean,standard] [--trackers udd,HSV] [--json out.json]
 
 Films are made by the film maker with the seed (14 s, 550 x 700 pixels, 1750 per metre, W = 0.039 m/s, noise 2
 of 255, MPEG-4 as OpenCV writes it, exposure 10 ms, the support before the disk; each row says what differs),
@@ -38,8 +38,9 @@ def main() -> int:
         prog="tracker", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--only", default="", help="words of which a film's name must hold one")
-    parser.add_argument("--peers", action="store_true", help="other trackers beside it")
-    parser.add_argument("--fast", action="store_true", help="the fast pass alone beside it")
+    parser.add_argument(
+        "--trackers", default="udd", help="of udd, fast (the first pass alone), HSV, trackpy, CSRT"
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=Path("build/tracker"), help="where films are kept")
     parser.add_argument("--json", type=Path)
@@ -47,15 +48,17 @@ def main() -> int:
     args.folder.mkdir(parents=True, exist_ok=True)
     rows, missed = [], 0
     print(HEAD, flush=True)
+    wanted = args.trackers.split(",")
+    trackers = {"udd": ours, "fast": fast}
+    if not set(wanted) <= set(trackers):
+        import others
+
+        trackers |= others.TRACKERS
+    for name in set(wanted) - set(trackers):
+        print(f"{name} is not installed here; the table goes without it")
+    trackers = {name: tracker for name, tracker in trackers.items() if name in wanted}
     for case in named([w for w in args.only.split(",") if w]):
         made = film(case, args.folder, args.seed)
-        trackers = {"udd": ours}
-        if args.fast:
-            trackers["udd fast"] = fast
-        if args.peers:
-            import others
-
-            trackers |= others.TRACKERS
         for name, tracker in trackers.items():
             try:
                 s = tracker(case, made)

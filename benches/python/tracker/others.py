@@ -6,6 +6,7 @@ Each gives the marks' centres in a frame; one least-squares rigid fit makes Y, Z
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -35,7 +36,7 @@ def mask_of(hsv: NDArray[np.uint8], k: int) -> NDArray[np.uint8]:
     """Pixels of the k-th mark's colour."""
     low, high = HUES[k]
     hue = (hsv[..., 0].astype(np.int16) + 90) % 180 - 90 if low < 0 else hsv[..., 0]
-    return ((hue >= low) & (hue <= high) & (hsv[..., 1] > 110) & (hsv[..., 2] > 50)).astype(np.uint8)
+    return ((hue >= low) & (hue <= high) & (hsv[..., 1] > 150) & (hsv[..., 2] > 50)).astype(np.uint8)
 
 
 def pose(marks: NDArray[np.complex128], film: Film) -> tuple[complex, float]:
@@ -92,13 +93,15 @@ def particles(case: Case, film: Film) -> Score:
     import trackpy
 
     trackpy.quiet()
+    warnings.filterwarnings("ignore", module="trackpy")  # a hidden mark is no news
     diameter = 2 * round(0.6 * SIDE * film.scale) + 1
 
     def find(picture: NDArray[np.uint8]) -> NDArray[np.complex128]:
         hsv = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2HSV), dtype=np.uint8)
         out = np.full(4, complex(np.nan, np.nan))
         for k in range(4):
-            found: Any = trackpy.locate(255 * mask_of(hsv, k), diameter, topn=1, preprocess=False)
+            soft = cv2.GaussianBlur(255 * mask_of(hsv, k), (0, 0), 0.3 * SIDE * film.scale)
+            found: Any = trackpy.locate(soft, diameter, topn=1, preprocess=False)
             if len(found):
                 out[k] = complex(found["x"].iloc[0], found["y"].iloc[0])
         return out

@@ -31,6 +31,14 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--quality", type=float, default=20.0, help="constant rate factor, 0 best to 51 (default 20)"
     )
+    parser.add_argument("--codec", default="h264", help="h264 (default), hevc or mp4v (as OpenCV writes it)")
+    parser.add_argument(
+        "--defect",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help='what goes wrong, such as clutter=20, readout=0.8, off_axis="(0.26, 0)"; may be repeated',
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
 
 
@@ -44,6 +52,7 @@ def run(args: argparse.Namespace) -> Answer:
     size = re.fullmatch(r"(\d+)[xX](\d+)", args.size)
     if size is None:
         raise UddError(f"--size must be width x height, such as 550x700, not {args.size}")
+    defects = _defects(args.defect)
     model = disk(args, args.W, 0.08 if args.R is None else args.R)
     require_video()
     checked_path(args.out)
@@ -57,6 +66,8 @@ def run(args: argparse.Namespace) -> Answer:
         tilt=args.tilt,
         noise=args.noise,
         quality=args.quality,
+        codec=args.codec,
+        defects=defects,
         seed=args.seed,
         progress=watched(),
     )
@@ -64,3 +75,25 @@ def run(args: argparse.Namespace) -> Answer:
     text = f"{made.path}: {len(made.t)} frames, {made.t[-1]:.2f} s{left}"
     data = {"file": made.path, "frames": len(made.t), "outcome": trajectory.outcome, "model": repr(model)}
     return Answer(text, data)
+
+
+def _defects(given: list[str]) -> Any:
+    import ast
+    from dataclasses import fields
+
+    from udd.film import Defects
+
+    names = [f.name for f in fields(Defects)]
+    found: dict[str, Any] = {}
+    for text in given:
+        name, sign, value = text.partition("=")
+        if not sign or name not in names:
+            raise UddError(f"--defect must be NAME=VALUE with a name of {', '.join(names)}, not {text}")
+        try:
+            found[name] = ast.literal_eval(value)
+        except (ValueError, SyntaxError, RecursionError, MemoryError):
+            raise UddError(f"--defect {name}: {value!r} is no number and no tuple of numbers") from None
+    try:
+        return Defects(**found)
+    except TypeError:
+        raise UddError(f"--defect: a value is of the wrong kind among {', '.join(given)}") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
@@ -88,12 +88,12 @@ def add_partial(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--partial", action="store_true", help="use what there is of a film that is cut off")
 
 
-def tracked(args: argparse.Namespace, radius: float, pivot: tuple[float, float] | None = None) -> Measurement:
+def tracked(args: argparse.Namespace, radius: float, **options: Any) -> Measurement:
     """Track a film; one that is cut off is refused, unless its user knows."""
     from udd.tracking import track
 
     with warnings.catch_warnings(record=True) as said:
-        found = track(args.file, disk_radius=radius, pivot=pivot, progress=watched())
+        found = track(args.file, disk_radius=radius, progress=watched(), **options)
     missing = int(found.meta.get("frames_missing", 0))
     whole = missing + len(found)
     if missing > _CUT * whole and not args.partial:

@@ -6,27 +6,49 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
 from .answer import Answer
-from .inputs import add_partial, tracked
+from .inputs import add_partial, is_film, tracked
 from .options import new, numbers
+
+if TYPE_CHECKING:
+    from udd.measurement import Measurement
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     parser = new(commands, "track", run, "Measure the motion of the disk in a film; the table is CSV.")
     parser.add_argument(
-        "file", type=Path, metavar="FILM", help="a film by a camera at rest, the four colour marks in view"
+        "file",
+        type=Path,
+        metavar="FILM",
+        help="a film by a camera at rest, the four colour marks in view; or a folder of films",
     )
-    parser.add_argument("--out", type=Path, metavar="CSV", help="file to write; otherwise standard output")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="CSV",
+        help="file to write (for a folder: folder); otherwise standard output",
+    )
     parser.add_argument(
         "--disk-radius", type=float, default=0.08, metavar="M", help="sets the scale (default 0.08)"
     )
     parser.add_argument(
         "--pivot", metavar="U,V", help="contact in the picture [pixels]; found where not given"
+    )
+    parser.add_argument(
+        "--mark-distance",
+        type=float,
+        metavar="M",
+        help="from the marks' centres to the disk's (default 65/80 R)",
+    )
+    parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
+    parser.add_argument("--fast", action="store_true", help="without the second pass")
+    parser.add_argument(
+        "--overlay", type=Path, metavar="MP4", help="film to write, what was found drawn upon it"
     )
     add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
@@ -34,20 +56,46 @@ def add(commands: Any) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Do it."""
-    import numpy as np
-
     from udd._validate import number
 
+    if args.file.is_dir():
+        return _folder(args)
     if args.out is not None and not args.out.parent.is_dir():
         raise UddError(f"{args.out}: there is no folder {args.out.parent}")
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
+    m = tracked(args, args.disk_radius, **_options(args)).with_meta(**more)
+    text, data = _summary(m)
+    if args.overlay is not None:
+        from udd.tracking import overlay
+
+        overlay(args.file, m, args.overlay)
+        text += f"\nwritten: {args.overlay}"
+        data["overlay"] = args.overlay
+    if args.out is not None:
+        m.to_csv(args.out)
+        return Answer(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
+    if not args.json:
+        with tempfile.TemporaryDirectory() as folder:
+            table = Path(folder) / "table.csv"
+            m.to_csv(table)
+            sys.stdout.write(table.read_text(encoding="utf-8"))
+        print(f"udd: {text}", file=sys.stderr)
+    return Answer("", data)
+
+
+def _options(args: argparse.Namespace) -> dict[str, Any]:
     pivot = None
     if args.pivot is not None:
         place = numbers([args.pivot], "--pivot")
         if len(place) != 2:
             raise UddError(f"--pivot must be two numbers U,V, not {args.pivot}")
         pivot = (place[0], place[1])
-    m = tracked(args, args.disk_radius, pivot).with_meta(**more)
+    return {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps, "refine": not args.fast}
+
+
+def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
+    import numpy as np
+
     usable = int(m.seen.sum())
     text = f"{usable} of {len(m)} frames usable, {m.duration:.2f} s"
     data: dict[str, Any] = {
@@ -61,13 +109,33 @@ def run(args: argparse.Namespace) -> Answer:
         y, z, beta = 1e3 * spread
         text += f"; median standard errors {y:.2g} mm, {z:.2g} mm, {beta:.2g} mrad"
         data["sigma_median"] = dict(zip(m.names, spread, strict=True))
-    if args.out is not None:
-        m.to_csv(args.out)
-        return Answer(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
-    if not args.json:
-        with tempfile.TemporaryDirectory() as folder:
-            table = Path(folder) / "table.csv"
-            m.to_csv(table)
-            sys.stdout.write(table.read_text(encoding="utf-8"))
-        print(f"udd: {text}", file=sys.stderr)
-    return Answer("", data)
+    return text, data
+
+
+def _folder(args: argparse.Namespace) -> Answer:
+    """Track all films of a folder; one that cannot be tracked does not stop the others."""
+    films = sorted(path for path in args.file.iterdir() if path.is_file() and is_film(path))
+    if not films:
+        raise UddError(f"{args.file}: there is no film in this folder")
+    if args.overlay is not None:
+        raise UddError("--overlay is for one film, not for a folder")
+    if args.out is None or (args.out.exists() and not args.out.is_dir()):
+        raise UddError("say with --out in which folder the tables of the films are to be written")
+    options = _options(args)
+    args.out.mkdir(exist_ok=True)
+    lines, rows, failed = [], [], 0
+    for film in films:
+        args.file = film
+        try:
+            m = tracked(args, args.disk_radius, **options)
+        except UddError as error:
+            failed += 1
+            lines.append(f"{film.name}: {error}")
+            rows.append({"film": film.name, "error": str(error)})
+            continue
+        table = args.out / f"{film.stem}.csv"
+        m.to_csv(table)
+        text, data = _summary(m)
+        lines.append(f"{film.name}: {text}; drive {100 * float(m.meta['drive_seen']):.3f} cm/s")
+        rows.append({"film": film.name, "file": table, **data})
+    return Answer("\n".join(lines), {"films": rows, "failed": failed}, 1 if failed else 0)

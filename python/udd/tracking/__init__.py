@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .decode import Film, TrackError
 from .glimpse import Glimpse
+from .overlay import overlay
 from .result import Pixels, pixels
 from .run import Tracking, pictures_at, pictures_between, track, track_in_detail
 
@@ -13,6 +14,7 @@ __all__ = [
     "Pixels",
     "TrackError",
     "Tracking",
+    "overlay",
     "pictures_at",
     "pictures_between",
     "pixels",

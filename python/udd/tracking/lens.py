@@ -19,7 +19,8 @@ class Lens:
     """Map from the picture to the plane of the disk, both in pixels (u + iv).
 
     With p the picture point from the picture's middle in units of `size`:  q = p (1 + curve |p|^2),
-    w = q / (1 + tilt_u q_u + tilt_v q_v), then u is stretched by 1 + aspect and sheared by `shear`.
+    w = q / (1 + tilt_u q_u + tilt_v q_v), then u is stretched by 1 + aspect and v sheared by `shear`: what is
+    upright in the middle of the picture is so in the plane, as for any camera that is not rolled.
     """
 
     middle: complex = 0j
@@ -44,7 +45,7 @@ class Lens:
         p = (z - self.middle) / self.size
         q = p * (1 + self.curve * (p.real**2 + p.imag**2))
         w: Complexes = q / (1 + self.tilt_u * q.real + self.tilt_v * q.imag)
-        at = self.middle + self.size * (w.real * (1 + self.aspect) + self.shear * w.imag + 1j * w.imag)
+        at = self.middle + self.size * (w.real * (1 + self.aspect) + 1j * (w.imag + self.shear * w.real))
         return np.asarray(at, dtype=np.complex128)
 
     @np.errstate(invalid="ignore")
@@ -54,7 +55,8 @@ class Lens:
         if self.plain:
             return z
         w = (z - self.middle) / self.size
-        w = (w.real - self.shear * w.imag) / (1 + self.aspect) + 1j * w.imag
+        across = w.real / (1 + self.aspect)
+        w = across + 1j * (w.imag - self.shear * across)
         q = w / (1 - self.tilt_u * w.real - self.tilt_v * w.imag)
         p = q
         for _ in range(8):  # contracts by 3 curve |p|^2 a time

@@ -26,6 +26,7 @@ FEWEST = 3  # frames in motion from which marks are learned a second time
 SHARP = 60  # slow frames from which the rim is measured
 FOR_LENS = 90  # frames from which tilt and lens are measured
 LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
+SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 
 
@@ -108,9 +109,16 @@ def _in_plane(lens: Lens, sight: Sight) -> tuple[complex, float]:
 
 
 def _centred(look: Look, centre: complex) -> Look:
-    """Marks as seen from the disk's own centre, red exactly at beta."""
-    red = look.marks[0].place - centre
-    turn = red / abs(red) * 1j
+    """Marks as seen from the disk's own centre, red at beta.
+
+    Where all four stand at right angles as nearly as they are known, all four say where beta is.
+    """
+    places = look.places - centre
+    turns = places / np.abs(places) / BODY
+    off = np.angle(turns / turns.mean()) * np.abs(places)
+    turn = complex(turns[0])
+    if np.abs(off).max() < SQUARE:
+        turn = complex(turns.mean() / abs(turns.mean()))
     marks = [
         replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
     ]

@@ -14,7 +14,7 @@ from .pose import align
 
 Array = NDArray[np.float64]
 ROUNDS = 5
-MOST = 60  # frames to judge by
+MOST = 36  # frames to judge by
 FEWEST = 6
 CERTAIN = 5.0  # standard errors
 LEAST = 0.02  # of the frame interval: what is less does no harm

@@ -26,7 +26,8 @@ from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
-from .refine import LONG, drop_weak
+from .readout import readout
+from .refine import LONG, Around, drop_weak
 from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
@@ -151,6 +152,8 @@ def track_in_detail(
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     if refine:
+        if known.readout.value:
+            known = _timed(known, look_over, tracks)
         tracks = _again(film, known, tracks, progress)
     drop_weak(tracks)
     size = scale(known.look.places, rim, radius, distance)
@@ -196,6 +199,20 @@ def _follow(
                 watch(Glimpse(picture, pose, known.look, frames, film.full_range))
 
         return follow(film.pictures(), known, tick)
+
+
+def _timed(known: Known, look_over: Survey, tracks: Tracks) -> Known:
+    """The readout once more, now that every frame's motion is known from its neighbours."""
+    around = Around(tracks)
+    frames = []
+    for picture in look_over.pictures:
+        here = around.at(picture.index) if picture.index < len(tracks.t) else None
+        if here is not None and here.held and not tracks.flag[picture.index]:
+            frames.append((picture.y, here.pose, here.motion(known.exposure)))
+    again = readout(frames, known.look, known.view, around.interval)
+    if not again.value:
+        return known
+    return replace(known, look=replace(known.look, readout=again.value), readout=again)
 
 
 def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
