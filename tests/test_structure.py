@@ -247,6 +247,39 @@ def test_damping_moves_where_the_symmetry_breaks(figure_eight: udd.Branch) -> No
     assert curve.values[-1][0] == pytest.approx(there.find("symmetry breaking")[0].value, abs=1e-9)
 
 
+def test_rotation_has_a_homoclinic_orbit_as_shilnikov_says() -> None:
+    cycles = udd.continuation(udd.periodic_orbit(udd.DLE(0.3)), "w", (0.29, 3.0), direction="up", period=50.0)
+    found = udd.connection(cycles)
+    assert found.kind == "homoclinic" and found.wild
+    assert found.error < 1e-9
+    # The folds of the branch accumulate there, from both sides, at the ratio that the eigenvalues give.
+    away = np.array([fold.value for fold in cycles.find("fold")]) - found.value
+    periods = np.array([fold.period for fold in cycles.find("fold")])
+    assert (np.sign(away[1:]) == -np.sign(away[:-1])).all()
+    assert -away[-1] / away[-2] == pytest.approx(found.fold_ratio, rel=0.02)
+    assert (periods[-1] - periods[-3]) / 2 == pytest.approx(found.fold_spacing, rel=0.1)
+    # Forward from its beginning it leaves and comes back, by another integrator.
+    k = len(found.t) // 2
+    run = udd.simulate(
+        udd.DLE(found.value),
+        found.t[k - 3 : k + 4],
+        found.state[k - 3],
+        method="dop853",
+        rtol=1e-12,
+        atol=1e-13,
+    )
+    np.testing.assert_allclose(run.state, found.state[k - 3 : k + 4], atol=1e-7)
+
+
+def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) -> None:
+    found = udd.connection(udd.continuation(rotation.find("Hopf")[0], period=16.0))
+    np.testing.assert_allclose(found.equilibrium.state, [0.0, 0.0, 5.0], atol=1e-12)
+    longer = udd.continuation(rotation.find("Hopf")[0], period=22.0)
+    # The cycles come nearer by exp(-0.85 T): the branch itself is not there yet.
+    assert longer.values[-1] == pytest.approx(found.value, abs=1e-6)
+    assert found.error < 1e-9 and not found.wild
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
