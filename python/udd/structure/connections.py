@@ -20,6 +20,8 @@ __all__ = ["Connection", "connection"]
 
 _LONGER = 2.0  # typical times that are added at both ends
 _SOLVED = 1e-11  # a Newton step below this, in scaled unknowns, is the last
+_NOISE = 1e-8  # where rounding keeps the steps from getting smaller, this will do
+_TRIED = 8  # slowest nodes near which an equilibrium is looked for
 _AHEAD = 1e-6  # of the parameter, for differences of the conditions at the ends
 
 
@@ -115,8 +117,8 @@ def connection(branch: Branch) -> Connection:
 
     Notes
     -----
-    The equilibrium is the one near which the branch's longest cycle is slowest. That cycle, cut there, is the
-    first guess of an orbit that begins in the plane of the growing eigenvectors and ends in that of the
+    The equilibrium is the one to which the branch's longest cycle comes nearest. That cycle, cut there, is
+    the first guess of an orbit that begins in the plane of the growing eigenvectors and ends in that of the
     decaying ones (W.-J. Beyn, IMA Journal of Numerical Analysis 10 (1990) 379): multiple shooting finds it
     together with the parameter. It is then prolonged at both ends until the value stands.
 
@@ -171,21 +173,27 @@ class _Problem:
 
     @classmethod
     def of(cls, curve: CycleCurve, u: Floats) -> _Problem:
-        """From a long cycle, cut where it is slowest."""
+        """From a long cycle, cut where it is nearest to an equilibrium."""
         flow, values, nodes, m = curve.flow, curve.values_at(u), curve.nodes(u), curve.pieces
         model = flow.with_values(values)
         speed = np.linalg.norm(
             model.rates(0.0, flow.full(nodes))[:, flow.kept] * flow.clock / flow.size, axis=1
         )
-        slowest = int(np.argmin(speed))
-        rest = refined(flow, values, nodes[slowest])
-        if rest is None or np.linalg.norm((rest - nodes[slowest]) / flow.size) > 0.5:
+        rests = [refined(flow, values, nodes[i]) for i in np.argsort(speed)[:_TRIED]]
+        apart = [
+            (float(away.min()), int(away.argmin()), rest)
+            for rest in rests
+            if rest is not None
+            for away in [np.linalg.norm((nodes - rest) / flow.size, axis=1)]
+        ]
+        if not apart:
             raise ModelError("the branch's longest cycle comes near no equilibrium: follow it further")
+        _, slowest, rest = min(apart, key=lambda one: one[0])
         # One round, from the cut to its image; beyond the end of the curve's own round in the mirror.
         order = np.arange(slowest, slowest + m + 1)
         cut = nodes[order % m] * np.where((order >= m)[:, None], curve.mirror, 1.0)
-        apart = not np.allclose(curve.mirror * rest, rest, atol=1e-9)
-        mirror = curve.mirror if apart else np.ones(flow.dim)
+        two = not np.allclose(curve.mirror * rest, rest, atol=1e-9)
+        mirror = curve.mirror if two else np.ones(flow.dim)
         return cls(flow, values, curve.parameter, rest, mirror, cut, curve.span(u), curve.value(u))
 
     def values_at(self, value: float) -> Floats:
@@ -240,6 +248,7 @@ class _Problem:
         model = flow.with_values(self.values_at(self.value))
         rate = model.rates(0.0, flow.full(self.nodes[middle]))[flow.kept] / size
         across, reference = rate / np.linalg.norm(rate), self.nodes[middle] / size
+        before = np.inf
         for _ in range(40):
             x = self.nodes / size
             found = flow.fly(self.values_at(self.value), self.nodes[:-1], spans, (self.parameter,))
@@ -267,8 +276,9 @@ class _Problem:
             step *= min(1.0, 0.3 / largest) if largest > 0 else 1.0
             self.nodes = self.nodes + step[:-1].reshape(m + 1, r) * size
             self.value += float(step[-1]) * scale
-            if largest < _SOLVED:
+            if largest < _SOLVED or (largest < _NOISE and largest > 0.1 * before):
                 return self.value
+            before = largest
             if not np.isfinite(largest):
                 break
         raise ModelError("the branch tends to no connection that is found: Newton's method does not converge")
@@ -280,8 +290,8 @@ class _Problem:
         more = max(1, int(np.ceil(_LONGER * self.flow.clock / share)))
         matrix = self.matrix(self.value)
         decaying, growing = self.projectors(self.value)
-        first = growing @ (self.nodes[0] - rest) / size
-        last = decaying @ (self.mirror * self.nodes[-1] - rest) / size
+        first = growing @ ((self.nodes[0] - rest) / size)
+        last = decaying @ ((self.mirror * self.nodes[-1] - rest) / size)
         before = [rest + size * (linalg.expm(-k * share * matrix) @ first) for k in range(more, 0, -1)]
         after = [
             self.mirror * (rest + size * (linalg.expm(k * share * matrix) @ last)) for k in range(1, more + 1)
