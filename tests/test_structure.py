@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -278,6 +280,61 @@ def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) 
     # The cycles come nearer by exp(-0.85 T): the branch itself is not there yet.
     assert longer.values[-1] == pytest.approx(found.value, abs=1e-6)
     assert found.error < 1e-9 and not found.wild
+
+
+def test_the_disks_connection_has_cycles_that_wind_towards_it() -> None:
+    # From the lower end of the symmetric cycles; 0.0126 is where the folds of the branch born there gather.
+    lower = udd.continuation(udd.periodic_orbit(udd.Disk(0.088)), "W", (0.009, 0.09), direction="down")
+    born = udd.continuation(lower.find("symmetry breaking")[-1], bounds=(0.005, 0.05), period=9.0)
+    found = udd.connection(born)
+    assert found.kind == "homoclinic" and found.wild and found.error < 1e-9
+    folds = np.array([fold.value for fold in born.find("fold")])
+    assert folds[-2:].min() < found.value < folds[-2:].max()
+
+
+def test_a_diagram_joins_what_is_seen_and_what_is_behind_it() -> None:
+    found = udd.diagram(udd.DLE(6.0), "w", np.linspace(5.2, 7.4, 12), n=40, transient=100, generations=1)
+    kinds = {(point.kind, round(point.value, 8)) for point in found.points}
+    assert kinds == {("symmetry breaking", 7.09642643), ("period doubling", 5.39471322)}
+    # Stable branches pass through the points of the scan.
+    scan, w = found.scan, 6.2
+    seen = scan["omega"].sel(w=w, path="up").to_numpy().ravel()
+    at = [(branch, orbit) for branch in found.branches if branch.kind == "cycle" for orbit in branch.at(w)]
+    stable = [orbit for _, orbit in at if orbit.stable]
+    assert stable
+    section = udd.poincare(udd.DLE(w), n=2, state0=stable[0].state, transient=0, rtol=1e-12, atol=1e-14)
+    own = section.component("omega")
+    # The scan shows one of two mirror images.
+    assert min(np.abs(np.sort(sign * own) - np.unique(seen.round(9))).max() for sign in (1, -1)) < 1e-6
+    assert found.hysteresis.shape[1] == 2 and len(found.as_dict()["branches"]) == len(found.branches)
+
+
+def test_pictures_of_branches(figure_eight: udd.Branch, rotation: udd.Branch) -> None:
+    for view in ("section", "extremes", "period"):
+        ax = udd.plot.branches([figure_eight], view=view)
+        labels = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert labels == ["stable", "unstable", "symmetry breaking"]
+        ax.figure.clear()
+    ax = udd.plot.branches(rotation, component="y")
+    assert ax.get_xlabel() == "w" and ax.get_ylabel() == "y [1]"
+    with pytest.raises(udd.UddError, match="no branches"):
+        udd.plot.branches([])
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from udd.cli import main
+
+    files = [tmp_path / "branches.png", tmp_path / "branches.json"]
+    out = [word for path in files for word in ("--out", str(path))]
+    code = main(["continuation", "w", "--from", "5", "--to", "9", "--at", "8", "--born", "1", "--json", *out])
+    assert code == 0
+    data = json.loads(capsys.readouterr().out)
+    points = [(p["kind"], round(p["value"], 8)) for branch in data["branches"] for p in branch["points"]]
+    assert points == [("symmetry breaking", 7.09642643), ("period doubling", 5.39471322)]
+    assert files[0].read_bytes()[:4] == b"\x89PNG"
+    assert json.loads(files[1].read_text())["parameter"] == "w"
+    assert main(["continuation", "w", "--from", "9", "--to", "5"]) == 1
+    assert "must be below" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
