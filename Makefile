@@ -22,7 +22,7 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery
+.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -32,13 +32,22 @@ install: .venv/.udd ## make .venv from the lock file and install the release bui
 demo: .venv/.udd ## from the sample film to the report: run the main job and print where its report is
 	$(BIN)/udd demo
 
+docs: .venv/.udd ## build the documentation into docs/_build/html; every page is run, and a warning is an error
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+
 test: test-rust test-python ## build everything and run all tests (cargo and pytest)
 
 test-rust: ## only the tests of the Rust core; needs no Python
 	cargo test --locked --no-fail-fast
 
 test-python: .venv/.udd ## only the tests of the Python package
-	$(PY) -m pytest
+	$(PY) -m pytest -n auto --dist loadfile
+
+test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" for some of it)
+	UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)
+
+bench-page: .venv/.browser ## the page's frames per second and its delay from slider to frame
+	$(PY) benches/python/page.py
 
 lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
 
@@ -74,6 +83,9 @@ bench-startup: .venv/.udd ## what importing udd takes in seconds, and a long swe
 bench-discovery: .venv/.udd ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(PY) benches/python/discovery $(ARGS)
 
+bench-tracker: .venv/.udd ## the tracker on films with every defect in turn (ARGS="--only clean,standard --fast --peers")
+	$(PY) benches/python/tracker $(ARGS)
+
 bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)
 	cd benches/python && PYTHONPATH=. $(CURDIR)/$(PEERS)/python -m peers $(ARGS)
 
@@ -86,7 +98,7 @@ lock: .venv/.deps ## write requirements.lock anew, with today's versions
 	  --custom-compile-command "make lock" --output-file requirements.lock
 
 clean: ## remove .venv and everything that was built
-	rm -rf .venv .venv-peers dist demo target .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers dist demo paper docs/_build target .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 
@@ -112,6 +124,12 @@ clean: ## remove .venv and everything that was built
 
 .venv/.udd: .venv/.deps $(SOURCES)
 	MATURIN_PEP517_ARGS=--locked $(PY) -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable . --verbose
+	@touch $@
+
+.venv/.browser: tests/browser/requirements.txt .venv/.udd
+	@command -v chromium chromium-browser google-chrome >/dev/null || \
+	  { as=$$([ "$$(id -u)" = 0 ] || echo sudo); $$as apt-get update -qq && $$as apt-get install -qq --yes --no-install-recommends chromium; }
+	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --only-binary :all: -r $<
 	@touch $@
 
 # --- the same for `bench-peers`; a peer that cannot be installed here is a note in the table

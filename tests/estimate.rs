@@ -124,7 +124,7 @@ fn elimination_equals_a_dense_solve() {
 
     let inverse = full.try_inverse().unwrap();
     let covariance = reduced.schur.clone().try_inverse().unwrap();
-    for (i, own) in reduced.state_covariance(&covariance).iter().enumerate() {
+    for (i, own) in reduced.uncertain(&covariance).covariance().iter().enumerate() {
         let expected = inverse.fixed_view::<2, 2>(2 * i, 2 * i).into_owned();
         approx::assert_relative_eq!(*own, expected, max_relative = 1e-8);
     }

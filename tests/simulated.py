@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 import udd
 
@@ -25,6 +26,7 @@ class Camera:
     exposure: float = 0.01
     outliers: float = 0.01
     lost: float = 0.02
+    memory: float = 0.0  # autocorrelation of the noise from frame to frame
 
 
 def start_between_wheels(model: udd.Disk, duration: float, rng: np.random.Generator) -> list[float]:
@@ -65,11 +67,14 @@ def film(
     sd = camera.noise + camera.per_speed * np.abs(omega)
     sd_angle = camera.angle_noise + camera.per_speed / 0.065 * np.abs(omega)
     far = np.where(rng.random(len(t)) < camera.outliers, 8.0, 1.0)
+    honest = rng.standard_normal((3, len(t)))
+    fresh, kept = [np.sqrt(1 - camera.memory**2)], [1.0, -camera.memory]
+    e = far * lfilter(fresh, kept, honest) if camera.memory else far * honest
     seen = np.column_stack(
         [
-            size * (c * y + s * z) + camera.offset[0] + far * sd * rng.standard_normal(len(t)),
-            size * (c * z - s * y) + camera.offset[1] + far * sd * rng.standard_normal(len(t)),
-            beta + camera.tilt + far * sd_angle * rng.standard_normal(len(t)),
+            size * (c * y + s * z) + camera.offset[0] + sd * e[0],
+            size * (c * z - s * y) + camera.offset[1] + sd * e[1],
+            beta + camera.tilt + sd_angle * e[2],
         ]
     )
     seen[rng.random(len(t)) < camera.lost] = np.nan

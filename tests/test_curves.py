@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -221,7 +222,8 @@ def _regression(seed: int, curve, noise: float = 0.3, n: int = 400) -> tuple[Spl
     x = rng.uniform(0, 1, n)
     design = spline.design(x)
     y = curve(x) + noise * rng.standard_normal(n)
-    return spline, x, Score(design.T @ y / noise**2, design.T @ design / noise**2)
+    information = design.T @ design / noise**2
+    return spline, x, Score(design.T @ y / noise**2, information, np.diag(information))
 
 
 def test_bands_of_a_plain_regression_hold_the_curve():
@@ -261,7 +263,7 @@ def test_chance_is_what_it_says():
     rng = np.random.default_rng(5)
     p = np.array(
         [
-            chance(Score(root @ rng.standard_normal(spline.size), score.information), spline.roughness)[0]
+            chance(replace(score, gradient=root @ rng.standard_normal(spline.size)), spline.roughness)[0]
             for _ in range(2000)
         ]
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -134,6 +135,7 @@ def test_ripples_from_one_response_equal_those_scored_singly():
 def test_a_result_is_data():
     found = discovered(E.quadratic_drag(c=5e-4), seed=12, duration=20.0)
     text = json.dumps(found.to_dict(), allow_nan=True)
+    assert json.dumps(pickle.loads(pickle.dumps(found)).to_dict(), allow_nan=True) == text
     assert json.loads(text)["effects"][0]["parameters"]["c"]["value"] == found.effects[0].parameters["c"]
     assert found.model is found.fit.model
 

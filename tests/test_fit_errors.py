@@ -54,3 +54,21 @@ def test_errors_cover():
         rms = np.sqrt(np.mean([score[name] ** 2 for score in z]))
         # 150 scores have an rms of 1 +- 0.058.
         assert 0.82 < rms < 1.18, (name, rms)
+
+
+def test_noise_that_remembers_itself_is_whitened():
+    """Frames whose noise goes together are worth less: the model stays tight, and errors still cover."""
+    scores, memory = [], []
+    for seed in range(8):
+        rng = np.random.default_rng([seed, 78])
+        truth = udd.Disk(rng.uniform(0.02, 0.08))
+        measured, _ = film(truth, rng, 60.0, Camera(memory=0.5))
+        fit = udd.fit(measured, udd.Disk(1.02 * truth.W))
+        scores.append([(fit.parameters[n] - truth.parameters[n]) / fit.errors[n] for n in NAMES])
+        memory.append(fit.noise.memory)
+    # One record's autocorrelation is known to 0.02 to 0.03; odd frames that are not weighted down dilute it.
+    np.testing.assert_allclose(np.mean(memory, axis=0), 0.5, atol=0.1)
+    # The rms of 32 scores exceeds 1.4 by chance once in 3000 times.
+    assert np.sqrt(np.mean(np.square(scores))) < 1.4
+    white, _ = film(udd.Disk(0.04), np.random.default_rng(5), 60.0)
+    assert (udd.fit(white, udd.Disk(0.04)).noise.memory == 0.0).all()

@@ -231,3 +231,18 @@ def test_the_command(
     np.testing.assert_array_equal(table[:, 1], data["theta"]["median"])
     assert main([*argv, "--out", str(tmp_path / "ahead.xls")]) == 1
     assert "must end in" in capsys.readouterr().err
+
+
+def test_a_users_own_model_is_run_on_too():
+    rng = np.random.default_rng(3)
+    t = np.arange(0.0, 16.0, 0.02)
+    truth = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v"}, {"k": 9.0, "c": 0.05})
+    motion = udd.simulate(truth, t, [1.0, 0.0]).state
+    seen = udd.Measurement(t, motion[:, :1] + 0.01 * rng.standard_normal((len(t), 1)), names=("x",))
+    found = udd.forecast(seen, truth.with_parameters({"k": 8.8}), start=12.0, t=t[601:] - t[600])
+    assert found.names == ("x",) and found.lyapunov_time == np.inf and found.valid_time == np.inf
+    inside = (found.low[:, 0] <= motion[600:, 0]) & (motion[600:, 0] <= found.high[:, 0])
+    # The band is one of 95 %; its errors go together for as long as the forecast lasts.
+    assert inside.mean() > 0.7
+    assert np.abs(found.median[:, 0] - motion[600:, 0]).max() < 0.02
+    assert found.to_dict()["x"]["median"].shape == (200,)

@@ -47,16 +47,11 @@ def test_a_formula_acts_as_the_librarys_effect_does(library: Effect, own: Effect
 
 
 def test_a_formula_goes_wherever_an_effect_goes() -> None:
-    warp = formula(
-        "torque",
-        "a*sin(n*beta)",
-        amplitudes=["a"],
-        ranges={"n": (1, 9)},
-        name="warp",
-        title="a warp",
-        a=0.01,
-        n=2,
-    )
+    def warped(a: float) -> effects.Effect:
+        given = {"amplitudes": ["a"], "ranges": {"n": (1, 9)}, "name": "warp", "title": "a warp"}
+        return formula("torque", "a*sin(n*beta)", **given, a=a, n=2)
+
+    warp = warped(0.01)
     disk = udd.Disk(0.039, effects=[effects.slip(c=0.1), warp, curve("lateral", "Z", -0.1, 0.1, [0.0] * 5)])
     assert list(disk.parameters)[6:9] == ["slip.c", "warp.a", "warp.n"]
     assert (warp.title, warp.equation, warp.amplitudes, warp.slots) == (
@@ -67,16 +62,7 @@ def test_a_formula_goes_wherever_an_effect_goes() -> None:
     )
     assert disk.effects[2].momentum == "consistent" and disk.units["curve.c4"] == "m/s"
     changed = disk.with_parameters({"warp.a": 0.5, "curve.c0": 1.0})
-    assert changed.effects[1] == formula(
-        "torque",
-        "a*sin(n*beta)",
-        amplitudes=["a"],
-        ranges={"n": (1, 9)},
-        name="warp",
-        title="a warp",
-        a=0.5,
-        n=2,
-    )
+    assert changed.effects[1] == warped(0.5)
     with pytest.raises(ModelError, match="n of warp must lie between 1 and 9"):
         disk.with_parameters({"warp.n": 10.0})
     for model in (disk, changed):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
+import scipy.linalg
 
 import discovered
 import simulated
 import udd
-from udd.discovery import innovations as module
 from udd.discovery.innovations import Innovations, innovations
+from udd.measurement import Measurement
 from udd.plot.fits import binned, coordinates
 from udd.report.loose import loosest
 
@@ -48,13 +51,45 @@ def test_a_missing_effect_leaves_colour() -> None:
     assert (np.abs(after.autocorrelation(25)[0]) < 0.2).all()
 
 
-def test_chunks_are_one_filter(fits: list[udd.Fit], monkeypatch: pytest.MonkeyPatch) -> None:
-    chunks = innovations(fits[0]).values
-    monkeypatch.setattr(module, "_CHUNK", 10**6)
-    whole = innovations(fits[0]).values
-    late = slice(60, None)  # the one filter has its own beginning there
-    # What five seconds of frames before each chunk leave of its beginning: 0.015 standard deviations at most.
-    np.testing.assert_allclose(chunks[late], whole[late], atol=0.03)
+@pytest.mark.parametrize("memory", [0.0, 0.6])
+def test_innovations_are_those_of_dense_algebra(memory: float) -> None:
+    """What is seen of a linear system is jointly Gaussian: Cholesky takes from each what went before."""
+    rng, dt, n = np.random.default_rng(8), 0.1, 60
+    model = udd.Model(["x", "v"], {"x": "v", "v": "-k*x"}, {"k": 2.0})
+    t = dt * np.arange(n)
+    seen = np.cos(np.sqrt(2.0) * t) + 0.05 * rng.standard_normal(n)
+    seen[30] = np.nan
+    fit = udd.fit(Measurement(t, seen[:, None], names=("x",)), model, free=["k"])
+    fit = dataclasses.replace(fit, noise=dataclasses.replace(fit.noise, memory=np.array([memory, 0.0])))
+
+    step = scipy.linalg.expm(dt * np.array([[0.0, 1.0], [-fit.parameters["k"], 0.0]]))
+    kick = np.diag(np.square(fit.problem.diffusion)) * dt
+    spread = [np.diag(np.ptp(fit.states, axis=0) ** 2)]
+    for _ in range(n - 1):
+        spread.append(step @ spread[-1] @ step.T + kick)
+    # Where the fit's states obey the model, what is seen differs from them by a motion of this covariance.
+    there = np.flatnonzero(np.isfinite(seen))
+    sd = np.zeros(n)
+    sd[there] = (fit.noise.sd(fit.record, fit.states[:, 0])[:, 0] / np.sqrt(fit.noise.weight))[there]
+    covariance = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            moved = np.linalg.matrix_power(step, i - j) @ spread[j]
+            # The noise begins anew after a frame that was not seen.
+            noise = sd[i] * sd[j] * memory ** (i - j) if (i < 30) == (j < 30) else 0.0
+            covariance[i, j] = covariance[j, i] = moved[0, 0] + (noise if memory or i == j else 0.0)
+    # The fitted states miss the model by their defects, which move all that comes after.
+    off = np.zeros((n, 2))
+    for i in range(n - 1):
+        off[i + 1] = step @ off[i] + step @ fit.states[i] - fit.states[i + 1]
+    rest = (seen - fit.states[:, 0] - off[:, 0])[there]
+    white = scipy.linalg.solve_triangular(
+        np.linalg.cholesky(covariance[np.ix_(there, there)]), rest, lower=True
+    )
+    found = innovations(fit).values
+    assert np.isnan(found[:12, 0]).all() and np.isnan(found[30, 0])
+    # The flow is followed to 1e-8 of the states, a millionth of the noise.
+    np.testing.assert_allclose(found[there[12:], 0], white[12:], atol=1e-5)
 
 
 def test_a_gap_starts_the_filter_anew() -> None:

@@ -46,6 +46,7 @@ _PUBLIC = {
     "diagram": "udd.structure",
     "discover": "udd.discovery",
     "effects": "udd.effects",
+    "energy_books": "udd.energy",
     "ensemble": "udd.ensembles",
     "equilibria": "udd.structure",
     "errors": "udd.errors",
@@ -54,11 +55,13 @@ _PUBLIC = {
     "locus": "udd.structure",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
+    "paper": "udd.paper",
     "periodic_orbit": "udd.structure",
     "plot": "udd.plot",
     "poincare": "udd.sections",
     "prune": "udd.discovery",
     "read_measurement": "udd.measurement",
+    "relatives": "udd.relatives",
     "render": "udd.film",
     "simulate": "udd.trajectory",
     "sweep": "udd.sweeping",
@@ -70,12 +73,15 @@ __all__ = [*_PUBLIC]
 if TYPE_CHECKING:  # the same for type checkers
     from udd import effects as effects
     from udd import errors as errors
+    from udd import paper as paper
     from udd import plot as plot
+    from udd import relatives as relatives
     from udd.branching.diagram import bifurcation as bifurcation
     from udd.branching.grids import basins as basins
     from udd.discovery import Discovery as Discovery
     from udd.discovery.discover import discover as discover
     from udd.discovery.pruning import prune as prune
+    from udd.energy import energy_books as energy_books
     from udd.ensembles import Ensemble as Ensemble
     from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning

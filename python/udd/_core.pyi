@@ -110,6 +110,34 @@ class Dense:
     def span(self) -> tuple[float, float]: ...
     def __call__(self, t: _Floats) -> _Floats: ...
 
+def mark_coverage(
+    mark: _Floats,
+    pose: _Floats,
+    motion: _Floats,
+    psf: float,
+    window: tuple[int, int, int, int],
+    local: _Floats,
+) -> _Floats: ...
+def locate_marks(
+    codes: NDArray[np.uint8],
+    view: NDArray[np.bool_],
+    light: _Floats,
+    look: _Floats,
+    marks: _Floats,
+    poses: _Floats,
+    motion: _Floats,
+    locals: _Floats,
+    keep: bool = False,
+) -> list[
+    tuple[
+        tuple[float, float],
+        tuple[float, float, float, float],
+        tuple[float, float, float, float],
+        tuple[int, int, int, int],
+        tuple[_Floats, _Floats] | None,
+    ]
+    | None
+]: ...
 def formula_bodies(name: str, spec: tuple[str, str, list[str], list[str]]) -> list[str]: ...
 def has_series(model: Model) -> bool: ...
 def effect_library() -> list[_Effect]: ...
@@ -203,6 +231,9 @@ def score_columns(
 def filter(
     model: Model, data: _Data, start: _Start, diffusion: list[float], windows: list[tuple[int, int]]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
+def innovations(
+    model: Model, data: _Data, start: _Start, diffusion: list[float], vague: list[float]
+) -> _Floats: ...
 def predict(
     model: Model, sets: list[_Values], film: list[int], t0: _Floats, states: _Floats, times: _Floats
 ) -> _Floats: ...

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import array, number
 from udd.crew import thread_count
+from udd.discovery.heldout import pace
 from udd.errors import FitError, IntegrationError, ModelError
 from udd.exponents import lyapunov
 from udd.fitting import Fit, Record, data_of, predicted, record_of
@@ -28,14 +29,16 @@ __all__ = ["Forecast", "forecast"]
 
 Array = NDArray[np.float64]
 
-_STEP = 0.01  # s between the times that a forecast is given at
-_KICK = 0.1  # s between the kicks that stand for the model's assumed error
-_AHEAD = {"disk": 10.0, "pendulum": 60.0}  # s
-_WINDOW = {"disk": 1.0, "pendulum": 4.0}  # s
-_LARGE = {"disk": 5e-3, "pendulum": 0.05}  # m, rad: the error at which a forecast is no longer valid
+# Times in s; of a user's own model in units of its `pace`.
+_STEP = 0.01  # between the times that a forecast is given at
+_KICK = 0.1  # between the kicks that stand for the model's assumed error
+_AHEAD = {"disk": 10.0, "pendulum": 60.0, "own": 10.0}
+_WINDOW = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
+#: The error at which a forecast is no longer valid: m, rad, and of each state in units of its spread.
+_LARGE = {"disk": 5e-3, "pendulum": 0.05, "own": 0.2}
 _FEWEST = 6  # frames that determine a state
 _RTOL, _ATOL = 1e-9, 1e-12
-_GROWTH_TIME = 4000.0  # s over which the exponent is averaged; its error is then a percent or two
+_GROWTH_TIME = 4000.0  # over which the exponent is averaged; its error is then a percent or two
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,8 @@ class Forecast:
     level : float
         Share of the members between `low` and `high`.
     error : float
-        What counts as parted, m of the disk's centre or rad of a pendulum.
+        What counts as parted, m of the disk's centre or rad of a pendulum; of a user's own model the root
+        mean square over the columns, in units of the motion's spread.
     valid_time : float
         Time after the start until half of the members have parted from the median by `error`, s; inf where
         that lies beyond the forecast.
@@ -150,23 +154,25 @@ def forecast(
     ----------
     measurement : Measurement
         Its frames in the window before `start` are used; later ones are only compared.
-    model : Disk, Pendulum or Fit
+    model : Disk, Pendulum, a user's own Model, or Fit
         A model is fitted first, to all frames up to `start` (:func:`udd.fit`); a fit is taken as it is.
     t : float or array_like, shape (k,), optional
         How far to look ahead, s after the start; or the times after it that are wanted, increasing. By
-        default 10 s for a disk, 60 s for a pendulum.
+        default 10 s for a disk, 60 s for a pendulum; of a user's own model ten times the time in which its
+        motion changes, four times over.
     start : float, optional
         Time on the measurement's clock from which the model runs free, s: its last frame up to then starts.
         By default the last frame of all.
     window : float, optional
-        Time before the start from which the state is filtered, s; by default 1 s, or 4 s for a pendulum.
+        Time before the start from which the state is filtered, s; by default 1 s, or 4 s for a pendulum; of a
+        user's own model a tenth of the default for `t`.
     members : int
         Size of the ensemble.
     level : float
         Share of the members between `low` and `high`.
     error : float, optional
         The error until which the forecast counts as valid: by default 5 mm of the disk's centre, 0.05 rad of
-        a pendulum.
+        a pendulum, 0.2 of the spread of a user's own motion.
     film : int, optional
         For a fit of several measurements: which of them has the camera and the drive of this one. By default
         the one that it is.
@@ -207,13 +213,17 @@ def forecast(
     >>> ahead.lyapunov_time  # errors of a damped pendulum do not grow
     inf
     """
-    times, asked = _times(measurement, t), _options(members, level)
+    if not isinstance(measurement, Measurement):
+        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+    asked = _options(members, level)
+    if t is not None:
+        _times(t, _STEP)
     known = measurement
     if start is not None:
         known = measurement.rows(measurement.t <= number("start", start))
-    record = record_of(known)
     kind = measurement.kind
-    length = number("window", _WINDOW[kind] if window is None else window, above=0.0)
+    if window is not None:
+        number("window", window, above=0.0)
     large = number("error", _LARGE[kind] if error is None else error, above=0.0)
     if isinstance(model, Fit):
         fitted = model
@@ -221,6 +231,10 @@ def forecast(
             raise FitError(f"the fit is that of a {fitted.measurement.kind}, the measurement of a {kind}")
     else:
         fitted = fit(known, model)
+    unit = pace(fitted)
+    times = _times(_AHEAD[kind] * unit if t is None else t, _STEP * unit)
+    length = float(_WINDOW[kind] * unit if window is None else window)
+    record = record_of(known, fitted.model if kind == "own" else None)
     film = _film(fitted, measurement, film)
     part, origin = _window(fitted, film, record, length)
     rng = np.random.default_rng(seed)
@@ -229,13 +243,14 @@ def forecast(
     models, cameras, states = _starts(fitted, film, part, asked, scale, rng)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film][2]
-    pace = 1.0 + clock_error
     t_model = part.t[-1] + times
-    runs = _runs(models, states, pace * t_model, kicks, rng)
-    seen = _observed(models, cameras, clock_error, t_model, runs)
+    runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, rng)
+    shown = [fitted.channels.index(name) for name in measurement.names]
+    seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
+    spread = np.nanstd(known.values, axis=0)
 
     low, median, high = _quantiles(seen, asked[1])
-    valid = [_parted(times, member - median, kind, large) for member in seen]
+    valid = [_parted(times, _size(member - median, kind, spread), large) for member in seen]
     tail = (1.0 - asked[1]) / 2.0
     # A member that never parts counts as later than all that do.
     shortest, valid_time, longest = np.quantile(valid, [tail, 0.5, 1.0 - tail], method="higher")
@@ -252,21 +267,19 @@ def forecast(
         valid_time=float(valid_time),
         valid_low=float(shortest),
         valid_high=float(longest),
-        lyapunov_time=_growth(fitted.models[film], states),
-        measured_valid_time=_compared(measurement, clock, median, large),
+        lyapunov_time=_growth(fitted.models[film], states, _GROWTH_TIME * unit),
+        measured_valid_time=_compared(measurement, clock, median, spread, large),
         fit=fitted,
         measurement=measurement,
     )
 
 
-def _times(measurement: Measurement, t: ArrayLike | None) -> Array:
+def _times(t: ArrayLike, step: float) -> Array:
     """Times after the start, s, of which the first is 0."""
-    if not isinstance(measurement, Measurement):
-        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
-    wanted = array("t", _AHEAD[measurement.kind] if t is None else t)
+    wanted = array("t", t)
     if wanted.ndim == 0:
         end = number("t", float(wanted), above=0.0)
-        return np.linspace(0.0, end, max(round(end / _STEP), 1) + 1)
+        return np.linspace(0.0, end, max(round(end / step), 1) + 1)
     if wanted.ndim != 1 or not wanted.size or wanted[0] < 0 or not (np.diff(wanted) > 0).all():
         raise ModelError("t must be a time ahead in s, or a list of such times that increases from 0 on")
     return wanted if wanted[0] == 0 else np.concatenate([[0.0], wanted])
@@ -300,7 +313,7 @@ def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Reco
     breaks = np.flatnonzero(~record.linked)
     run = int(breaks[-1]) + 1 if breaks.size else 0
     part = record.part(slice(max(run, int(np.searchsorted(t, t[last] - length - 1e-9))), last + 1))
-    count = int(part.observed.all(axis=1).sum())
+    count = int(part.observed.any(axis=1).sum())
     if count < _FEWEST:
         raise FitError(
             f"the {length:g} s before the start hold {count} frames in a row; "
@@ -315,7 +328,7 @@ def _starts(
     fitted: Fit, film: int, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
-    data = data_of(part, replace(fitted.noise, weight=np.ones(len(part.t))), part.states[:, 0])
+    data = data_of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
     (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], list(fitted.problem.diffusion)
     own = fitted.models[film]
     order = list(own.parameters)
@@ -368,7 +381,9 @@ def _normal(covariance: Array, rng: np.random.Generator) -> Array:
     return result
 
 
-def _runs(models: list[Model], states: Array, t: Array, kicks: Array, rng: np.random.Generator) -> Array:
+def _runs(
+    models: list[Model], states: Array, t: Array, kicks: Array, every: float, rng: np.random.Generator
+) -> Array:
     """The members' states at the model's times `t`, (n, k, d); NaN once a disk has left the wheels."""
     n, d = states.shape
     rows = np.array([list(model.parameters.values()) for model in models])
@@ -377,7 +392,7 @@ def _runs(models: list[Model], states: Array, t: Array, kicks: Array, rng: np.ra
     result[:, 0] = states
     alive = _between_wheels(models[0], states)
     kicked = np.any(kicks > 0)
-    pieces = max(round((t[-1] - t[0]) / _KICK), 1) if kicked else 1
+    pieces = max(round((t[-1] - t[0]) / every), 1) if kicked else 1
     edges = np.linspace(t[0], t[-1], pieces + 1)
     current = states.copy()
     for a, b in pairwise(edges.tolist()):
@@ -431,9 +446,19 @@ def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
     return result[0], result[1], result[2]
 
 
-def _parted(t: Array, difference: Array, kind: str, error: float) -> float:
+def _size(difference: Array, kind: str, spread: Array) -> Array:
+    """How far two motions are apart: the disk's centre, m; a pendulum's angle; else in units of the spread."""
+    if kind == "disk":
+        result: Array = np.hypot(difference[:, 0], difference[:, 1])
+        return result
+    if kind == "own":
+        difference = np.sqrt(np.mean((difference / spread) ** 2, axis=1, keepdims=True))
+    result = np.abs(difference[:, 0])
+    return result
+
+
+def _parted(t: Array, size: Array, error: float) -> float:
     """When a difference first exceeds the error, or the disk is gone; inf if never."""
-    size = np.hypot(difference[:, 0], difference[:, 1]) if kind == "disk" else np.abs(difference[:, 0])
     beyond = np.flatnonzero(~(size <= error))
     if not beyond.size:
         return math.inf
@@ -444,7 +469,7 @@ def _parted(t: Array, difference: Array, kind: str, error: float) -> float:
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
 
-def _compared(measurement: Measurement, clock: Array, median: Array, error: float) -> float:
+def _compared(measurement: Measurement, clock: Array, median: Array, spread: Array, error: float) -> float:
     """When what was measured after the start first parts from the median, s after it; NaN if it does not."""
     after = measurement.slice(float(np.nextafter(clock[0], np.inf)), float(clock[-1]))
     t = after.t
@@ -453,18 +478,18 @@ def _compared(measurement: Measurement, clock: Array, median: Array, error: floa
     if measurement.kind == "pendulum":
         difference = (difference + np.pi) % (2 * np.pi) - np.pi
     there = np.isfinite(difference).all(axis=1)
-    when = _parted(t[there] - clock[0], difference[there], measurement.kind, error)
+    when = _parted(t[there] - clock[0], _size(difference[there], measurement.kind, spread), error)
     return when if np.isfinite(when) else math.nan
 
 
-def _growth(model: Model, states: Array) -> float:
+def _growth(model: Model, states: Array, long: float) -> float:
     """The Lyapunov time of the fitted model, s; of its equations, wherever their attractor goes."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a percent is enough for a unit of time
         try:
             if isinstance(model, Disk):
                 model = model.replace(edge="ignore")
-            value, spread = lyapunov(model, with_error=True, t=_GROWTH_TIME, state0=np.median(states, axis=0))
+            value, spread = lyapunov(model, with_error=True, t=long, state0=np.median(states, axis=0))
         except (IntegrationError, ModelError):
             return math.nan
     return 1.0 / value if value > 2 * spread else math.inf

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::rows::{Rows, add};
-use super::{EstimateError, Linear, Record};
+use super::rows::{Rows, add, dot};
+use super::{Columns, EstimateError, Linear, Record};
 use crate::scalar::{Instructions, Isa, Work};
 
 /// The normal equations of the least squares. The right-hand side is the last column of the borders, and of
@@ -22,14 +22,15 @@ pub struct Bordered<const D: usize> {
 }
 
 impl<const D: usize> Bordered<D> {
-    /// The Gauss-Newton equations of a linearised record, without priors. `precision[i]` is the inverse
-    /// variance of the model's error over link `i`, per state.
+    /// The Gauss-Newton equations of a linearised record for the parameters of some columns, without priors.
+    /// `precision[i]` is the inverse variance of the model's error over link `i`, per state.
     pub fn new<const M: usize>(
         linear: &Linear<D, M>,
+        columns: &Columns,
         record: &Record<M>,
         precision: &[SVector<f64, D>],
     ) -> Self {
-        Isa::best().run(Assembly { linear, record, precision })
+        Isa::best().run(Assembly { linear, columns, record, precision })
     }
 
     /// The number of parameters.
@@ -61,6 +62,7 @@ impl<const D: usize> Bordered<D> {
 
 struct Assembly<'a, const D: usize, const M: usize> {
     linear: &'a Linear<D, M>,
+    columns: &'a Columns,
     record: &'a Record<M>,
     precision: &'a [SVector<f64, D>],
 }
@@ -70,8 +72,8 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Bordered<D> {
-        let Self { linear, record, precision } = self;
-        let (n, p) = (record.t.len(), linear.columns.seen.width());
+        let Self { linear, columns, record, precision } = self;
+        let (n, p) = (record.t.len(), columns.seen.width());
         let mut system = Bordered {
             diagonal: vec![SMatrix::zeros(); n],
             below: vec![SMatrix::zeros(); n - 1],
@@ -83,21 +85,18 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
         let mut row = vec![0.0; p + 1];
         for i in 0..n {
             std::mem::swap(&mut now, &mut before);
-            now.fill(linear, record, i);
+            now.fill(linear, columns, record, i);
             for m in (0..M).filter(|&m| now.there[m]) {
-                let memory = record.memory[m];
-                let remembers = memory != 0.0 && i > 0 && record.linked[i - 1] && before.there[m];
-                let (scale, back) = match remembers {
-                    true => ((1.0 - memory * memory).sqrt().recip(), -memory),
-                    false => (1.0, 0.0),
-                };
+                let memory = record.remembered(i, m, before.there[m]);
+                let scale = (1.0 - memory * memory).sqrt().recip();
                 for (to, &value) in row.iter_mut().zip(now.columns.row(m)) {
                     *to = scale * value;
                 }
                 let h = now.h[m] * scale;
-                if remembers {
-                    add(&mut row, scale * back, before.columns.row(m));
-                    let h_back = before.h[m] * (scale * back);
+                if memory != 0.0 {
+                    let back = -memory * scale;
+                    add(&mut row, back, before.columns.row(m));
+                    let h_back = before.h[m] * back;
                     system.diagonal[i - 1] += h_back * h_back.transpose();
                     system.below[i - 1] += h * h_back.transpose();
                     for k in 0..D {
@@ -116,7 +115,7 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
             for k in 0..D {
                 // w (x_{i+1} - a x_i - b theta) = -w defect
                 let w = precision[i][k].sqrt();
-                for (to, &value) in row.iter_mut().zip(linear.columns.state.row(D * i + k)) {
+                for (to, &value) in row.iter_mut().zip(columns.state.row(D * i + k)) {
                     *to = -w * value;
                 }
                 row[p] = -w * link.defect[k];
@@ -149,7 +148,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
     }
 
     #[inline(always)]
-    fn fill(&mut self, linear: &Linear<D, M>, record: &Record<M>, i: usize) {
+    fn fill(&mut self, linear: &Linear<D, M>, columns: &Columns, record: &Record<M>, i: usize) {
         let root = root(&record.information[i]);
         let (sight, p) = (&linear.sights[i], self.columns.width() - 1);
         for m in 0..M {
@@ -160,7 +159,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
             for c in m..M {
                 let weight = root[(m, c)];
                 h += sight.h.row(c).transpose() * weight;
-                add(row, weight, linear.columns.seen.row(M * i + c));
+                add(row, weight, columns.seen.row(M * i + c));
                 row[p] += weight * sight.misfit[c];
             }
             self.h[m] = h;
@@ -284,7 +283,7 @@ impl<const D: usize> Eliminated<D> {
         for i in (0..n).rev() {
             let mut x = SVector::from_fn(|k, _| {
                 let row = self.solved.row(D * i + k);
-                row[p] - row[..p].iter().zip(parameters.iter()).map(|(a, b)| a * b).sum::<f64>()
+                row[p] - dot(&row[..p], parameters.as_slice())
             });
             if i + 1 < n {
                 x -= self.links[i].transpose() * change[i + 1];
@@ -294,46 +293,40 @@ impl<const D: usize> Eliminated<D> {
         change
     }
 
-    /// The covariance of each frame's state, the parameters' uncertainty (covariance `parameters`)
-    /// included.
-    pub fn state_covariance(&self, parameters: &DMatrix<f64>) -> Vec<SMatrix<f64, D, D>> {
-        let uncertain = self.uncertain(&lower_root(parameters));
-        let whole = |i: usize, own: &SMatrix<f64, D, D>| {
-            let rows =
-                |r: usize, c: usize| dot(uncertain.shifts.row(D * i + r), uncertain.shifts.row(D * i + c));
-            own + SMatrix::from_fn(rows)
-        };
-        uncertain.conditional.iter().enumerate().map(|(i, own)| whole(i, own)).collect()
-    }
-
-    /// How uncertain the states are, given a root of the parameters' covariance.
-    pub(super) fn uncertain(&self, root: &DMatrix<f64>) -> Uncertain<D> {
-        Isa::best().run(StateCovariance { of: self, root })
+    /// How uncertain the states are, given the parameters' covariance.
+    pub fn uncertain(&self, parameters: &DMatrix<f64>) -> Uncertain<D> {
+        Isa::best().run(StateCovariance { of: self, root: lower_root(parameters) })
     }
 }
 
 /// The states' uncertainty, frame by frame.
-pub(super) struct Uncertain<const D: usize> {
+#[derive(Clone, Debug)]
+pub struct Uncertain<const D: usize> {
+    /// A root of the parameters' covariance: its columns are independent changes.
+    pub root: DMatrix<f64>,
     /// Their covariance were the parameters known.
     pub conditional: Vec<SMatrix<f64, D, D>>,
-    /// `D` rows for each frame: by how much they move with each of independent changes of the parameters.
+    /// `D` rows for each frame: by how much they move with each of those changes.
     pub shifts: Rows,
 }
 
-/// A root of a covariance: its columns are independent changes.
-pub(super) fn lower_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+impl<const D: usize> Uncertain<D> {
+    /// The covariance of each frame's state, the parameters' uncertainty included.
+    pub fn covariance(&self) -> Vec<SMatrix<f64, D, D>> {
+        let moved =
+            |i: usize| SMatrix::from_fn(|r, c| dot(self.shifts.row(D * i + r), self.shifts.row(D * i + c)));
+        self.conditional.iter().enumerate().map(|(i, own)| own + moved(i)).collect()
+    }
+}
+
+fn lower_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let n = covariance.nrows();
     nalgebra::Cholesky::new(covariance.clone()).map_or_else(|| DMatrix::zeros(n, n), |lower| lower.l())
 }
 
-/// The product of two rows.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 struct StateCovariance<'a, const D: usize> {
     of: &'a Eliminated<D>,
-    root: &'a DMatrix<f64>,
+    root: DMatrix<f64>,
 }
 
 impl<const D: usize> Work for StateCovariance<'_, D> {
@@ -343,7 +336,7 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
     fn run<V: Instructions>(self) -> Self::Output {
         let Eliminated { pivots, links, solved, .. } = self.of;
         let (n, p) = (pivots.len(), self.root.nrows());
-        let mut found = Uncertain { conditional: vec![SMatrix::zeros(); n], shifts: Rows::zeros(n * D, p) };
+        let (mut states, mut shifts) = (vec![SMatrix::zeros(); n], Rows::zeros(n * D, p));
         let mut conditional: SMatrix<f64, D, D> = SMatrix::zeros();
         let (mut response, mut own) = (Rows::zeros(D, p), Rows::zeros(D, p));
         for i in (0..n).rev() {
@@ -366,7 +359,7 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
                 }
             }
             for k in 0..D {
-                let shift = found.shifts.row_mut(D * i + k);
+                let shift = shifts.row_mut(D * i + k);
                 for (j, &value) in response.row(k).iter().enumerate() {
                     for (c, to) in shift.iter_mut().enumerate().take(j + 1) {
                         // More of a parameter takes from the state what it explains.
@@ -374,8 +367,8 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
                     }
                 }
             }
-            found.conditional[i] = conditional;
+            states[i] = conditional;
         }
-        found
+        Uncertain { root: self.root, conditional: states, shifts }
     }
 }

@@ -66,6 +66,7 @@ where
         let actors: Vec<Vec<Actor<F::Built<Wide>>>> =
             values.iter().enumerate().map(|(film, values)| actors(family, film, values, free)).collect();
         let systems: Vec<F::Built<f64>> = values.iter().map(|values| family.build(values)).collect();
+        let cameras: Vec<_> = (0..values.len()).map(|film| acting(free, film, camera)).collect();
 
         let seen: Vec<&mut [f64]> = columns.seen.blocks_mut(M).collect();
         seen.into_par_iter().enumerate().for_each(|(i, rows)| {
@@ -77,7 +78,7 @@ where
             };
             let x = &point.states[i];
             let rate = systems[film].rates(t, x, &sides_of(&systems[film], t, x));
-            self.camera_columns(set, x, &rate, free, film, rows);
+            self.camera_columns(set, x, &rate, &cameras[film], rows);
             // The parameters of the model are seen through the rate, by a camera that looks at it.
             let by_rate = self.seen_by_rate(&set.camera, x, &rate);
             if by_rate.iter().flatten().all(|&v| v == 0.0) {
@@ -152,19 +153,10 @@ where
         set: &super::Set,
         x: &[f64; D],
         rate: &[f64; D],
-        free: &[Free],
-        film: usize,
+        own: &[(usize, usize)],
         rows: &mut [f64],
     ) {
-        let own: Vec<(usize, usize)> = free
-            .iter()
-            .enumerate()
-            .filter(|(_, free)| free.acts_on(film))
-            .filter_map(|(column, free)| match free.role {
-                Role::Camera(number) => Some((column, number)),
-                _ => None,
-            })
-            .collect();
+        let width = rows.len() / M;
         let (x, rate) = (x.map(Wide::constant), rate.map(Wide::constant));
         for chunk in own.chunks(WIDTH) {
             let mut camera: Vec<Wide> = set.camera.iter().map(|&v| Wide::constant(v)).collect();
@@ -174,7 +166,7 @@ where
             let seen = self.sensor.observe(&camera, &x, &rate);
             for (k, &(column, _)) in chunk.iter().enumerate() {
                 for m in 0..M {
-                    rows[m * free.len() + column] = seen[m].d[k];
+                    rows[m * width + column] = seen[m].d[k];
                 }
             }
         }
@@ -193,6 +185,20 @@ where
     }
 }
 
+fn model(role: Role) -> Option<usize> {
+    if let Role::Model(number) = role { Some(number) } else { None }
+}
+
+fn camera(role: Role) -> Option<usize> {
+    if let Role::Camera(number) = role { Some(number) } else { None }
+}
+
+/// The columns of those free parameters of one film that play a part, with their numbers in it.
+fn acting(free: &[Free], film: usize, part: fn(Role) -> Option<usize>) -> Vec<(usize, usize)> {
+    let own = free.iter().enumerate().filter(|(_, free)| free.acts_on(film));
+    own.filter_map(|(column, free)| Some((column, part(free.role)?))).collect()
+}
+
 /// The systems of one film that differentiate by all of the model's parameters that are free.
 fn actors<F: Family<D>, const D: usize>(
     family: &F,
@@ -200,16 +206,8 @@ fn actors<F: Family<D>, const D: usize>(
     values: &[f64],
     free: &[Free],
 ) -> Vec<Actor<F::Built<Wide>>> {
-    let own: Vec<(usize, usize)> = free
-        .iter()
-        .enumerate()
-        .filter(|(_, free)| free.acts_on(film))
-        .filter_map(|(column, free)| match free.role {
-            Role::Model(number) => Some((column, number)),
-            _ => None,
-        })
-        .collect();
-    own.chunks(WIDTH)
+    acting(free, film, model)
+        .chunks(WIDTH)
         .map(|chunk| {
             let mut wide: Vec<Wide> = values.iter().map(|&v| Wide::constant(v)).collect();
             for (k, &(_, number)) in chunk.iter().enumerate() {

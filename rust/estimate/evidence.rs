@@ -27,12 +27,8 @@ where
                 if !there[m] {
                     continue;
                 }
-                let memory = record.memory[m];
-                let remembers = memory != 0.0 && i > 0 && record.linked[i - 1] && before.0[m];
-                cost += match remembers {
-                    true => (own[m] - memory * before.1[m]).powi(2) / (1.0 - memory * memory),
-                    false => own[m] * own[m],
-                };
+                let memory = record.remembered(i, m, before.0[m]);
+                cost += (own[m] - memory * before.1[m]).powi(2) / (1.0 - memory * memory);
             }
             before = (there, own);
         }
@@ -53,9 +49,7 @@ where
             for m in (0..M).filter(|&m| root[(m, m)] != 0.0) {
                 there[m] = true;
                 given += 2.0 * root[(m, m)].ln();
-                if i > 0 && record.linked[i - 1] && before[m] {
-                    given -= (1.0 - record.memory[m].powi(2)).ln();
-                }
+                given -= (1.0 - record.remembered(i, m, before[m]).powi(2)).ln();
             }
             before = there;
         }

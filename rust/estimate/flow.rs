@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::{EstimateError, Estimator, Point, Sensor};
-use crate::integrate::{Driver, Failure, Tolerance, propagate};
+use crate::integrate::{Driver, Failure, MOST_STEPS, Tolerance, propagate};
 use crate::model::{Family, System, sides_of};
 use crate::scalar::{Dual, Scalar};
 
@@ -15,9 +15,6 @@ const PLACES: [(f64, f64); PLACES_PER_LINK] =
     [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 /// How many of them there are.
 pub const PLACES_PER_LINK: usize = 3;
-
-/// More steps than this from one frame to the next mean that something is wrong.
-const MOST_STEPS: u64 = 1_000_000;
 
 /// A state with its derivatives by the state at the frame before.
 type Tangent<const D: usize> = [Dual<f64, D>; D];

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::bordered::{Uncertain, lower_root};
+use super::bordered::Uncertain;
 use super::linearise::invert;
 use super::{Bordered, Eliminated, EstimateError, Estimator, Free, Linear, Point, Sensor};
 use crate::model::Family;
@@ -108,7 +108,7 @@ where
     }
 
     fn equations(&self, point: &Point<D>, linear: &Linear<D, M>) -> Bordered<D> {
-        let mut system = Bordered::new(linear, &self.record, &self.precision());
+        let mut system = Bordered::new(linear, &linear.columns, &self.record, &self.precision());
         self.add_priors(point, &mut system);
         system
     }
@@ -209,11 +209,9 @@ where
         let linear = self.linearise(&point)?;
         let reduced = self.equations(&point, &linear).eliminate(&self.record.t)?;
         let covariance = invert(&reduced.schur).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
-        let root = lower_root(&covariance);
-        let uncertain = reduced.uncertain(&root);
-        let state_covariance = reduced.state_covariance(&covariance);
+        let uncertain = reduced.uncertain(&covariance);
         let misfit: Vec<_> = linear.sights.iter().map(|sight| sight.misfit).collect();
-        let seen_variance = (0..misfit.len()).map(|i| seen_variance(i, &linear, &uncertain, &root)).collect();
+        let seen_variance = (0..misfit.len()).map(|i| seen_variance(i, &linear, &uncertain)).collect();
         let defect: Vec<_> = linear.flow.iter().map(|link| link.defect).collect();
         let cost = self.cost(&point, &misfit, &defect);
         let evidence = self.evidence(&cost, reduced.log_determinant, &reduced.schur);
@@ -223,7 +221,7 @@ where
             converged,
             iterations,
             covariance,
-            state_covariance,
+            state_covariance: uncertain.covariance(),
             evidence,
             misfit,
             seen_variance,
@@ -237,9 +235,8 @@ fn seen_variance<const D: usize, const M: usize>(
     i: usize,
     linear: &Linear<D, M>,
     uncertain: &Uncertain<D>,
-    root: &DMatrix<f64>,
 ) -> SVector<f64, M> {
-    let h = &linear.sights[i].h;
+    let (h, root) = (&linear.sights[i].h, &uncertain.root);
     SVector::from_fn(|m, _| {
         let camera = linear.columns.seen.row(M * i + m);
         let moved = (0..root.ncols()).map(|c| {

@@ -17,6 +17,7 @@ mod evidence;
 mod flow;
 mod forecast;
 mod gauss_newton;
+mod innovations;
 mod linearise;
 mod record;
 mod rows;
@@ -24,7 +25,7 @@ mod score;
 mod sensor;
 mod waves;
 
-pub use bordered::{Bordered, Eliminated};
+pub use bordered::{Bordered, Eliminated, Uncertain};
 pub use columns::Columns;
 pub use flow::{Link, PLACES_PER_LINK, Place};
 pub use forecast::Filtered;

@@ -34,6 +34,13 @@ impl<const M: usize> Default for Record<M> {
 }
 
 impl<const M: usize> Record<M> {
+    /// How much of channel `m`'s noise in frame `i` is still that of the frame before, given whether that one
+    /// was seen: noise begins anew after a gap.
+    #[inline(always)]
+    pub(super) fn remembered(&self, i: usize, m: usize, seen_before: bool) -> f64 {
+        if i > 0 && self.linked[i - 1] && seen_before { self.memory[m] } else { 0.0 }
+    }
+
     /// The frames from `first` to `last`, both included.
     pub(super) fn part(&self, first: usize, last: usize) -> Self {
         Self {

@@ -80,6 +80,11 @@ impl Rows {
     }
 }
 
+/// The product of two rows.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Adds a multiple of a row to another.
 #[inline(always)]
 pub(super) fn add(to: &mut [f64], factor: f64, row: &[f64]) {

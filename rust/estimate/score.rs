@@ -48,7 +48,7 @@ where
             .collect();
         let size = more.iter().map(|columns| columns.seen.width()).sum();
         let columns = more.iter().fold(linear.columns.clone(), |all, more| all.beside(more));
-        let scores = self.score_beside(point, &Linear { columns, ..linear }, &[size])?;
+        let scores = self.score_beside(point, &linear, &columns, &[size])?;
         Ok(scores.into_iter().next().expect("one group"))
     }
 
@@ -93,21 +93,22 @@ where
                 let own = first..&(first + sizes.iter().sum::<usize>());
                 let part = |rows: &Rows| rows.part(*own.start..*own.end);
                 let more = Columns { seen: part(&columns.seen), state: part(&columns.state) };
-                self.score_beside(point, &linear.with(&more), sizes)
+                self.score_beside(point, &linear, &linear.columns.beside(&more), sizes)
             })
             .collect::<Result<_, EstimateError>>()?;
         Ok(scores.concat())
     }
 
-    /// The scores of the columns that follow those of the free parameters, in groups.
+    /// The scores of the columns that follow those of the free parameters in `columns`, in groups.
     pub(super) fn score_beside(
         &self,
         point: &Point<D>,
         linear: &Linear<D, M>,
+        columns: &Columns,
         groups: &[usize],
     ) -> Result<Vec<Score>, EstimateError> {
         let own = self.free.len();
-        let mut system = Bordered::new(linear, &self.record, &self.precision());
+        let mut system = Bordered::new(linear, columns, &self.record, &self.precision());
         self.add_priors(point, &mut system);
         let reduced = system.eliminate(&self.record.t)?;
         let matrix = reduced.schur.view((0, 0), (own, own)).into_owned();
@@ -126,13 +127,5 @@ where
             }
         };
         Ok(groups.iter().map(one).collect())
-    }
-}
-
-impl<const D: usize, const M: usize> Linear<D, M> {
-    /// This linearisation with more columns.
-    pub(super) fn with(&self, more: &Columns) -> Self {
-        let columns = self.columns.beside(more);
-        Self { columns, sights: self.sights.clone(), flow: self.flow.clone() }
     }
 }

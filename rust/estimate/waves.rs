@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::columns::{Columns, TimeOrigin};
-use super::rows::{Rows, add};
+use super::rows::{Rows, add, dot};
 use super::score::Candidate;
 use super::{EstimateError, Estimator, Point, Score, Sensor};
 use crate::model::Family;
@@ -50,7 +50,7 @@ where
             .zip(shares.par_chunks(BATCH))
             .map(|(frequencies, shares)| {
                 let waves = self.waves(point, &responses, frequencies, shares);
-                self.score_beside(point, &linear.with(&waves), &vec![2; frequencies.len()])
+                self.score_beside(point, &linear, &linear.columns.beside(&waves), &vec![2; frequencies.len()])
             })
             .collect::<Result<_, EstimateError>>()?;
         Ok(batches.concat())
@@ -81,9 +81,8 @@ where
                 add(in_sin, cos, s.as_slice());
                 let combine = |from: &Rows, to: &mut Rows, rows: std::ops::Range<usize>| {
                     for r in rows {
-                        let dot = |weights: &[f64]| from.row(r).iter().zip(weights).map(|(a, b)| a * b).sum();
-                        to.row_mut(r)[2 * k] = dot(in_cos);
-                        to.row_mut(r)[2 * k + 1] = dot(in_sin);
+                        to.row_mut(r)[2 * k] = dot(from.row(r), in_cos);
+                        to.row_mut(r)[2 * k + 1] = dot(from.row(r), in_sin);
                     }
                 };
                 combine(&responses.seen, &mut waves.seen, M * i..M * (i + 1));

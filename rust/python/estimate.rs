@@ -457,6 +457,33 @@ fn filter<'py>(
     each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &diffusion, &windows))
 }
 
+/// Innovations (n, m) in units of their standard deviations, all parameters held; NaN where nothing was seen or too
+/// little was known. `vague` is what is known of a state where a run starts.
+#[pyfunction]
+fn innovations<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    data: Data<'py>,
+    start: Start<'py>,
+    diffusion: Vec<f64>,
+    vague: Vec<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
+        model: (F, Vec<f64>, C),
+        py: Python<'py>,
+        (data, start): (&Data<'py>, &Start<'py>),
+        diffusion: &[f64],
+        vague: &[f64],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (estimator, point) = problem(model, data, start, &[], diffusion)?;
+        let vague =
+            vague.try_into().map_err(|_| PyValueError::new_err(format!("vague must have {D} numbers")))?;
+        let found = interrupt::run(py, |_| estimator.innovations(&point, vague))?;
+        array(py, [found.len(), M], found.into_iter().flatten())
+    }
+    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &diffusion, &vague))
+}
+
 /// What would be seen at `times[k]`, increasing, after start `k` of film `film[k]` at `t0[k]`, by the model alone.
 #[pyfunction]
 fn predict<'py>(
@@ -517,6 +544,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(responses, module)?)?;
     module.add_function(wrap_pyfunction!(score_columns, module)?)?;
     module.add_function(wrap_pyfunction!(filter, module)?)?;
+    module.add_function(wrap_pyfunction!(innovations, module)?)?;
     module.add_function(wrap_pyfunction!(predict, module)?)?;
     module.add_function(wrap_pyfunction!(camera_parameters, module)?)
 }

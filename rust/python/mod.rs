@@ -8,6 +8,7 @@ mod interrupt;
 mod jobs;
 mod lyapunov;
 mod model;
+mod picture;
 mod section;
 mod shooting;
 mod simulate;
@@ -25,6 +26,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     ensemble::register(module)?;
     shooting::register(module)?;
     estimate::register(module)?;
+    picture::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;
     Ok(())

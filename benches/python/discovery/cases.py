@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from camera import ALONE, FPS, Camera, drawn, film
+from filmed import filmed
 from information import information
 from laws import FOREIGN, LIBRARY, Kind, Law
 from motion import Device, Run, World, staying
@@ -50,7 +51,7 @@ class Record:
     measurement: udd.Measurement
 
 
-BATCHES = ("three", "library", "foreign", "pairs", "nulls")
+BATCHES = ("three", "library", "foreign", "pairs", "nulls", "films")
 
 
 def cases(batch: str, records: int) -> Iterator[Case]:
@@ -69,6 +70,8 @@ def cases(batch: str, records: int) -> Iterator[Case]:
                 yield Case(batch, tuple(rng.choice(names, 2, replace=False).tolist()), number, (3.0, 10.0))
         elif batch == "nulls":
             yield from (Case(batch, (), number, defect=defect) for defect in ("all", *ALONE))
+        elif batch == "films":
+            yield Case(batch, (), number, defect="film")
 
 
 def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
@@ -89,6 +92,8 @@ def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
         if made is None:
             continue
         world, motion, multiples = made
+        if case.batch == "films":
+            return Record(world, motion, camera, multiples, known, filmed(motion, duration, rng))
         stated, seen = film(camera, motion, duration, rng)
         sigma = np.tile([camera.noise, camera.noise, camera.angle_noise], (len(stated), 1))
         return Record(world, motion, camera, multiples, known, udd.Measurement(stated, seen, sigma=sigma))
@@ -96,7 +101,7 @@ def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
 
 
 def _camera(case: Case, rng: np.random.Generator, precise: bool) -> Camera:
-    if case.defect == "all":
+    if case.defect in ("all", "film"):
         return drawn(rng, precise, hard=not case.names)
     plain = Camera(noise=5e-5, angle_noise=1e-3) if precise else Camera()
     return replace(plain, **ALONE[case.defect])

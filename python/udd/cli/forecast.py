@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import argparse
 import math
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from udd.errors import UddError
 
 from .answer import Answer, telling
 from .fit import options
 from .inputs import add_input, check_early, measurement_of, model_of
 from .options import new
+from .saving import add_out, checked, save_figure
 
 if TYPE_CHECKING:
     from udd.forecasting import Forecast
 
-_ENDINGS = (".csv", ".png", ".svg", ".pdf")
+_DATA = (".csv",)
 
 
 def add(commands: Any) -> None:
@@ -43,14 +41,7 @@ def add(commands: Any) -> None:
         "--error", type=float, help="until which it is valid [m, or rad] (default 0.005; a pendulum 0.05)"
     )
     parser.add_argument("--seed", type=int, default=0, help="another seed, another ensemble (default 0)")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help=f"file to write, by its ending: {', '.join(_ENDINGS)}; repeatable",
-    )
+    add_out(parser, _DATA)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -59,11 +50,7 @@ def run(args: argparse.Namespace) -> Answer:
     from udd.forecasting import forecast
 
     check_early(args)
-    for path in args.out:
-        if path.suffix not in _ENDINGS:
-            raise UddError(f"{path}: the name must end in {', '.join(_ENDINGS)}")
-        if not path.parent.is_dir():
-            raise UddError(f"{path}: there is no folder {path.parent}")
+    checked(args.out, _DATA)
     measurement, _film = measurement_of(args)
     model = model_of(args, measurement)
     known = measurement if args.start is None else measurement.rows(measurement.t <= args.start)
@@ -90,7 +77,9 @@ def run(args: argparse.Namespace) -> Answer:
 
 def describe(found: Forecast) -> str:
     """A forecast in a few lines."""
-    factor, unit = (1e3, "mm") if "Z" in found.names else (1e3, "mrad")
+    factor, unit = {
+        "disk": (1e3, "mm"), "pendulum": (1e3, "mrad"), "own": (1e2, "% of the spread"),
+    }[found.measurement.kind]  # fmt: skip
     within = f"{factor * found.error:.3g} {unit}"
     reach = found.t[-1] - found.start
     lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]
@@ -130,9 +119,7 @@ def _write(path: Path, found: Forecast) -> None:
             ax.get_legend().remove()
         if ax is not axes[-1]:
             ax.set_xlabel("")
-    picture = BytesIO()
-    figure.savefig(picture, format=path.suffix[1:], dpi=150)
-    write_whole(path, picture.getvalue())
+    save_figure(path, figure)
 
 
 def _csv(found: Forecast) -> str:

@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from . import (
+    app,
     basins,
     bifurcation,
     continuation,
@@ -17,6 +18,7 @@ from . import (
     fit,
     forecast,
     lyapunov,
+    paper,
     poincare,
     simulate,
     sweep,
@@ -37,6 +39,8 @@ _COMMANDS = (
     fit,
     forecast,
     discover,
+    paper,
+    app,
 )
 
 

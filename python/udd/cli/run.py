@@ -18,6 +18,9 @@ _EXTRAS = {
     "av": ("track", "films need"),
     "cv2": ("track", "films need"),
     "distributed": ("scale", "sweeps need"),
+    "starlette": ("app", "the page needs"),
+    "uvicorn": ("app", "the page needs"),
+    "websockets": ("app", "the page needs"),
     "xarray": ("scale", "sweeps need"),
     "zarr": ("scale", "sweeps need"),
 }

@@ -16,14 +16,16 @@ from udd.errors import UddError
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-_DATA = (".nc", ".zarr")
+#: Endings of a labelled result's own files, and of pictures.
+DATA = (".nc", ".zarr")
 PICTURES = (".png", ".svg", ".pdf")
 
 
-def add_out(parser: argparse.ArgumentParser) -> None:
+def add_out(parser: argparse.ArgumentParser, data: tuple[str, ...] = DATA) -> None:
     """Where to write."""
-    kinds = ", ".join((*_DATA, *PICTURES))
+    kinds = ", ".join((*data, *PICTURES))
     parser.add_argument(
         "--out",
         type=Path,
@@ -34,11 +36,11 @@ def add_out(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def checked(paths: list[Path]) -> None:
+def checked(paths: list[Path], data: tuple[str, ...] = DATA) -> None:
     """Refuse what cannot be written, before the work."""
     for path in paths:
-        if path.suffix not in (*_DATA, *PICTURES):
-            raise UddError(f"{path}: the name must end in {', '.join((*_DATA, *PICTURES))}")
+        if path.suffix not in (*data, *PICTURES):
+            raise UddError(f"{path}: the name must end in {', '.join((*data, *PICTURES))}")
         if not path.parent.is_dir():
             raise UddError(f"{path}: there is no folder {path.parent}")
         if path.suffix == ".zarr" and path.exists():
@@ -59,13 +61,18 @@ def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -
 
 
 def save_picture(path: Path, draw: Callable[[Axes], object]) -> None:
-    """Write a picture of one pair of axes, by the ending of its name."""
+    """Write a picture of one pair of axes, of the kind that the name's ending says."""
     from matplotlib.figure import Figure
-
-    from udd.files import write_whole
 
     figure = Figure(figsize=(7.2, 4.4), layout="constrained")
     draw(figure.add_subplot())
+    save_figure(path, figure)
+
+
+def save_figure(path: Path, figure: Figure) -> None:
+    """Write a figure, of the kind that the name's ending says."""
+    from udd.files import write_whole
+
     picture = BytesIO()
     figure.savefig(picture, format=path.suffix[1:], dpi=150)
     write_whole(path, picture.getvalue())

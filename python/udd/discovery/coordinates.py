@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,32 +72,18 @@ class Slot:
 def coordinates(model: Model) -> tuple[Coordinate, ...]:
     """What a model's unknown curves are tried against: its states and what is made of them, and time."""
     own = [
-        Coordinate(
-            name,
-            lambda _t, x, k=k: x[..., k],  # type: ignore[misc]
-            lambda _x, v, k=k: v[..., k],  # type: ignore[misc]
-            name in model.angles,
-            name,
-        )
+        Coordinate(name, partial(_state, k), partial(_change, k), name in model.angles, name)
         for k, name in enumerate(model.state_names)
     ]
     if "Omega" in model.state_names:
         k = model.state_names.index("Omega")
-        own.append(
-            Coordinate(
-                "|Omega|",
-                lambda _t, x, k=k: np.abs(x[..., k]),  # type: ignore[misc]
-                lambda x, v, k=k: np.sign(x[..., k]) * v[..., k],  # type: ignore[misc]
-                False,
-                "abs(Omega)",
-            )
-        )
+        own.append(Coordinate("|Omega|", partial(_size, k), partial(_growth, k), False, "abs(Omega)"))
     if isinstance(model, Disk):
         own += [
             Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
-            Coordinate("theta", lambda _t, x: np.arctan2(x[..., 1], x[..., 2]), _azimuthal, True, None),
+            Coordinate("theta", _azimuth, _azimuthal, True, None),
         ]
-    own.append(Coordinate("t", lambda t, _x: t, lambda x, _v: np.ones(x.shape[:-1]), False, "t"))
+    own.append(Coordinate("t", _time, _passing, False, "t"))
     return tuple(own)
 
 
@@ -113,6 +100,36 @@ def coordinate(model: Model, name: str) -> Coordinate:
             return one
     known = ", ".join(c.name for c in coordinates(model))
     raise FitError(f"a curve can be a function of {known}, not of {name!r}")
+
+
+def _state(k: int, _t: Array, x: Array) -> Array:
+    return x[..., k]
+
+
+def _change(k: int, _x: Array, v: Array) -> Array:
+    return v[..., k]
+
+
+def _size(k: int, _t: Array, x: Array) -> Array:
+    return np.abs(x[..., k])
+
+
+def _growth(k: int, x: Array, v: Array) -> Array:
+    result: Array = np.sign(x[..., k]) * v[..., k]
+    return result
+
+
+def _time(t: Array, _x: Array) -> Array:
+    return t
+
+
+def _passing(x: Array, _v: Array) -> Array:
+    return np.ones(x.shape[:-1])
+
+
+def _azimuth(_t: Array, x: Array) -> Array:
+    result: Array = np.arctan2(x[..., 1], x[..., 2])
+    return result
 
 
 def _distance(_t: Array, x: Array) -> Array:
@@ -141,7 +158,7 @@ def slots(model: Model) -> tuple[Slot, ...]:
     if isinstance(model, Disk):
         turning = (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
         moving = tuple(
-            Slot(name, momentum, equation, _moving(equation, momentum))
+            Slot(name, momentum, equation, partial(_moving, equation, momentum))
             for name, equation in (("lateral", "Y"), ("vertical", "Z"))
             for momentum in ("constraint", "consistent")
         )
@@ -150,7 +167,7 @@ def slots(model: Model) -> tuple[Slot, ...]:
         return (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
     known = model.kinematic if isinstance(model, OwnModel) else ()
     return tuple(
-        Slot(f"{name}'", None, name, _direct(k))
+        Slot(f"{name}'", None, name, partial(_direct, k))
         for k, name in enumerate(model.state_names)
         if name not in known
     )
@@ -173,26 +190,18 @@ def _friction(model: Model, x: Array, value: Array, rate: Array) -> Array:
     return _torque(model, x, -value * x[..., 0], rate)
 
 
-def _moving(equation: str, momentum: str) -> Callable[[Model, Array, Array, Array], Array]:
-    k = ("Omega", "Y", "Z").index(equation)
-
-    def forcing(model: Model, x: Array, value: Array, rate: Array) -> Array:
-        result = np.zeros(x.shape)
-        result[..., k] = value
-        if momentum == "consistent":
-            # design.md: I dOmega/dT = ... - (Y u + Z W_c) Omega + Y dW_c/dT - Z du/dT
-            arm, other, sign = (1, 2, -1.0) if equation == "Y" else (2, 1, 1.0)
-            torque = -x[..., arm] * value * x[..., 0] + sign * x[..., other] * rate
-            result[..., 0] = torque / _inertia(model, x)
-        return result
-
-    return forcing
+def _moving(equation: str, momentum: str, model: Model, x: Array, value: Array, rate: Array) -> Array:
+    result = np.zeros(x.shape)
+    result[..., ("Omega", "Y", "Z").index(equation)] = value
+    if momentum == "consistent":
+        # I dOmega/dT = ... - (Y u + Z W_c) Omega + Y dW_c/dT - Z du/dT
+        arm, other, sign = (1, 2, -1.0) if equation == "Y" else (2, 1, 1.0)
+        torque = -x[..., arm] * value * x[..., 0] + sign * x[..., other] * rate
+        result[..., 0] = torque / _inertia(model, x)
+    return result
 
 
-def _direct(k: int) -> Callable[[Model, Array, Array, Array], Array]:
-    def forcing(_model: Model, x: Array, value: Array, _rate: Array) -> Array:
-        result = np.zeros(x.shape)
-        result[..., k] = value
-        return result
-
-    return forcing
+def _direct(k: int, _model: Model, x: Array, value: Array, _rate: Array) -> Array:
+    result = np.zeros(x.shape)
+    result[..., k] = value
+    return result

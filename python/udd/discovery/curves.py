@@ -235,7 +235,7 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     found = responses(fit)
     (score,) = score_groups(found, [(curve.slot, curve.coordinates)], [curve.splines])
     smoothed = smooth(score, curve.roughness, _observations(fit), at)
-    moved = Score(score.gradient + score.information @ at, score.information)
+    moved = replace(score, gradient=score.gradient + score.information @ at)
     return replace(
         curve,
         coefficients=smoothed.coefficients,

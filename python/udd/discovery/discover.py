@@ -20,6 +20,7 @@ from .heldout import pace
 from .results import Discovery, Found
 from .search import Search, Step
 from .terms import given_terms
+from .together import together
 
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
@@ -48,10 +49,10 @@ def discover(
     0.1 % over all candidates together (in those 60 % for white noise, and in all data with the misfits' own
     colour), its amplitudes are physical, and the last 40 % are explained better beyond doubt: with all
     parameters held, the 95 % interval of the costs' ratio excludes 1, and at no horizon do forecasts get
-    worse. All coefficients are refitted and the search goes on; single effects that do not pass are tried in
-    pairs. Forms that the data cannot tell apart are named. Where no effect passes but the model does not
-    explain the data (chi2 per degree of freedom above 2.5), an effect is present that the library does not
-    hold.
+    worse. All coefficients are refitted and the search goes on; effects that do not pass alone are tried in
+    twos and threes. Forms that the data cannot tell apart are named. Where no effect passes but the model
+    does not explain the data (chi2 per degree of freedom above 2.5), an effect is present that the library
+    does not hold.
 
     Parameters
     ----------
@@ -100,8 +101,9 @@ def discover(
     options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each, "search": True}
 
     tell("fitting the known model")
-    base = fit_record(measurement, record.part(train), model, free, **options)
-    baseline = fit_record(measurement, record, model, free, **options)
+    base, baseline = together(
+        lambda frames: fit_record(measurement, frames, model, free, **options), (record.part(train), record)
+    )
     search = Search(record, ~train, tell, pace(base), given)
     before = search.errors(base)
     end = search.run(base, baseline, before)
@@ -125,9 +127,9 @@ def discover(
         error_before=before,
         error_after=end.errors,
         ratio=search.improvement(before, end.errors) if found else (1.0, 1.0, 1.0),
-        scans=end.scans,
-        curves=end.curves,
-        looks=search.looks,
+        scans=[sorted(look.library.scored, key=lambda s: -s.chi2) for look in end.looks],
+        curves=[look.curves for look in end.looks],
+        looks=[look.looks for look in end.looks],
         split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=end.part,
     )

@@ -24,10 +24,12 @@ class Score:
 
     Everything else optimal, chi2 falls by ``2 gradient . c - c . information c`` when they take the values c;
     both in units of the fit's own scatter.
+    Taken `alone` is the information on each amplitude were all free parameters known.
     """
 
     gradient: Array
     information: Array
+    alone: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +113,14 @@ def score_forcings(fit: Fit, columns: Sequence[Array], known: bool = False) -> l
         sizes = [c.shape[-1] for c in some]
         sight = np.zeros((len(fit.record.t), fit.misfit.shape[1], sum(sizes)))
         at_end = np.ascontiguousarray(np.concatenate(some, axis=-1))
-        gradient, information, _alone = _core.score_columns(
+        gradient, information, alone = _core.score_columns(
             model, data, start, [] if known else free, diffusion, at_end, sight, sizes
         )
         own, square = 0, 0
         for k in sizes:
             block = information[square : square + k * k].reshape(k, k) / scatter
-            scores.append(Score(gradient[own : own + k] / scatter, (block + block.T) / 2))
+            part = slice(own, own + k)
+            scores.append(Score(gradient[part] / scatter, (block + block.T) / 2, alone[part] / scatter))
             own, square = own + k, square + k * k
     return scores
 

@@ -20,6 +20,7 @@ from udd.models import Disk, Model, Pendulum
 from udd.trajectory import simulate
 
 from .candidates import Candidate
+from .together import together
 
 if TYPE_CHECKING:
     from .results import Alternative, Discovery
@@ -121,16 +122,18 @@ def hints(found: Discovery) -> list[Hint]:
         return []
     pairs = [_Pair.of(found, other) for other in found.alternatives]
     now = [pair.nats(None) for pair in pairs]
-    designs = []
-    for film in _films(found.trained):
+
+    def told(film: Film) -> tuple[str, dict[str, float]] | None:
         filmed = _filmed(found.trained, film)
         if filmed is None:
-            continue
+            return None
         each: dict[str, float] = {}
         for pair, before in zip(pairs, now, strict=True):
-            told = pair.other.nats + max(pair.nats((film, filmed)) - before, 0.0)
-            each[pair.other.title] = float(min(told, each.get(pair.other.title, np.inf)))
-        designs.append((film.design, each))
+            nats = pair.other.nats + max(pair.nats((film, filmed)) - before, 0.0)
+            each[pair.other.title] = float(min(nats, each.get(pair.other.title, np.inf)))
+        return film.design, each
+
+    designs = [design for design in together(told, _films(found.trained)) if design]
     return _ranked(designs)
 
 

@@ -10,9 +10,8 @@ import numpy as np
 from udd import effects
 from udd.effects import Effect
 from udd.errors import FitError
-from udd.fitting import Fit
+from udd.fitting import Fit, widened
 from udd.fitting.parameters import Free
-from udd.fitting.problem import Point, Problem
 from udd.fitting.solve import tighten
 
 from .absorbed import distinct
@@ -101,7 +100,7 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     curve, start = refined(curve, fit), fit
     for _ in range(_ROUNDS):
         effect, at = curve_effect(curve, name), curve.coefficients
-        problem, point = _widened(fit, effect, start)
+        problem, point = widened(fit, [effect], start)
         current = tighten(fit.measurements, problem, point, problem.schedule[1:])
         curve, start = rescored(curve, current, at), current
         moved = curve.coefficients - at
@@ -147,7 +146,7 @@ def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula")
     FitError
         The formula cannot be added to the model, or the fit fails.
     """
-    problem, point = _widened(fit, formula_effect(curve, formula, name), fit)
+    problem, point = widened(fit, [formula_effect(curve, formula, name)])
     order = list(problem.models[0].parameters)
     names = [f"{name}.{p}" for p in formula.parameters]
     more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
@@ -163,13 +162,3 @@ def _text(curve: Curve) -> str:
             f"nothing over {own.name} can be added to a model: formulas have no word for {own.name}"
         )
     return own.text
-
-
-def _widened(fit: Fit, effect: Effect, start: Fit) -> tuple[Problem, Point]:
-    """The problem of a fit with one effect more, and where another fit of the same data ended."""
-    own = len(fit.models[0].parameters)
-    models = tuple(model.with_effects((*model.effects, effect)) for model in fit.models)
-    sets = tuple(
-        ([*values[:own], *effect.values], camera, clock) for values, camera, clock in start.point.sets
-    )
-    return replace(fit.problem, models=models), Point(start.states, sets)

@@ -22,6 +22,7 @@ from .terms import waves
 
 #: A candidate is absorbed when the free parameters take this share of its information.
 _ABSORBED = 1e-4
+_ALIKE = 1e6  # condition of the information from which on candidates act alike
 _WAVES = 100  # scored at a time: what a long record takes in memory
 
 
@@ -63,19 +64,28 @@ class Scan:
     columns: list[list[int]]
     scatter: float
 
-    def pairs(self) -> list[tuple[Scored, Scored, float]]:
-        """Every pair of candidates with the fall of chi2 that both together give, largest first."""
+    def groups(self, size: int) -> list[tuple[list[Scored], float]]:
+        """Every so many candidates with the fall of chi2 that all of them together give, largest first."""
         usable = [k for k, s in enumerate(self.scored) if not s.absorbed]
+        # Candidates that act alike have no place side by side.
+        unit = _unit(self.information)
+        unlike = {
+            (i, j)
+            for i, j in itertools.combinations(usable, 2)
+            if np.linalg.cond(unit[np.ix_(own := self.columns[i] + self.columns[j], own)]) < _ALIKE
+        }
         result = []
-        for i, j in itertools.combinations(usable, 2):
-            columns = self.columns[i] + self.columns[j]
+        for group in itertools.combinations(usable, size):
+            if not unlike.issuperset(itertools.combinations(group, 2)):
+                continue
+            columns = [c for k in group for c in self.columns[k]]
             block = self.information[np.ix_(columns, columns)]
-            if np.linalg.cond(_unit(block)) > 1e6:
+            if size > 2 and np.linalg.cond(unit[np.ix_(columns, columns)]) >= _ALIKE:
                 continue
             g = self.gradient[columns]
             fall = float(g @ np.linalg.solve(block, g)) / self.scatter
-            result.append((self.scored[i], self.scored[j], fall))
-        return sorted(result, key=lambda pair: -pair[2])
+            result.append(([self.scored[k] for k in group], fall))
+        return sorted(result, key=lambda found: -found[1])
 
     def likeness(self, i: int, j: int) -> float:
         """How alike two candidates act on the data: the largest canonical correlation, 0 to 1."""
@@ -137,11 +147,11 @@ def _scan_waves(fit: Fit, model: OwnModel) -> list[Scored]:
             slot = by_state[one.effect.slots[0].removesuffix("'")]
             value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
             columns.append(moved.columns(slot, value, np.zeros(value.shape)))
-        for one, score, full in zip(
-            some, score_forcings(fit, columns), score_forcings(fit, columns, known=True), strict=True
-        ):
-            alone = np.diag(full.information) * scatter
-            result.append(_score(one, score.gradient * scatter, score.information * scatter, alone, scatter))
+        for one, score in zip(some, score_forcings(fit, columns), strict=True):
+            gradient, information, alone = (
+                scatter * part for part in (score.gradient, score.information, score.alone)
+            )
+            result.append(_score(one, gradient, information, alone, scatter))
     return result
 
 

@@ -27,6 +27,7 @@ from .heldout import (
 from .located import fit_curve, fit_formula
 from .results import Alternative
 from .scan import Scan, Scored, physical, scan, scan_ripples
+from .together import together
 
 #: Chance that a record without any effect is said to have one, over all candidates together.
 ALPHA = 1e-3
@@ -45,7 +46,7 @@ _FORMULAS = 3  # for each, fitted in full
 
 @dataclass(frozen=True)
 class Step:
-    """An addition that was accepted: one candidate, a pair, or a curve.
+    """An addition that was accepted: one candidate, two or three together, or a curve.
 
     Attributes
     ----------
@@ -86,15 +87,20 @@ class Look:
     library : Scan
     curves : list of Curve
         The likeliest first.
+    looks : int
+        How many scores could have been the best, around all fits that were tried.
     """
 
     fit: Fit
     library: Scan
     curves: list[Curve]
+    looks: int
 
-    def passing(self, looks: int) -> list[Scored]:
+    def passing(self) -> list[Scored]:
         """The candidates that chance does not explain, the strongest first."""
-        usable = [s for s in self.library.scored if s.physical and not s.absorbed and s.p * looks < ALPHA]
+        usable = [
+            s for s in self.library.scored if s.physical and not s.absorbed and s.p * self.looks < ALPHA
+        ]
         return sorted(usable, key=lambda s: -round(s.chi2, 3))
 
     def nats(self, scored: Scored) -> float:
@@ -228,6 +234,11 @@ def _of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
     return trial if fitted.converged else None
 
 
+def _fitted(trials: list[Trial | None]) -> list[Trial]:
+    """Those that could be fitted."""
+    return [t for t in trials if t]
+
+
 def _states_first(curves: list[Curve]) -> list[Curve]:
     """The likeliest first, but curves over time, which take up anything slow, after those as likely."""
     late = 2 * NATS
@@ -248,14 +259,13 @@ def _unused(current: Fit, name: str) -> str:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where a search ended: fits of the first part and of all data, errors, what was done and seen."""
+    """Where a search ended: fits of the first part and of all data, errors, what was seen and done."""
 
     part: Fit
     whole: Fit
     errors: Errors
     accepted: list[Step]
-    scans: list[list[Scored]]
-    curves: list[list[Curve]]
+    looks: list[Look]
 
 
 class Search:
@@ -271,7 +281,6 @@ class Search:
     ) -> None:
         self.record, self.held, self.tell = record, held, tell
         self.unit, self.given = unit, given
-        self.looks: list[int] = []
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -289,22 +298,19 @@ class Search:
     def run(self, base: Fit, whole: Fit, before: Errors) -> Outcome:
         """Add effects until none passes."""
         accepted: list[Step] = []
-        scans: list[list[Scored]] = []
-        curves: list[list[Curve]] = []
+        looks: list[Look] = []
         states = [State(base, whole, before)]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = self._look(states[-1].part)
-            scans.append(sorted(look.library.scored, key=lambda s: -s.chi2))
-            curves.append(look.curves)
-            found = self._addition(states[-1], look)
+            looks.append(self._look(states[-1].part))
+            found = self._addition(states[-1], looks[-1])
             if found is None:
                 break
             accepted.append(found[0])
             states.append(found[1])
-            self._prune(accepted, states)
+            self._prune(accepted, states, looks)
         end = states[-1]
-        return Outcome(end.part, end.whole, end.errors, accepted, scans, curves)
+        return Outcome(end.part, end.whole, end.errors, accepted, looks)
 
     def _look(self, fitted: Fit) -> Look:
         """Score every candidate and curve around the fit and, where it explains little, around a looser one.
@@ -320,75 +326,79 @@ class Search:
             scanned = scan(current, [*library(current.model, self.given), *best])
             curves = scan_curves(current)
             looks += len(scanned.scored) + len(rippled) + curves.looks
-            found.append(Look(current, scanned, curves.curves))
-        self.looks.append(looks)
-        return max(found, key=Look.strongest)
+            found.append(Look(current, scanned, curves.curves, 0))
+        return replace(max(found, key=Look.strongest), looks=looks)
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, a pair of them, or a curve.
+        """The best thing to add that passes: an effect of the library, some of them together, or a curve.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
-        looks = self.looks[-1]
-        passing = look.passing(looks)
+        passing = look.passing()
         singles = self._singles(current, passing)
         if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             singles += self._rivals(current, look, max(look.nats(s) for s in passing))
-        likely = _states_first([c for c in look.curves if c.p * looks < ALPHA])[:_CURVES]
+        likely = _states_first([c for c in look.curves if c.p * look.looks < ALPHA])[:_CURVES]
         return (
-            self._accept(current, singles, look, looks)
-            or self._pair(current, look)
-            or self._accept(current, self._curves(current, likely), look, looks)
+            self._accept(current, singles, look)
+            or self._group(current, look, 2)
+            or self._group(current, look, 3)
+            or self._accept(current, self._curves(current, likely), look)
         )
 
     def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
         """Formulas that may explain the data as well as what the library has."""
-        trials: list[Trial | None] = []
+        trials: list[Trial] = []
         for curve in look.curves[:1]:
-            for written in self._formulas(current, curve):
-                if curve.evidence + written.nats > known - NATS:
-                    self.tell(f"trying {written.text}")
-                    trials.append(_of_formula(current.part, curve, written))
-        return [t for t in trials if t]
+            written = self._formulas(current, curve)
+            trials += self._written(
+                current, curve, [f for f in written if curve.evidence + f.nats > known - NATS]
+            )
+        return trials
+
+    def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
+        """Formulas for a curve, fitted."""
+        self._trying([f.text for f in formulas])
+        return _fitted(together(lambda written: _of_formula(current.part, curve, written), formulas))
+
+    def _trying(self, titles: list[str]) -> None:
+        if titles:
+            self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
     def _formulas(self, current: State, curve: Curve) -> list[Formula]:
         return formulas_for(curve, int(np.isfinite(current.part.misfit).sum())).formulas[:_FORMULAS]
 
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
-        trials = []
-        for s in passing[:_TRIED]:
-            self.tell(f"trying {s.candidate.title}")
-            trials.append(_of_library(current.part, [s.candidate], list(s.amplitudes)))
-        return [t for t in trials if t]
+        best = passing[:_TRIED]
+        self._trying([s.candidate.title for s in best])
+        return _fitted(together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best))
 
-    def _pair(self, current: State, look: Look) -> tuple[Step, State] | None:
-        best = look.library.pairs()
-        trials = []
-        for a, b, fall in best[:_TRIED]:
-            columns = len(a.amplitudes) + len(b.amplitudes)
-            same = a.candidate.effect.name == b.candidate.effect.name
-            if same or chi2.sf(fall, columns) * len(best) >= ALPHA:
-                continue
-            self.tell(f"trying {a.candidate.title} with {b.candidate.title}")
-            trials.append(_of_library(current.part, [a.candidate, b.candidate], [0.0] * columns))
-        return self._accept(current, [t for t in trials if t], look, len(best))
+    def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
+        """Several effects at once that pass only together."""
+        best = look.library.groups(size)
+        likely = [
+            [s.candidate for s in group]
+            for group, fall in best[:_TRIED]
+            if len({s.candidate.effect.name for s in group}) == size
+            and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
+        ]
+        self._trying([" with ".join(c.title for c in group) for group in likely])
+        nothing = [[0.0 for c in group for _name in c.amplitude_names] for group in likely]
+        trials = together(lambda k: _of_library(current.part, likely[k], nothing[k]), range(len(likely)))
+        return self._accept(current, _fitted(trials), replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
-        trials: list[Trial | None] = []
-        for curve in likely:
-            self.tell(f"trying {curve.title}")
-            located = _of_curve(current.part, curve)
-            if located is None or located.curve is None:
-                continue
+        trials: list[Trial] = []
+        self._trying([curve.title for curve in likely])
+        for located in _fitted(together(lambda curve: _of_curve(current.part, curve), likely)):
             trials.append(located)
-            for written in self._formulas(current, located.curve):
-                self.tell(f"trying {written.text}")
-                trials.append(_of_formula(current.part, located.curve, written))
-        return [t for t in trials if t]
+            if located.curve is not None:
+                trials += self._written(current, located.curve, self._formulas(current, located.curve))
+        return trials
 
-    def _prune(self, accepted: list[Step], states: list[State]) -> None:
+    def _prune(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
         """Leave out effects that a later one makes needless.
 
         A wrong form of the library takes up a part of what an effect outside of it does.
@@ -400,20 +410,16 @@ class Search:
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
             before = states[k]
-            found = self._accept(
-                before, self._curves(before, [last.curve]), self._look(before.part), self.looks[-1]
-            )
+            found = self._accept(before, self._curves(before, [last.curve]), looks[k])
             if found is None:
                 continue
             both, alone = self._level(states[-1].part, found[1].part)
             more = sum(c.parameters for step in accepted[k:-1] for c in step.candidates)
             if alone.chi2 < both.chi2 + _price(both) * more * max(both.scatter, 1.0):
-                accepted[k:], states[k + 1 :] = [found[0]], [found[1]]
+                accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
                 return
 
-    def _accept(
-        self, current: State, trials: list[Trial], look: Look, looks: int
-    ) -> tuple[Step, State] | None:
+    def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         if not trials:
@@ -434,7 +440,7 @@ class Search:
                 continue
             before, after = self._level(current.whole, whole.fit)
             fall = (before.chi2 - after.chi2) / after.inflation(before)
-            p = min(float(chi2.sf(fall, trial.freedom)) * looks, 1.0)
+            p = min(float(chi2.sf(fall, trial.freedom)) * look.looks, 1.0)
             if p >= ALPHA:
                 continue
             try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from udd.film.defects import Defects
 from udd.film.rendering import Film, render
 
-__all__ = ["Film", "render"]
+__all__ = ["Defects", "Film", "render"]

@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Iterable
 from fractions import Fraction
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from udd.errors import UddError
 
 SUFFIXES = (".mp4", ".mov")
+CODECS = ("h264", "hevc", "mp4v")
 
 
 def require_video() -> Any:
@@ -42,9 +44,18 @@ def checked_path(path: str | os.PathLike[str]) -> Path:
 
 
 def write_film(
-    target: Path, frames: Iterable[NDArray[np.uint8]], size: tuple[int, int], rate: Fraction, quality: float
+    target: Path,
+    frames: Iterable[NDArray[np.uint8]],
+    size: tuple[int, int],
+    rate: Fraction,
+    quality: float,
+    codec: str = "h264",
+    numbers: Iterable[int] | None = None,
 ) -> None:
-    """Encode RGB frames (height, width, 3) and put the film in place; a failed one leaves nothing."""
+    """Encode RGB frames (height, width, 3) and put the film in place; a failed one leaves nothing.
+
+    Frame k of them has the time stamp numbers[k] / rate, without `numbers` k / rate.
+    """
     try:
         handle, name = tempfile.mkstemp(
             prefix=f".{target.stem}.", suffix=target.suffix.lower(), dir=target.parent
@@ -53,7 +64,10 @@ def write_film(
         raise UddError(f"cannot write the film {target}: {error.strerror}") from None
     os.close(handle)
     try:
-        _encode(name, frames, size, rate, quality)
+        if codec == "mp4v":
+            _encode_as_opencv(name, frames, size, rate)
+        else:
+            _encode(name, frames, count() if numbers is None else numbers, size, rate, quality, codec)
         os.chmod(name, 0o666 & ~_umask())  # mkstemp's file is for the owner alone
         os.replace(name, target)
     except OSError as error:
@@ -63,27 +77,54 @@ def write_film(
 
 
 def _encode(
-    name: str, frames: Iterable[NDArray[np.uint8]], size: tuple[int, int], rate: Fraction, quality: float
+    name: str,
+    frames: Iterable[NDArray[np.uint8]],
+    numbers: Iterable[int],
+    size: tuple[int, int],
+    rate: Fraction,
+    quality: float,
+    codec: str,
 ) -> None:
     av = require_video()
     with av.open(name, "w", options={"movflags": "+faststart"}) as container:
-        stream = _stream(container, rate, quality)
+        stream = _stream(container, rate, quality, codec)
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
         stream.time_base = stream.codec_context.time_base = 1 / rate
         # one thread: x264's choices depend on their number, and the same call must give the same film
         stream.codec_context.thread_count = 1
-        for number, picture in enumerate(frames):
+        for number, picture in zip(numbers, frames, strict=False):
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
             frame.pts, frame.time_base = number, 1 / rate
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
 
 
-def _stream(container: Any, rate: Fraction, quality: float) -> Any:
+def _encode_as_opencv(
+    name: str, frames: Iterable[NDArray[np.uint8]], size: tuple[int, int], rate: Fraction
+) -> None:
+    import cv2
+
+    writer = cv2.VideoWriter(name, cv2.VideoWriter.fourcc(*"mp4v"), float(rate), size)
+    if not writer.isOpened():
+        raise UddError("this OpenCV cannot write MPEG-4 films")
+    try:
+        for picture in frames:
+            writer.write(np.ascontiguousarray(picture[..., ::-1]))
+    finally:
+        writer.release()
+
+
+def _stream(container: Any, rate: Fraction, quality: float, codec: str) -> Any:
     """H.264 where the library has it, else MPEG-4; without B-frames, so that stored and shown order agree."""
     from av.codec.codec import UnknownCodecError
 
+    if codec == "hevc":
+        try:
+            options = {"crf": f"{quality:g}", "preset": "veryfast", "x265-params": "bframes=0:log-level=none"}
+            return container.add_stream("libx265", rate=rate, options=options)
+        except UnknownCodecError:
+            raise UddError("this PyAV cannot write HEVC films") from None
     try:
         # With its macroblock tree x264 looks at memory that it never wrote: one film in fifty came out with
         # other bytes.

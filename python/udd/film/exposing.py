@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from udd.film.camera import Camera
+from udd.film.defects import WOBBLE_PERIOD, Defects, lit, source_of_pixels
 from udd.film.light import Picture, to_code
 from udd.film.motion import Array, Motion
 from udd.film.scene import back_shapes, blurred, front_shapes, over, paint
@@ -22,50 +23,83 @@ SHADOW_DEPTH, SHADOW_SOFT, SHADOW_SHIFT = 0.16, 0.09, (0.07, 0.10)  # in disk ra
 class Scene:
     """Everything but the motion, drawn once; `expose` gives the picture of one frame."""
 
-    def __init__(self, camera: Camera, radius: float, background: Picture, support: float) -> None:
+    def __init__(
+        self, camera: Camera, radius: float, background: Picture, support: float, defects: Defects
+    ) -> None:
         unit = radius / 0.08
         self.camera = camera
         self.radius = radius * camera.scale
-        self.sprite = disk_sprite(self.radius, FOCUS)
+        self.defects = defects
+        offsets = np.asarray(defects.mark_offsets, dtype=np.float64) * camera.scale
+        self.sprite = disk_sprite(self.radius, FOCUS, offsets, defects.mark_strength)
         back = paint(back_shapes(unit) if support > 0 else [], camera, FOCUS)
-        front = paint(front_shapes(unit, support), camera, FOCUS)
+        front = paint(front_shapes(unit, support, defects.bars), camera, FOCUS)
         self.below = over(back, background)
         self.front, self.clear = _split(front)
         self.shade = _shadow(self.radius)
-        self.still = to_code(over(front, self.below))
-        self._picture = np.empty_like(self.still)
+        self._still = over(front, self.below)
+        self.bent = source_of_pixels(camera, defects) if defects.bends else None
+        self.plain = not (defects.bends or defects.lights)
+        self._codes = to_code(self._still)
+        self._picture = np.empty_like(self._codes)
 
     def expose(self, motion: Motion, time: float) -> Picture:
         """Return the unrounded codes (height, width, 3) of the frame whose exposure is centred on `time`.
 
         The next call writes into the same array.
         """
-        states = motion(sub_times(motion, time, self.camera, self.radius))
+        times = sub_times(motion, time, self.camera, self.radius, self.defects.readout)
+        states = motion(times)
         centres = self.camera.to_pixel(states[:, 1], states[:, 2])
+        squeeze = np.cos(self.defects.wobble * np.sin(2 * np.pi * times / WOBBLE_PERIOD))
+        centres[:, 0] += (squeeze - 1) * (centres[:, 0] - self.camera.pivot[0])
         low, high = self._window(centres)
         picture = self._picture
-        np.copyto(picture, self.still)
+        np.copyto(picture, self._codes if self.plain else self._still)
         if (high > low).all():
             part = (slice(low[1], high[1]), slice(low[0], high[0]))
-            shape = (int(high[1] - low[1]), int(high[0] - low[0]))
-            turns = states[:, 3] + self.camera.tilt
-            disk, clear = _split(_average(self.sprite, FINE, centres - low, turns, (*shape, 4)))
-            # the shadow is round, so it only shifts, and so soft that steps of half its softness do not show
-            some = centres[:: max(int(SHADOW_SOFT * self.radius / STEP / 2), 1)]
-            some = (
-                some
-                + (centres.mean(axis=0) - some.mean(axis=0))
-                + np.multiply(SHADOW_SHIFT, self.radius)
-                - low
+            light = self._disk(times - time, states, centres - low, squeeze, part)
+            picture[part] = to_code(light) if self.plain else light
+        return picture if self.plain else self._developed(picture, time)
+
+    def _disk(
+        self, times: Array, states: Array, centres: Array, squeeze: Array, part: tuple[slice, slice]
+    ) -> Picture:
+        """Return the light of the part of the picture that the disk and its shadow may touch."""
+        rows = np.arange(part[0].start, part[0].stop)
+        shape = (len(rows), part[1].stop - part[1].start)
+        weights = _open(times, rows, self.camera, self.defects.readout)
+        turns = states[:, 3] + self.camera.tilt
+        disk, clear = _split(_average(self.sprite, FINE, centres, turns, (*shape, 4), weights, squeeze))
+        # the shadow is round, so it only shifts, and so soft that steps of half its softness do not show
+        every = max(int(SHADOW_SOFT * self.radius / STEP / 2), 1)
+        some = centres[::every]
+        if weights is None:
+            some = some + (centres.mean(axis=0) - some.mean(axis=0))
+            shadow_weights = None
+        else:
+            shadow_weights = weights[::every] / np.maximum(weights[::every].sum(axis=0), 1e-6)
+        some = some + np.multiply(SHADOW_SHIFT, self.radius)
+        shadow = _average(self.shade, COARSE, some, np.zeros(len(some)), shape, shadow_weights)
+        light = self.below[part] * _threefold(1 - shadow)
+        light *= clear
+        light += disk
+        light *= self.clear[part]
+        light += self.front[part]
+        return light
+
+    def _developed(self, light: Picture, time: float) -> Picture:
+        """Codes of what the lens and the lamps make of a true-to-scale picture's light."""
+        import cv2
+
+        if self.bent is not None:
+            light = np.asarray(
+                cv2.remap(light, *self.bent, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),
+                dtype=np.float32,
             )
-            shadow = _average(self.shade, COARSE, some, np.zeros(len(some)), shape)
-            light = self.below[part] * _threefold(1 - shadow)
-            light *= clear
-            light += disk
-            light *= self.clear[part]
-            light += self.front[part]
-            picture[part] = to_code(light)
-        return picture
+        if self.defects.lights:
+            light = lit(light, time, self.defects)
+        return to_code(np.clip(light, 0, 1))
 
     def _window(self, centres: Array) -> tuple[np.ndarray, np.ndarray]:
         """Find the pixels the disk or its shadow may touch: corners (x, y), the upper one excluded."""
@@ -75,34 +109,76 @@ class Scene:
         return np.maximum(low, 0), np.minimum(high, self.camera.size)
 
 
-def sub_times(motion: Motion, time: float, camera: Camera, radius: float) -> Array:
-    """Space sub-frames evenly through the exposure, as many as the fastest point of the rim needs."""
-    opened, middle, closed = motion(time + camera.exposure * np.array([-0.5, 0.0, 0.5]))
+def sub_times(motion: Motion, time: float, camera: Camera, radius: float, readout: float = 0.0) -> Array:
+    """Space sub-frames evenly through the exposure, as many as the fastest point of the rim needs.
+
+    A rolling shutter's exposure lasts from the first row's opening to the last row's closing.
+    """
+    whole = camera.exposure + readout / float(camera.rate)
+    opened, middle, closed = motion(time + whole * np.array([-0.5, 0.0, 0.5]))
     path = 0.0
     for a, b in ((opened, middle), (middle, closed)):
         path += math.hypot(b[1] - a[1], b[2] - a[2]) * camera.scale + abs(b[3] - a[3]) * radius
-    n = min(max(math.ceil(path / STEP), 1), 1024)
-    return np.asarray(time + camera.exposure * ((np.arange(n) + 0.5) / n - 0.5), dtype=np.float64)
+    n = min(max(math.ceil(path / STEP), 1 if readout == 0 else 32), 1024)
+    return np.asarray(time + whole * ((np.arange(n) + 0.5) / n - 0.5), dtype=np.float64)
 
 
-def _average(sprite: Picture, fine: float, centres: Array, turns: Array, shape: tuple[int, ...]) -> Picture:
+def _open(times: Array, rows: np.ndarray, camera: Camera, readout: float) -> Array | None:
+    """Return the share of each sub-frame (n, rows) in each row's exposure; None where all rows are alike."""
+    if readout == 0:
+        return None
+    height = camera.size[1]
+    middle = readout / float(camera.rate) * ((rows + 0.5) / height - 0.5)
+    step = times[1] - times[0]
+    low = np.maximum(times[:, None] - step / 2, middle[None, :] - camera.exposure / 2)
+    high = np.minimum(times[:, None] + step / 2, middle[None, :] + camera.exposure / 2)
+    share = np.maximum(high - low, 0)
+    return np.asarray(share / share.sum(axis=0), dtype=np.float64)
+
+
+def _average(
+    sprite: Picture,
+    fine: float,
+    centres: Array,
+    turns: Array,
+    shape: tuple[int, ...],
+    weights: Array | None = None,
+    squeeze: Array | None = None,
+) -> Picture:
     """Average the sprite with its middle at each of the centres (n, 2), turned clockwise by each angle.
 
-    `fine` is the number of sprite pixels per pixel, `shape` that of the result.
+    `fine` is the number of sprite pixels per pixel, `shape` that of the result, `weights` (n, rows) that of
+    each copy in each row, `squeeze` (n,) its width.
     """
     import cv2
 
     total = np.zeros(shape, dtype=np.float32)
     piece = np.empty_like(total)
     middle = (sprite.shape[0] - 1) / 2
-    for (x, y), turn in zip(centres, turns, strict=True):
+    for k, ((x, y), turn) in enumerate(zip(centres, turns, strict=True)):
+        if weights is not None and not weights[k].any():
+            continue
         c, s = fine * math.cos(turn), fine * math.sin(turn)
-        inverse = np.array([[c, s, middle - c * x - s * y], [-s, c, middle + s * x - c * y]])
-        cv2.warpAffine(
-            sprite, inverse, shape[1::-1], dst=piece, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        thin = 1.0 if squeeze is None else 1 / float(squeeze[k])
+        inverse = np.array(
+            [[c * thin, s, middle - c * thin * x - s * y], [-s * thin, c, middle + s * thin * x - c * y]]
         )
-        cv2.accumulate(piece, total)
-    total /= len(centres)
+        if weights is None:
+            cv2.warpAffine(
+                sprite, inverse, shape[1::-1], dst=piece, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+            )
+            cv2.accumulate(piece, total)
+            continue
+        rows = np.flatnonzero(weights[k])
+        first, last = int(rows[0]), int(rows[-1]) + 1
+        inverse[:, 2] += inverse[:, 1] * first
+        band = cv2.warpAffine(
+            sprite, inverse, (shape[1], last - first), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        )
+        weight = weights[k, first:last].astype(np.float32).reshape(-1, *[1] * (len(shape) - 1))
+        total[first:last] += band * weight
+    if weights is None:
+        total /= len(centres)
     return total
 
 

@@ -76,6 +76,22 @@ def motion_of(trajectory: TrajectoryLike) -> Motion:
     return motion
 
 
+def then_falling(motion: Motion, end: float, g: float = 9.81) -> Motion:
+    """Let the wheels lose the disk at the time `end`: from there on it falls and turns on evenly."""
+    step = 1e-5
+    before, last = motion(np.array([end - step, end]))
+    rate = (last - before) / step
+    rate[0], rate[3] = 0.0, last[0]
+
+    def falling(times: Array) -> Array:
+        late = np.maximum(times - end, 0.0)
+        state = motion(np.minimum(times, end)) + late[:, None] * rate
+        state[:, 2] -= 0.5 * g * late**2
+        return np.asarray(state, dtype=np.float64)
+
+    return falling
+
+
 def dense_output(trajectory: TrajectoryLike) -> Motion | None:
     """Return the trajectory as a function of time where it was made with dense output."""
     if not callable(trajectory):

@@ -13,10 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd.errors import UddError
 from udd.film.camera import Camera, make_camera
-from udd.film.encoding import checked_path, require_video, write_film
+from udd.film.defects import Defects, hung
+from udd.film.encoding import CODECS, checked_path, require_video, write_film
 from udd.film.exposing import Scene
 from udd.film.light import Noise, Picture, to_light
-from udd.film.motion import Array, Motion, TrajectoryLike, checked, motion_of, spacing_error
+from udd.film.motion import (
+    Array,
+    Motion,
+    TrajectoryLike,
+    checked,
+    motion_of,
+    spacing_error,
+    then_falling,
+)
 from udd.film.scene import room
 from udd.measurement import Measurement
 
@@ -36,6 +45,8 @@ class Film:
         Time stamp of each frame in the file, s: frame k has k / fps. It is the middle of the exposure.
     state : ndarray, shape (n, 4)
         [Omega, Y, Z, beta] of the disk in the middle of each exposure, rad/s, m, m, rad.
+    held : ndarray of bool, shape (n,)
+        Whether the wheels hold the disk; where not, it falls freely.
     size : (int, int)
         Width and height, pixels.
     scale : float
@@ -49,6 +60,7 @@ class Film:
     path: Path
     t: NDArray[np.float64]
     state: NDArray[np.float64]
+    held: NDArray[np.bool_]
     size: tuple[int, int]
     scale: float
     pivot: tuple[float, float]
@@ -57,7 +69,8 @@ class Film:
     @property
     def truth(self) -> Measurement:
         """What a perfect tracker would measure: Y, Z, beta in the middle of each exposure."""
-        return Measurement(self.t, self.state[:, 1:], meta={"R": self.radius, "source": self.path.name})
+        values = np.where(self.held[:, None], self.state[:, 1:], np.nan)
+        return Measurement(self.t, values, meta={"R": self.radius, "source": self.path.name})
 
 
 def render(
@@ -74,6 +87,8 @@ def render(
     background: ArrayLike | None = None,
     noise: float = 2.0,
     quality: float = 20.0,
+    codec: str = "h264",
+    defects: Defects | None = None,
     seed: int = 0,
     progress: bool = False,
 ) -> Film:
@@ -116,6 +131,12 @@ def render(
         Standard deviation of the sensor noise, in codes of 255.
     quality : float
         H.264's constant rate factor: 0 is lossless but for the colours' coarser grid, 20 good, 35 poor.
+    codec : str
+        ``"h264"``, ``"hevc"``, or ``"mp4v"`` for MPEG-4 as OpenCV's ``VideoWriter`` writes it (without a
+        choice of quality).
+    defects : udd.film.Defects, optional
+        What goes wrong: clutter, cross-bars, a camera that stands aside, a rolling shutter, uneven light,
+        marks glued off their places, frames dropped, and so on; by default nothing.
     seed : int
         Seed of the noise. The same call gives the same film.
     progress : bool
@@ -146,9 +167,16 @@ def render(
     target = checked_path(path)
     t, _ = checked(trajectory)
     radius = float(getattr(getattr(trajectory, "model", None), "R", 0.08))
+    defects = Defects() if defects is None else defects
     camera = make_camera(radius, size=size, fps=fps, exposure=exposure, scale=scale, pivot=pivot, tilt=tilt)
     _check_rest(support, noise, quality, seed)
+    if codec not in CODECS:
+        raise UddError(f"codec must be one of {', '.join(CODECS)}, got {codec!r}")
+    if codec == "mp4v" and defects.dropped:
+        raise UddError("codec mp4v has frames at even times; use another one for a film with dropped frames")
     motion = motion_of(trajectory)
+    if defects.after:
+        motion = then_falling(motion, float(t[-1]))
     error = spacing_error(trajectory, radius) * camera.scale
     if error > _COARSE:
         raise UddError(
@@ -156,33 +184,51 @@ def render(
             f"a mark would be off by about {error:.2g} pixels; "
             "simulate more times (200 per second are plenty) or with dense=True"
         )
-    times = frame_times(t, camera)
-    scene = Scene(camera, radius, _background(background, camera, radius), support)
+    stamps = frame_times(t, camera, defects.after)
+    numbers = np.setdiff1d(np.arange(len(stamps)), np.asarray(defects.dropped, dtype=int))
+    wall = _background(background, camera, radius)
+    if defects.clutter:
+        wall = hung(wall, camera, defects.clutter, radius / 0.08)
+    scene = Scene(camera, radius, wall, support, defects)
     write_film(
         target,
-        _frames(scene, motion, t[0] + times, Noise(noise, seed), progress),
+        _frames(scene, motion, t[0] + stamps, numbers, defects, Noise(noise, seed), progress),
         camera.size,
         camera.rate,
         quality,
+        codec,
+        numbers.tolist(),
     )
-    return Film(target, times, motion(t[0] + times), camera.size, camera.scale, camera.pivot, radius)
+    times = stamps[numbers]
+    held = times + t[0] <= t[-1]
+    state = motion(t[0] + times)
+    return Film(target, times, state, held, camera.size, camera.scale, camera.pivot, radius)
 
 
-def frame_times(t: Array, camera: Camera) -> Array:
+def frame_times(t: Array, camera: Camera, after: float = 0.0) -> Array:
     """Stamp the frames that fit, k / fps; what is missing by rounding alone does not count."""
-    n = math.floor((t[-1] - t[0] - camera.exposure / 2) * camera.rate + 1e-6) + 1
+    n = math.floor((t[-1] + after - t[0] - camera.exposure / 2) * camera.rate + 1e-6) + 1
     if n < 1:
         raise UddError(f"the trajectory lasts {t[-1] - t[0]:.3g} s, which is shorter than one exposure")
     return np.arange(n) / float(camera.rate)
 
 
 def _frames(
-    scene: Scene, motion: Motion, times: Array, noise: Noise, progress: bool
+    scene: Scene,
+    motion: Motion,
+    times: Array,
+    numbers: NDArray[np.intp],
+    defects: Defects,
+    noise: Noise,
+    progress: bool,
 ) -> Iterator[NDArray[np.uint8]]:
     from tqdm import tqdm
 
-    for time in tqdm(times, desc="film", unit="frame", disable=not progress):
-        yield noise.on(scene.expose(motion, float(time)))
+    last: NDArray[np.uint8] | None = None
+    for number in tqdm(numbers.tolist(), desc="film", unit="frame", disable=not progress):
+        if number not in defects.repeated or last is None:
+            last = noise.on(scene.expose(motion, float(times[number])))
+        yield np.zeros_like(last) if number in defects.black else last
 
 
 def _background(background: ArrayLike | None, camera: Camera, radius: float) -> Picture:

@@ -49,21 +49,22 @@ def back_shapes(unit: float) -> list[Shape]:
     return [(corners * unit, colour) for corners, colour in shapes]
 
 
-def front_shapes(unit: float, width: float) -> list[Shape]:
+def front_shapes(unit: float, width: float, bars: int = 0) -> list[Shape]:
     """Build the support before the disk: base, pillar with its row of holes, axle and support wheel.
 
-    `width` is relative to the real support's 26 mm; 0 leaves all of it away.
+    `width` is relative to the real support's 26 mm; 0 leaves all of it away. `bars` cross it lower down.
     """
     if width == 0:
         return []
     half = 0.013 * width
+    crossing = [box(-0.0475, z - 0.0045, 0.0475, z + 0.0045, BLACK) for z in -0.055 * (1 + np.arange(bars))]
     shapes = [box(-0.092, -0.191, 0.092, -0.177, BLACK), box(-half, -0.181, half, 0.007, BLACK)]
     shapes += [box(side * half - 0.0006, -0.178, side * half + 0.0006, 0.007, EDGE) for side in (-1, 1)]
     shapes += [dot(0.0, -0.024 - 0.008 * i, 0.0023, HOLE) for i in range(20)]
     shapes += [box(-0.013 - half, -0.0028, 0.013 + half, 0.0028, METAL)]
     shapes += [box(-0.0065, -0.020, 0.0065, 0.020, RUBBER)]
     shapes += [box(-0.0065, z, 0.0065, z + 0.0011, TREAD) for z in np.arange(-0.0185, 0.019, 0.0035)]
-    return [(corners * unit, colour) for corners, colour in shapes]
+    return [(corners * unit, colour) for corners, colour in [*crossing, *shapes]]
 
 
 def paint(shapes: Sequence[Shape], camera: Camera, focus: float) -> Picture:

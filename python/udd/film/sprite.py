@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,16 @@ MARKS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
 MARK_CENTRE, MARK_SIDE = 65 / 80, 16 / 80
 
 
-def disk_sprite(radius: float, focus: float) -> Picture:
+def disk_sprite(
+    radius: float,
+    focus: float,
+    offsets: NDArray[np.float64] | None = None,
+    strength: Sequence[float] = (1.0,) * 4,
+) -> Picture:
     """Draw the disk of `radius` picture pixels, (n, n, 4): light times cover in red, green, blue, and cover.
+
+    The marks are `offsets` (4, 2) picture pixels off their places, clockwise and outward, and their colours
+    are mixed with the disk's by `strength`.
 
     n is odd, so the disk's centre lies on the middle pixel. Edges are drawn from the exact distance to them,
     then blurred by `focus` (picture pixels), so that no place and no angle is favoured.
@@ -33,10 +42,13 @@ def disk_sprite(radius: float, focus: float) -> Picture:
     light = np.broadcast_to(to_light(DISK), (v.size, v.size, 3)).astype(np.float64)
     for quarter, colour in enumerate(MARKS):
         angle = quarter * math.pi / 2
-        mark = _band(x, MARK_CENTRE * r * round(math.sin(angle)), MARK_SIDE * r) * _band(
-            y, -MARK_CENTRE * r * round(math.cos(angle)), MARK_SIDE * r
+        aside, out = (0.0, 0.0) if offsets is None else (float(v) * FINE for v in offsets[quarter])
+        sine, cosine = round(math.sin(angle)), round(math.cos(angle))
+        away = MARK_CENTRE * r + out
+        mark = _band(x, away * sine + aside * cosine, MARK_SIDE * r) * _band(
+            y, -away * cosine + aside * sine, MARK_SIDE * r
         )
-        light += mark[..., None] * (to_light(colour) - light)
+        light += float(strength[quarter]) * mark[..., None] * (to_light(colour) - light)
     sprite = np.concatenate([light * disk[..., None], disk[..., None]], axis=-1).astype(np.float32)
     return blurred(sprite, focus * FINE)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .fit import extend, fit, fit_record, refit
+from .fit import extend, fit, fit_record, refit, widened
 from .problem import Fit, data_of
 from .record import Record, record_of
 from .solve import at_level, filtered, frame_costs, held, loosened, predicted
@@ -22,4 +22,5 @@ __all__ = [
     "predicted",
     "record_of",
     "refit",
+    "widened",
 ]

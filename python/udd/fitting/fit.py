@@ -136,7 +136,20 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
     return models
 
 
-def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float] | None) -> Fit:
+def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) -> tuple[Problem, Point]:
+    """The problem of a fit with more effects, held as they are, and where that fit ended.
+
+    Or where another fit of the same data ended.
+    """
+    models = tuple(own.with_effects((*own.effects, *effects)) for own in fitted.models)
+    known = len(fitted.model.parameters)
+    more = [value for effect in effects for value in effect.values]
+    end = (start or fitted).point
+    sets = tuple(([*values[:known], *more], camera, clock) for values, camera, clock in end.sets)
+    return replace(fitted.problem, models=models), Point(end.states, sets)
+
+
+def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
     The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
@@ -147,26 +160,21 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float] |
     fitted : Fit
     effects : sequence of Effect
         The effects to add.
-    amplitudes : sequence of float or None
-        Where their amplitudes start, in order; None to hold the effects as they are.
+    amplitudes : sequence of float
+        Where their amplitudes start, in order.
     """
-    names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes] if amplitudes is not None else []
+    left = list(amplitudes)
+    effects = [e.replace(**{p: left.pop(0) for p in e.amplitudes}) for e in effects]
+    problem, point = widened(fitted, effects)
+    order = list(problem.models[0].parameters)
+    names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
     line = 0.5 / float(np.ptp(fitted.record.t))
     scanned = [(e, p.name) for e in effects for p in e.spec.parameters if p.role == "frequency"]
     waves = [(f"{e.name}.{name}", e.parameters[name]) for e, name in scanned]
-    starts = dict(zip(names, amplitudes or (), strict=True))
-    models = tuple(
-        own.with_effects((*own.effects, *effects)).with_parameters(starts) for own in fitted.models
-    )
-    order = list(models[0].parameters)
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
-    problem = replace(fitted.problem, models=models, free=fitted.problem.free + more)
-    sets = tuple(
-        (list(own.parameters.values()), camera, clock)
-        for own, (_model, camera, clock) in zip(models, fitted.point.sets, strict=True)
-    )
-    return tighten(fitted.measurements, problem, Point(fitted.states, sets), problem.schedule[1:])
+    problem = replace(problem, free=problem.free + more)
+    return tighten(fitted.measurements, problem, point, problem.schedule[1:])
 
 
 def refit(fitted: Fit) -> Fit:
@@ -211,17 +219,14 @@ def _estimate_noise(
     for _ in range(_NOISE_ROUNDS):
         result = solve(measurements, problem, point)
         point, before = result.point, problem.noise
-        omega = point.states[:, 0]
-        if isinstance(problem.models[0], OwnModel):
-            omega = np.zeros(len(omega))  # a user's state need not be a speed that blurs
         if result.leverage > FOLLOWS:
             return False, problem, point
-        noise = estimated(problem.record, omega, result.misfit, result.misfit_variance, before)
-        if measurements[0].sigma is not None and noise.beyond(problem.record, omega, _BELIEVED):
+        noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
+        if measurements[0].sigma is not None and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return False, problem, point
         if not problem.likeliest and measurements[0].sigma is None and measurements[0].kind in _FAITHFUL:
             noise = replace(noise, factor=np.maximum(noise.factor, _FAITHFUL[measurements[0].kind]))
         problem = replace(problem, noise=noise)
-        if before.like(noise, problem.record, omega):
+        if before.like(noise, problem.record, result.blurring):
             break
     return True, problem, point

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 #: A frame farther out than this share of honest frames counts less (Huber).
 _HONEST = 0.99
+#: Standard errors by which an autocorrelation is no chance, and from where on it is motion.
+_SURE, _MOTION = 4.0, 0.8
 #: Frequencies over which the misfits' power is averaged.
 _BAND = 17
 
@@ -43,6 +45,10 @@ class Noise:
     blur: Array
     weight: Array
     memory: Array
+
+    def everywhere(self, frames: int) -> Noise:
+        """The same noise in another record, in which no frame is odd."""
+        return replace(self, weight=np.ones(frames))
 
     def sd(self, record: Record, omega: Array) -> Array:
         """Standard deviation of every frame and channel, (n, m)."""
@@ -119,6 +125,31 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
         factor[m], blur[m] = np.sqrt(share / scale)
         factor[m] = max(factor[m], 1e-3 * np.sqrt(power.mean() / (record.sigma[use, m] ** 2).mean()))
     return Noise(factor, blur, weight, before.memory)
+
+
+def remembered(record: Record, misfit: Array, sd: Array, weight: Array) -> Array:
+    """How much of the noise the misfits remember from frame to frame, per channel.
+
+    None where chance explains it, and none where it would last for many frames: that is motion, which the
+    model lacks.
+
+    Parameters
+    ----------
+    record : Record
+    misfit, sd : ndarray (n, m)
+        Misfits of a model that is held tightly, and the noise's standard deviation.
+    weight : ndarray (n,)
+        Frames that are farther out than honest ones say nothing.
+    """
+    scaled = np.where(np.isfinite(misfit), misfit, 0.0) / np.where(np.isfinite(sd), sd, np.inf)
+    there = record.observed & (weight == 1.0)[:, None]
+    scaled = np.where(there, scaled, 0.0)
+    pairs = there[1:] & there[:-1] & record.linked[:, None]
+    power = (scaled**2).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    count = np.maximum(pairs.sum(axis=0), 1)
+    rho = (scaled[1:] * scaled[:-1] * pairs).sum(axis=0) / count / np.maximum(power, 1e-300)
+    result: Array = np.where((rho > _SURE / np.sqrt(count)) & (rho < _MOTION), rho, 0.0)
+    return result
 
 
 def _distance(record: Record, misfit: Array, sd: Array) -> Array:

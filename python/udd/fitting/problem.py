@@ -28,6 +28,7 @@ SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
         (3e-3, 1e-5, 1e-5, 1e-4),
         (1e-3, 3e-6, 3e-6, 3e-5),
         (3e-4, 1e-6, 1e-6, 1e-5),
+        (1e-4, 3e-7, 3e-7, 3e-6),
     ),
     "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5), (1e-4, 3e-6), (1e-5, 3e-7)),
 }
@@ -176,6 +177,12 @@ class Fit:
         return self.model.state_names if self.model.kind == "own" else self.measurement.names
 
     @property
+    def blurring(self) -> Array:
+        """The angular speed that noise may grow with, rad/s; a user's state need not be one."""
+        omega = self.states[:, 0]
+        return np.zeros(len(omega)) if self.model.kind == "own" else omega
+
+    @property
     def residuals(self) -> Array:
         """What was seen less what was fitted, for every row of the measurement; NaN where not seen.
 
@@ -222,8 +229,10 @@ class Fit:
             "dof": self.dof,
             "converged": self.converged,
             "noise": {
-                name: {"factor": float(f), "per_rad_per_s": float(b)}
-                for name, f, b in zip(self.channels, self.noise.factor, self.noise.blur, strict=True)
+                name: {"factor": float(f), "per_rad_per_s": float(b), "memory": float(m)}
+                for name, f, b, m in zip(
+                    self.channels, self.noise.factor, self.noise.blur, self.noise.memory, strict=True
+                )
             },
         }
 

@@ -13,13 +13,17 @@ from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model
 
+from .noise import estimated, remembered
 from .problem import Fit, Point, Problem, Values, data_of
 from .record import Record
 
 Array = NDArray[np.float64]
 
 _STEPS = 30  # a right model converges in three to seven, but for kinks of its law
-_LESS = 3.0  # nats by which the evidence may fall when the model is held more tightly
+#: Nats by which the evidence may fall when the model is held more tightly.
+LESS = 3.0
+_LOOSE = 0.3  # leverage from which on misfits are not the noise
+_SAME = 0.03  # autocorrelations that differ by less need no other fit
 
 
 def solve(measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = 40) -> Fit:
@@ -113,7 +117,7 @@ def filtered(
 
     All parameters are a fit's.
     """
-    data = data_of(record, replace(fitted.noise, weight=np.ones(len(record.t))), record.states[:, 0])
+    data = data_of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
     pairs = [(int(a), int(b)) for a, b in windows]
     return _core.filter(fitted.model, data, (record.states, list(fitted.point.sets)), list(diffusion), pairs)
 
@@ -132,14 +136,35 @@ def tighten(
     for diffusion in schedule:
         problem = replace(problem, diffusion=diffusion)
         result = solve(measurements, problem, point, _STEPS)
+        if problem.likeliest:
+            result = remembering(result)
         if best is not None and not result.converged:
             break
-        if best is not None and problem.likeliest and result.evidence < best.evidence - _LESS:
+        if best is not None and problem.likeliest and result.evidence < best.evidence - LESS:
             break
         best, point = result, result.point
+        problem = replace(problem, noise=result.noise)
     if best is None:
         raise FitError("the fit has no level to solve at")
     return best
+
+
+def remembering(fitted: Fit) -> Fit:
+    """The same with noise that remembers itself, where the record makes that likelier.
+
+    Frames whose noise goes together are worth less than independent ones: without this the model would be
+    held too loosely, to follow the noise, and standard errors would be too small.
+    """
+    if fitted.leverage > _LOOSE:
+        return fitted
+    sd = fitted.noise.sd(fitted.record, fitted.blurring)
+    memory = remembered(fitted.record, fitted.misfit, sd, fitted.noise.weight)
+    if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
+        return fitted
+    noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
+    problem = replace(fitted.problem, noise=replace(noise, memory=memory))
+    result = solve(fitted.measurements, problem, fitted.point, _STEPS)
+    return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
 
 
 def loosened(fitted: Fit, scatter: float) -> Fit:
@@ -170,7 +195,7 @@ def held(fitted: Fit, record: Record, level: int) -> Fit:
     A wrong model may not get that far: the level of the result says how far it got.
     """
     problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
-    problem = replace(problem, noise=replace(fitted.noise, weight=np.ones(len(record.t))))
+    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
     start = replace(fitted.point, states=record.states)
     return tighten(fitted.measurements, problem, start, problem.schedule[: level + 1])
 

@@ -42,7 +42,8 @@ def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
     coordinate = coordinate or ("Z" if "Z" in names else names[0])
     if coordinate not in names:
         raise UddError(f"the forecast has {', '.join(names)}, not {coordinate}")
-    k, factor = names.index(coordinate), scale(coordinate)
+    of_own = result.measurement.kind == "own"  # its states may be called as the disk's are
+    k, factor = names.index(coordinate), 1.0 if of_own else scale(coordinate)
     ax = new_axes(ax)
     t = result.t
     for number, member in enumerate(result.members[:_MEMBERS, :, k]):
@@ -66,8 +67,8 @@ def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
     ax.axvline(t[0], color="black", linewidth=0.8)
     if np.isfinite(result.valid_time):
         ax.axvline(t[0] + result.valid_time, color="black", linestyle="--", linewidth=1, label="valid until")
-    ax.set_xlabel(label("t"))
-    ax.set_ylabel(label(coordinate))
+    ax.set_xlabel("t" if of_own else label("t"))
+    ax.set_ylabel(coordinate if of_own else label(coordinate))
     ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=5)
     tidy(ax)
     return ax

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd.energy import angular_momentum
 from udd.errors import UddError
 
 from .inputs import STATES, Motion, motions, only
@@ -157,9 +158,9 @@ def phase_space(result: Any, ax: Axes | None = None) -> Axes:
     if motion.kind == "disk":
         if motion.model is None:
             raise UddError("J needs the model's W and R: the trajectory has no model")
-        y, z, omega = motion["Y"], motion["Z"], motion["Omega"]
-        inertia = motion.model.R**2 / 2 + y**2 + z**2
-        coordinates = {"J": inertia * omega - motion.model.W * y, "Y": y, "Z": z}
+        y, z = motion["Y"], motion["Z"]
+        state = np.stack([motion["Omega"], y, z], axis=-1)
+        coordinates = {"J": angular_momentum(motion.model, state), "Y": y, "Z": z}
     else:
         coordinates = {name: motion[name] for name in ("omega", "y", "z")}
     space: Any = new_axes(ax, projection="3d")

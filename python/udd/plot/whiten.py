@@ -63,7 +63,8 @@ def whiteness(
         ax.axhline(0, color="black", linewidth=0.8)
     ax.plot(lag, rho[:, k], color=colour, marker=".", markersize=5, linewidth=1.2, label=name)
     ax.set_xlabel("lag [s]")
-    ax.set_ylabel(f"autocorrelation of {CHANNELS[channel][0]} [1]")
+    title = CHANNELS[channel][0] if channel in CHANNELS else channel
+    ax.set_ylabel(f"autocorrelation of {title} [1]")
     tidy(ax)
     return ax
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,22 +15,13 @@ from udd.plot.inputs import first_film
 from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
 from . import movie, runs
+from .images import Image, blank, embedded, png, svg
 from .loose import loosest
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    pass
 
 _FRAMES = 4  # of the film
-
-
-@dataclass(frozen=True)
-class Image:
-    """A picture with what it shows in words, and its width on the page in pixels."""
-
-    uri: str
-    alt: str
-    width: int
 
 
 def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[Any]) -> dict[str, Any]:
@@ -65,7 +54,7 @@ def orbits(discovery: Any) -> Image:
     if discovery.effects:
         runs_shown.append(("with the added effect", discovery.fit, AFTER))
     n = 1 + len(runs_shown)
-    figure, grid = _figure(3.5 * n, 3.8, columns=n, top=0.55, shared=True)
+    figure, grid = blank(3.5 * n, 3.8, columns=n, top=0.55, shared=True)
     axes = grid[0]
     pendulum = discovery.measurement.kind == "pendulum"
     if not pendulum:
@@ -86,7 +75,7 @@ def orbits(discovery: Any) -> Image:
     for ax in axes[1:]:
         ax.set_ylabel("")
         ax.tick_params(labelleft=False)
-    return _png(
+    return png(
         figure,
         "The path of the disk's centre as measured, and free runs of the fitted models for the same time",
     )
@@ -97,7 +86,7 @@ def forecast(discovery: Any) -> Image:
     found = runs.forecast(discovery)
     name = "Z" if discovery.measurement.kind == "disk" else "theta"
     k = discovery.measurement.names.index(name)
-    figure, ((ax,),) = _figure(9.0, 3.2, top=0.4)
+    figure, ((ax,),) = blank(9.0, 3.2, top=0.4)
     ax.plot(found.t_seen, scale(name) * found.seen[:, k], ".", color=MEASURED, markersize=5, label="measured")
     ax.plot(found.t, scale(name) * found.before[:, k], color=BEFORE, linewidth=1.5, label="the known model")
     if discovery.effects:
@@ -114,7 +103,7 @@ def forecast(discovery: Any) -> Image:
     ax.set_ylabel(label(name))
     ax.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     tidy(ax)
-    return _svg(
+    return svg(
         figure, f"{name} over time: measured, and free runs of the models from the moment they are let go"
     )
 
@@ -122,16 +111,16 @@ def forecast(discovery: Any) -> Image:
 def residual_map(loose: list[Any]) -> Image:
     """What each equation leaves over along each coordinate, before and after."""
     rows = len(loose[0].model.state_names)
-    figure, ((ax,),) = _figure(9.4, 0.95 * rows + 0.55, left=1.05, bottom=0.5, top=0.05)
+    figure, ((ax,),) = blank(9.4, 0.95 * rows + 0.55, left=1.05, bottom=0.5, top=0.05)
     plot.residual_map(loose[-1], ax, before=loose[0] if len(loose) > 1 else None)
-    return _svg(figure, "Mean residual of every equation along every coordinate, with bands of two errors")
+    return svg(figure, "Mean residual of every equation along every coordinate, with bands of two errors")
 
 
 def residuals(loose: list[Any]) -> Image:
     """The clearest of these patterns frame by frame, before and after."""
     columns = list(zip(("the known model", "with the added effect"), loose, (BEFORE, AFTER), strict=False))
     equation, against = fits.clearest(loose[0])
-    figure, grid = _figure(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.9, columns=len(columns))
+    figure, grid = blank(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.9, columns=len(columns))
     spread = []
     k = loose[0].model.state_names.index(equation)
     for ax, (words, fit, colour) in zip(grid[0], columns, strict=True):
@@ -145,57 +134,56 @@ def residuals(loose: list[Any]) -> Image:
     for ax in grid[0][1:]:
         ax.set_ylabel("")
         ax.tick_params(labelleft=False)
-    return _png(figure, "The residual of one equation, frame by frame, along one coordinate")
+    return png(figure, "The residual of one equation, frame by frame, along one coordinate")
 
 
 def curve(found: Any) -> Image:
     """A curve that was located without a formula."""
-    figure, ((ax,),) = _figure(6.4, 3.4, top=0.45)
+    figure, ((ax,),) = blank(6.4, 3.4, top=0.45)
     plot.curve(found, ax)
-    return _svg(figure, f"{found.title}, with its band")
+    return svg(figure, f"{found.title}, with its band")
 
 
 def evidence(discovery: Any, stage: int) -> Image:
     """The evidence for each candidate at one stage of the search."""
     scan = [s for s in discovery.scans[stage] if not s.absorbed][:12]
     longest = max((len(s.candidate.title) for s in scan), default=10)
-    figure, ((ax,),) = _figure(9.0, 1.2 + 0.28 * len(scan), left=0.4 + 0.072 * longest, top=0.55)
+    figure, ((ax,),) = blank(9.0, 1.2 + 0.28 * len(scan), left=0.4 + 0.072 * longest, top=0.55)
     plot.evidence(discovery, ax, stage=stage)
     ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
-    return _svg(figure, "Bars: the evidence for each candidate effect; dashed: what chance hardly reaches")
+    return svg(figure, "Bars: the evidence for each candidate effect; dashed: what chance hardly reaches")
 
 
 def errors(discovery: Any) -> Image:
     """Held-out errors against the horizon."""
-    figure, ((ax,),) = _figure(6.4, 3.8, top=0.4)
+    figure, ((ax,),) = blank(6.4, 3.8, top=0.4)
     plot.errors(discovery, ax)
-    return _svg(figure, "Median error on held-out data against the time since the model was let go")
+    return svg(figure, "Median error on held-out data against the time since the model was let go")
 
 
 def whiteness(found: list[Any]) -> Image:
     """Autocorrelation of the innovations, before and after."""
     names = found[0].names
-    figure, grid = _figure(
-        3.1 * len(names) + (0 if len(names) > 1 else 4.0), 2.7, columns=len(names), top=0.4
-    )
+    figure, grid = blank(3.1 * len(names) + (0 if len(names) > 1 else 4.0), 2.7, columns=len(names), top=0.4)
     said = (("the known model", BEFORE), ("with the added effect", AFTER))
     for ax, name in zip(grid[0], names, strict=True):
         for each, (words, colour) in zip(found, said, strict=False):
             plot.whiteness(each, ax, channel=name, colour=colour, name=words)
-        ax.text(0.95, 0.95, CHANNELS[name][0], ha="right", va="top", transform=ax.transAxes)
+        title = CHANNELS[name][0] if name in CHANNELS else name
+        ax.text(0.95, 0.95, title, ha="right", va="top", transform=ax.transAxes)
         ax.set_ylabel("autocorrelation" if ax is grid[0][0] else "")
         low = min(float(np.min(line.get_ydata())) for line in ax.lines)
         ax.set_ylim(-0.5 if low > -0.5 else -1.0, 1.0)
         ax.tick_params(labelleft=ax is grid[0][0])
     grid[0][0].legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
-    return _svg(figure, "Autocorrelation of the innovations against the lag, with the band of white noise")
+    return svg(figure, "Autocorrelation of the innovations against the lag, with the band of white noise")
 
 
 def friction(fit: Any) -> Image:
     """The friction that was found."""
-    figure, ((ax,),) = _figure(6.4, 3.2)
+    figure, ((ax,),) = blank(6.4, 3.2)
     plot.friction(fit, ax)
-    return _svg(
+    return svg(
         figure, "The fitted friction coefficient against the angular velocity, with its standard error"
     )
 
@@ -203,7 +191,7 @@ def friction(fit: Any) -> Image:
 def misfits(fit: Any) -> Image:
     """What was seen less what was fitted, per channel."""
     names = fit.measurement.names
-    figure, grid = _figure(9.0, 1.55 * len(names) + 0.7, rows=len(names))
+    figure, grid = blank(9.0, 1.55 * len(names) + 0.7, rows=len(names))
     for (ax,), name in zip(grid, names, strict=True):
         plot.misfit(fit, ax, channel=name)
         ax.set_ylabel("{} [{}]".format(*CHANNELS[name][:2]))
@@ -213,7 +201,7 @@ def misfits(fit: Any) -> Image:
         legend = ax.get_legend()
         if ax is not grid[0][0] and legend is not None:
             legend.remove()
-    return _png(figure, "Measured less fitted, over time, with a band for the noise that was found")
+    return png(figure, "Measured less fitted, over time, with a band for the noise that was found")
 
 
 def frames(discovery: Any, film: str | os.PathLike[str]) -> Image:
@@ -225,13 +213,13 @@ def frames(discovery: Any, film: str | os.PathLike[str]) -> Image:
     rows = np.flatnonzero(m.seen & (m.t >= discovery.split))
     chosen = rows[np.unique(np.linspace(0, min(len(rows) - 1, 60), _FRAMES).astype(int))]
     geometry = pixels(_fitted(discovery.fit))
-    figure, grid = _figure(2.6 * _FRAMES, 2.9, columns=_FRAMES, left=0.05, bottom=0.05, between=0.1)
+    figure, grid = blank(2.6 * _FRAMES, 2.9, columns=_FRAMES, left=0.05, bottom=0.05, between=0.1)
     for ax, picture, row in zip(grid[0], pictures_between(film, m.t[chosen]), chosen, strict=False):
         plot.overlay(picture, geometry, int(row), ax)
         _look_at(geometry, picture.shape, ax)
         ax.set_axis_off()
         ax.set_title(f"T = {m.t[row]:.2f} s", fontsize="medium")
-    return _embedded(figure, "jpeg", "Frames of the film with the fitted disk drawn over them", dpi=130)
+    return embedded(figure, "jpeg", "Frames of the film with the fitted disk drawn over them", dpi=130)
 
 
 def _look_at(geometry: Any, shape: tuple[int, ...], ax: Any) -> None:
@@ -248,53 +236,3 @@ def _fitted(fit: Any) -> Measurement:
     return Measurement(
         measurement.t, measurement.values - rest, meta=measurement.meta, names=measurement.names
     )
-
-
-def _figure(
-    width: float,
-    height: float,
-    *,
-    rows: int = 1,
-    columns: int = 1,
-    left: float = 0.85,
-    bottom: float = 0.6,
-    top: float = 0.3,
-    between: float = 0.25,
-    shared: bool = False,
-) -> tuple[Figure, list[list[Axes]]]:
-    """A figure and its Axes, row by row, with margins in inches: a layout engine takes half of the time."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height))
-    grid = figure.subplots(rows, columns, squeeze=False, sharex=shared or "col", sharey=shared or "row")
-    figure.subplots_adjust(
-        left=left / width,
-        right=1 - 0.1 / width,
-        bottom=bottom / height,
-        top=1 - top / height,
-        wspace=between * columns / max(width - left, 1.0),
-        hspace=between * rows / max(height - bottom, 1.0),
-    )
-    return figure, grid.tolist()
-
-
-def _svg(figure: Figure, alt: str) -> Image:
-    return _embedded(figure, "svg", alt, dpi=150)
-
-
-def _png(figure: Figure, alt: str) -> Image:
-    """For thousands of dots."""
-    return _embedded(figure, "png", alt, dpi=170)
-
-
-def _embedded(figure: Figure, kind: str, alt: str, dpi: int) -> Image:
-    import matplotlib as mpl
-
-    buffer = io.BytesIO()
-    metadata = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}.get(kind)
-    # Without the salt, and with the date, the same result would give another file every time.
-    with mpl.rc_context({"svg.hashsalt": "udd"}):
-        figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
-    mime = "image/svg+xml" if kind == "svg" else f"image/{kind}"
-    uri = f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode()}"
-    return Image(uri, alt, round(96 * figure.get_figwidth()))

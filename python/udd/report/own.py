@@ -10,17 +10,19 @@ import numpy as np
 from udd.plot.style import AFTER, BEFORE, MEASURED, tidy
 
 from . import figures, words
+from .images import Image, blank, png, svg
 from .runs import side_by_side
 
 _SHOWN = 8.0  # longest horizons of the held-out errors that the free runs are shown for
 
 
-def draw(discovery: Any) -> dict[str, Any]:
+def draw(discovery: Any, innovations: list[Any]) -> dict[str, Any]:
     """The pictures by name."""
     return {
         "forecast": _free_runs(discovery),
         "errors": figures.errors(discovery),
         "misfit": _misfits(discovery.fit),
+        "whiteness": figures.whiteness(innovations),
         "evidence": [figures.evidence(discovery, stage) for stage in range(len(discovery.scans))],
         "curves": [figures.curve(f.curve) for f in discovery.effects if words.is_curve(f.effect)],
     }
@@ -55,10 +57,10 @@ def measured(discovery: Any) -> str:
     return f"{what}; noise as the record shows it: {noise}.{rest}"
 
 
-def _free_runs(discovery: Any) -> figures.Image:
+def _free_runs(discovery: Any) -> Image:
     names = [name for name in discovery.fit.channels if name in discovery.measurement.names]
     t, seen, found = side_by_side(discovery, _SHOWN * discovery.error_before.horizons[-1])
-    figure, grid = figures._figure(9.0, 1.7 * len(names) + 0.9, rows=len(names), top=0.4)
+    figure, grid = blank(9.0, 1.7 * len(names) + 0.9, rows=len(names), top=0.4)
     said = (("the known model", BEFORE), ("with what was added", AFTER))
     for (ax,), name in zip(grid, names, strict=True):
         k = discovery.fit.channels.index(name)
@@ -71,12 +73,12 @@ def _free_runs(discovery: Any) -> figures.Image:
         tidy(ax)
     grid[-1][0].set_xlabel("t")
     grid[0][0].legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    return figures._svg(figure, "The states over time: measured, and free runs of the models")
+    return svg(figure, "The states over time: measured, and free runs of the models")
 
 
-def _misfits(fit: Any) -> figures.Image:
+def _misfits(fit: Any) -> Image:
     names = [name for name in fit.channels if name in fit.measurement.names]
-    figure, grid = figures._figure(9.0, 1.5 * len(names) + 0.7, rows=len(names))
+    figure, grid = blank(9.0, 1.5 * len(names) + 0.7, rows=len(names))
     sd = fit.noise.sd(fit.record, fit.states[:, 0])
     for (ax,), name in zip(grid, names, strict=True):
         k = fit.channels.index(name)
@@ -86,4 +88,4 @@ def _misfits(fit: Any) -> figures.Image:
         ax.set_ylabel(name)
         tidy(ax)
     grid[-1][0].set_xlabel("t")
-    return figures._png(figure, "Measured less fitted, with a band for the noise that was found")
+    return png(figure, "Measured less fitted, with a band for the noise that was found")

@@ -61,14 +61,14 @@ def write(
     if of_own and film is not None:
         raise UddError("a film shows a disk, not a model of your own")
     fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]
-    surprises = [] if of_own else [innovations(fit) for fit in fits]
+    surprises = [innovations(fit) for fit in fits]
     page = environment.get_template("own.html" if of_own else "page.html").render(
         d=discovery,
         style=environment.loader.get_source(environment, "page.css")[0] if environment.loader else "",
         words=words,
         tables=tables,
         own=own,
-        pictures=own.draw(discovery) if of_own else figures.draw(discovery, film, surprises),
+        pictures=own.draw(discovery, surprises) if of_own else figures.draw(discovery, film, surprises),
         innovations=surprises,
         numbers=words.headline(discovery),
         command=command or words.command(discovery, None if origin is None else Path(origin).name),

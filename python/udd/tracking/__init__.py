@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from .decode import Film, TrackError
+from .glimpse import Glimpse
 from .result import Pixels, pixels
 from .run import Tracking, pictures_at, pictures_between, track, track_in_detail
 
 __all__ = [
     "Film",
+    "Glimpse",
     "Pixels",
     "TrackError",
     "Tracking",

@@ -88,19 +88,21 @@ def _rim(
     clear = cv2.remap(view.astype(np.uint8), map_u, map_v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
     fall = profile[:, :-4] - profile[:, 4:]
     k = np.argmax(fall, axis=1) + 2
-    out = np.full(len(rays), np.nan)
     n = int(SMEAR / step)
-    for i, j in enumerate(k):
-        if j < 2 * n + 2 or j > len(radii) - 2 * n - 3 or not clear[i, j - 2 * n : j + 2 * n].all():
-            continue
-        inner = float(np.median(profile[i, j - 2 * n : j - n]))
-        outer = float(np.median(profile[i, j + n : j + 2 * n]))
-        if inner - outer < 25:
-            continue
-        part = profile[i, j - n : j + n + 1]
-        below = np.flatnonzero(part < (inner + outer) / 2)
-        if len(below) and below[0] > 0:
-            b = int(below[0])
-            fraction = (part[b - 1] - (inner + outer) / 2) / (part[b - 1] - part[b])
-            out[i] = radii[j - n + b - 1] + step * fraction
+    out = np.full(len(rays), np.nan)
+    rows = np.flatnonzero((k >= 2 * n + 2) & (k <= len(radii) - 2 * n - 3))
+    if not len(rows):
+        return out
+    # profile and view about each ray's steepest fall
+    near = rows[:, None], k[rows, None] + np.arange(-2 * n, 2 * n)[None, :]
+    part, open_ = profile[near], clear[near].all(axis=1)
+    inner, outer = np.median(part[:, :n], axis=1), np.median(part[:, 3 * n :], axis=1)
+    half = (inner + outer) / 2
+    below = part[:, n : 3 * n + 1] < half[:, None]
+    first = np.argmax(below, axis=1)
+    good = open_ & (inner - outer >= 25) & below.any(axis=1) & (first > 0)
+    at = n + first[good]
+    before, after = part[good, at - 1], part[good, at]
+    fraction = (before - half[good]) / (before - after)
+    out[rows[good]] = radii[k[rows[good]] - 2 * n + at - 1] + step * fraction
     return out

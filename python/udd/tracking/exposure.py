@@ -13,7 +13,7 @@ from .pose import align
 from .survey import Moving
 
 SHARES = np.linspace(0.0, 1.0, 9)  # of the frame interval
-FASTEST = 18
+FASTEST = 12
 WORSE = 5.0  # times the least misfit
 STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
 
@@ -49,10 +49,9 @@ def _misfit(m: Moving, share: float, look: Look, view: NDArray[np.bool_]) -> flo
     if align(picture.y, view, look, pose, motion, [1.0, 0.5, MISFIT], gain_slack=0.3) is None:
         return np.inf
     total = 0.0
-    for mark in look.marks:
-        place = pose.centre + mark.place * np.exp(1j * pose.angle)
-        local = look.lens.local(place)
-        middle = local.back(place)
+    at = pose.centre + look.places * np.exp(1j * pose.angle)
+    for mark, local, point in zip(look.marks, look.lens.locals(at), look.lens.picture(at), strict=True):
+        middle = complex(point)
         reach = np.hypot(*mark.half) + 0.3 * (abs(whole.shift) + abs(whole.turn * mark.place)) + 4
         r0, r1 = max(0, int(middle.imag - reach)), min(view.shape[0], int(middle.imag + reach))
         c0, c1 = max(0, int(middle.real - reach)), min(view.shape[1], int(middle.real + reach))

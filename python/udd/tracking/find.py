@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ COLOURS = ("red", "orange", "blue", "green")  # clockwise on the disk
 HUES = {"red": (80.0, 122.0), "orange": (122.0, 165.0), "blue": (-70.0, 15.0), "green": (195.0, 285.0)}
 BODY = np.array([-1j, 1, 1j, -1])  # directions of the marks in the body frame; picture points are u + iv
 LEAST_CHROMA = 18.0  # of 127: below, grey with noise
+FADED = 8.0  # the same where no strong colours are found
+FEWEST = 3  # frames that must show the disk
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,18 @@ class Sight:
     area: float  # mean area of a mark [pixels]
 
 
-def chroma(picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Strength and hue [degrees, -90 ... 270] of the colour at half resolution."""
-    import cv2
-
-    u = picture.u.astype(np.float32) - 128
-    v = picture.v.astype(np.float32) - 128
-    strength, hue = cv2.cartToPolar(u, v, angleInDegrees=True)
-    return np.asarray(strength), np.where(hue > 285, hue - 360, hue)
+@cache
+def _names(least: float) -> NDArray[np.uint8]:
+    """Number of the colour, 1 to 4 (0: none), for each pair of colour differences, (256, 256) by U and V."""
+    difference = np.arange(256.0) - 128
+    u, v = difference[:, None], difference[None, :]
+    hue = np.degrees(np.arctan2(v, u)) % 360
+    hue = np.where(hue > 285, hue - 360, hue)
+    strong = np.hypot(u, v) > least
+    names = np.zeros((256, 256), dtype=np.uint8)
+    for k, colour in enumerate(COLOURS):
+        names[strong & (hue > HUES[colour][0]) & (hue <= HUES[colour][1])] = k + 1
+    return names
 
 
 def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
@@ -60,20 +67,24 @@ def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
     return Blobs(np.asarray(2 * (xy[:, 0] + 1j * xy[:, 1]) + (0.5 + 0.5j)), np.asarray(4.0 * area[order]))
 
 
-def coloured(picture: Picture) -> list[Blobs]:
-    """Blobs of each of the four colours, by broad hues."""
-    strength, hue = chroma(picture)
-    strong = strength > LEAST_CHROMA
+def coloured(picture: Picture, chroma: float = LEAST_CHROMA) -> list[Blobs]:
+    """Blobs of each of the four colours, by broad hues, stronger than `chroma`."""
+    name = _names(chroma).ravel()[(picture.u.astype(np.uint16) << 8) | picture.v]
     least = max(6, picture.u.size // 20000)
-    return [blobs(strong & (hue > HUES[c][0]) & (hue <= HUES[c][1]), least) for c in COLOURS]
+    return [blobs(name == k + 1, least) for k in range(len(COLOURS))]
 
 
-def squares(patches: list[Blobs], slack: float = 0.12) -> list[tuple[float, Sight]]:
+def squares(
+    patches: list[Blobs], without: int | None = None, slack: float = 0.12
+) -> list[tuple[float, Sight]]:
     """Quadruples of blobs that could be the marks of one disk, as (misfit, sight).
 
     The two diagonals share their middle and their length and cross at a right angle, red, orange,
-    blue, green clockwise; the areas are alike and small against the square.
+    blue, green clockwise; the areas are alike and small against the square. `without` one of the marks, half
+    a diagonal has to do.
     """
+    if without is not None:
+        return _corners(patches, without, slack / 2)
     red, orange, blue, green = (b.centre for b in patches)
     if 0 in (len(red), len(orange), len(blue), len(green)):
         return []
@@ -88,27 +99,69 @@ def squares(patches: list[Blobs], slack: float = 0.12) -> list[tuple[float, Sigh
         a, c = divmod(int(i), len(blue))
         b, d = divmod(int(j), len(green))
         area = np.array([p.area[k] for p, k in zip(patches, (a, b, c, d), strict=True)])
-        diagonal = complex(d1[i, 0] + d2[0, j]) / 2
-        ratio = np.sqrt(area) / abs(diagonal)
-        if area.max() > 4 * area.min() or ratio.max() > 0.4 or ratio.min() < 0.02:
-            continue
-        angle = float(np.angle(diagonal / (BODY[0] - BODY[2])))
-        centre = complex(m1[i, 0] + m2[0, j]) / 2
-        found.append((float(misfit[i, j]), Sight(centre, angle, abs(diagonal) / 2, float(area.mean()))))
+        sight = _sight(complex(m1[i, 0] + m2[0, j]) / 2, complex(d1[i, 0] + d2[0, j]) / 4, 0, area)
+        if sight is not None:
+            found.append((float(misfit[i, j]), sight))
     return sorted(found, key=lambda item: item[0])
 
 
-def sightings(pictures: list[Picture]) -> list[Sight | None]:
-    """The disk in each picture where all four marks can be told, None elsewhere.
+def _corners(patches: list[Blobs], without: int, slack: float) -> list[tuple[float, Sight]]:
+    """Triples that could be three of the marks: a diagonal, and one mark where the other one crosses it."""
+    single, first, second = (without + 2) % 4, (without + 1) % 4, (without + 3) % 4
+    a, b, c = (patches[k].centre for k in (first, second, single))
+    if 0 in (len(a), len(b), len(c)):
+        return []
+    middle = ((a[:, None] + b[None, :]) / 2).reshape(-1, 1)
+    arm = ((a[:, None] - b[None, :]) / 2).reshape(-1, 1)
+    # a quarter turn clockwise (in u + iv) leads from one mark to the next
+    expected = middle + arm * 1j ** (single - first)
+    misfit = np.abs(c[None, :] - expected) / (2 * np.abs(arm) + 1e-9)
+    found = []
+    for i, k in np.argwhere(misfit < slack):
+        p, q = divmod(int(i), len(b))
+        area = np.array([patches[first].area[p], patches[second].area[q], patches[single].area[k]])
+        sight = _sight(complex(middle[i, 0]), complex(arm[i, 0]), first, area)
+        if sight is not None:
+            found.append((float(misfit[i, k]), sight))
+    return sorted(found, key=lambda item: item[0])
 
-    The camera stands still, so the square has one size over the whole film: the size found most
-    often decides between quadruples.
+
+def _sight(centre: complex, arm: complex, mark: int, area: NDArray[np.float64]) -> Sight | None:
+    """The disk with its centre and the arm to one of its marks, if the marks' areas fit."""
+    ratio = np.sqrt(area) / (2 * abs(arm) + 1e-9)
+    if area.max() > 4 * area.min() or ratio.max() > 0.4 or ratio.min() < 0.02:
+        return None
+    angle = float(np.angle(arm / BODY[mark]))
+    return Sight(centre, angle, abs(arm), float(area.mean()))
+
+
+def sightings(pictures: list[Picture]) -> tuple[list[Sight | None], int | None]:
+    """The disk in each picture where its marks can be told, None elsewhere; and the mark that is missing.
+
+    Strong colours are looked for first, then faded ones, then three marks instead of four.
     """
-    everything = [squares(coloured(p)) for p in pictures]
+    best: tuple[list[Sight | None], int | None] = ([None] * len(pictures), None)
+    for chroma in (LEAST_CHROMA, FADED):
+        patches = [coloured(p, chroma) for p in pictures]
+        for without in (None, 0, 1, 2, 3):
+            sights = _agreeing([squares(p, without) for p in patches])
+            if _count(sights) > (1 if without is None else 2) * max(_count(best[0]), FEWEST - 1):
+                best = sights, without
+            if _count(best[0]) >= max(FEWEST, len(pictures) // 10):
+                return best
+    return best
+
+
+def _count(sights: list[Sight | None]) -> int:
+    return sum(s is not None for s in sights)
+
+
+def _agreeing(everything: list[list[tuple[float, Sight]]]) -> list[Sight | None]:
+    """One sight a picture, of the size that most agree on: the camera stands still."""
     reaches = np.array([s.reach for found in everything for _, s in found[:20]])
     weight = np.array([1 / (0.01 + misfit) for found in everything for misfit, _ in found[:20]])
     if not len(reaches):
-        return [None] * len(pictures)
+        return [None] * len(everything)
     near = np.abs(np.log(reaches[:, None] / reaches[None, :])) < 0.03
     reach = float(reaches[np.argmax(near @ weight)])
     return [next((s for _, s in found if abs(np.log(s.reach / reach)) < 0.04), None) for found in everything]

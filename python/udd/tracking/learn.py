@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from .decode import Picture, Plane
 from .find import BODY, Sight
 from .look import Look, Mark, Motion, Pose
-from .marks import MISFIT, Sighting, coverage
+from .marks import MISFIT, Sighting, coverage, seen_at
 from .pose import align
 from .rigid import solve
 
-ROUNDS = 8
-MOST = 48  # frames to learn from
+ROUNDS = 6
+MOST = 40  # frames to learn from
 WHOLE = 0.97  # share of its edges that is in view for a mark to learn from
 HALF_SEEN = 0.5  # and that looks as expected
 STEADY = 0.005  # pixels; shapes that change less have settled
@@ -52,10 +52,10 @@ def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds:
         fits: list[Seen] = []
         for y, pose, motion in frames[:MOST]:
             steps = [1.0, 0.5] if turn == 0 else [0.5 if turn < rounds // 2 else MISFIT]
-            fit = align(y, view, look, pose, motion, steps, gain_slack=1.0)
+            fit = align(y, view, look, pose, motion, steps, gain_slack=1.0, keep=True)
             if fit is not None:
                 fits.append((pose, motion, fit.sightings))
-        marks, psf = _reshape(fits, look)
+        marks, psf = _reshape(fits, look, view.shape[0])
         change = max(
             abs(m.place - n.place) + abs(m.half[0] - n.half[0])
             for m, n in zip(marks, look.marks, strict=True)
@@ -114,7 +114,7 @@ def _level(
     return float(light[codes[0]] - light[codes[1]])
 
 
-def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
+def _reshape(fits: list[Seen], look: Look, height: int) -> tuple[list[Mark], float]:
     marks, psfs = [], []
     for k, mark in enumerate(look.marks):
         normal, right = np.zeros((4, 4)), np.zeros(4)
@@ -123,7 +123,7 @@ def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
             s = sightings[k]
             if s is None or s.in_view < WHOLE or s.complete < HALF_SEEN:
                 continue
-            n, r = _shape_step(mark, pose, motion, look, s)
+            n, r = _shape_step(mark, pose, motion, look, s, height)
             normal, right = normal + n, right + r
             gains.append(s.gain)
         if not gains:
@@ -145,14 +145,19 @@ def _reshape(fits: list[Seen], look: Look) -> tuple[list[Mark], float]:
 
 
 def _shape_step(
-    mark: Mark, pose: Pose, motion: Motion, look: Look, s: Sighting
+    mark: Mark, pose: Pose, motion: Motion, look: Look, s: Sighting, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normal equations for (turn, half sides, psf) after the local unknowns have taken what they can."""
     r0, r1, c0, c1 = s.box
-    psf, here = look.psf, look.lens.local(pose.centre + mark.place * np.exp(1j * pose.angle))
+    psf = look.psf
+    number = next(k for k, m in enumerate(look.marks) if m is mark)
+    poses, locals_ = seen_at(look, pose, motion, height)
+    here = locals_[number]
+    centre, angle = complex(poses[number, 0], poses[number, 1]), float(poses[number, 2])
+    assert s.weight is not None and s.residual is not None  # kept
 
     def cover(m: Mark, blur: float) -> NDArray[np.float64]:
-        return coverage(m, pose.centre, pose.angle, motion, blur, s.box, here).ravel()
+        return coverage(m, centre, angle, motion, blur, s.box, here).ravel()
 
     base = cover(mark, psf)
     grad_v, grad_u = np.gradient(base.reshape(r1 - r0, c1 - c0))

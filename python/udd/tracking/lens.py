@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 PRIOR = np.array([0.1, 0.15, 0.15, 0.1, 0.05])  # what cameras on a tripod have
-SAME = np.eye(2)
 BETTER = 0.8  # the misfit must fall to this share, or the picture is taken as it is
 FEWEST = 12  # frames to judge by
 
@@ -62,34 +61,23 @@ class Lens:
             p = q / (1 + self.curve * (p.real**2 + p.imag**2))
         return np.asarray(self.middle + self.size * p)
 
-    def local(self, plane: complex) -> Local:
-        """The map near a point of the plane."""
+    def locals(self, plane: Complexes) -> Array:
+        """The map near points (n,) of the plane, linearised.
+
+        Rows of eight: the point in the picture (u, v), in the plane (u, v), d plane / d picture (2, 2).
+        """
         if self.plain:
-            return Local(0j, 0j, SAME)
-        at = complex(self.picture(plane))
-        h = 0.5
-        du = (complex(self.plane(at + h)) - complex(self.plane(at - h))) / (2 * h)
-        dv = (complex(self.plane(at + 1j * h)) - complex(self.plane(at - 1j * h))) / (2 * h)
-        return Local(at, complex(self.plane(at)), np.array([[du.real, dv.real], [du.imag, dv.imag]]))
+            return np.broadcast_to(UNBENT, (len(plane), 8)).copy()
+        at, h = self.picture(plane), 0.5
+        du = (self.plane(at + h) - self.plane(at - h)) / (2 * h)
+        dv = (self.plane(at + 1j * h) - self.plane(at - 1j * h)) / (2 * h)
+        here = self.plane(at)
+        columns = (at, here)
+        slopes = [du.real, dv.real, du.imag, dv.imag]
+        return np.column_stack([*(x for z in columns for x in (z.real, z.imag)), *slopes])
 
 
-@dataclass(frozen=True)
-class Local:
-    """A linear map from the picture to the plane about one point."""
-
-    picture: complex
-    plane: complex
-    slope: Array  # (2, 2) d plane / d picture
-
-    def back(self, plane: complex) -> complex:
-        """The picture point of a nearby plane point."""
-        d = plane - self.plane
-        if self.slope is SAME:
-            return self.picture + d
-        u, v = np.linalg.solve(self.slope, [d.real, d.imag])
-        return self.picture + complex(u, v)
-
-
+UNBENT = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0])
 PLAIN = Lens()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,33 @@ class Mark:
     turn: float  # orientation of its first side against the body frame [rad]
     level: float  # brightness minus that of the disk
 
+    @property
+    def row(self) -> NDArray[np.float64]:
+        """As six numbers: place u, v, half sides, turn, level."""
+        return np.array([self.place.real, self.place.imag, *self.half, self.turn, self.level])
+
 
 @dataclass(frozen=True)
 class Motion:
-    """How the disk moves during the exposure: displacement [pixels] and turn [rad] over the whole of it."""
+    """How the disk moves during the exposure, about its pose in the middle of it.
+
+    At the share s of the exposure (-1/2 to 1/2) it is off by s shift + s^2 bend [pixels] and
+    s turn + s^2 twist [rad]. `rate` [pixels/s] and `spin` [rad/s] are for rows that are exposed at
+    times of their own.
+    """
 
     shift: complex = 0j
     turn: float = 0.0
+    bend: complex = 0j
+    twist: float = 0.0
+    rate: complex = 0j
+    spin: float = 0.0
+
+    @property
+    def row(self) -> NDArray[np.float64]:
+        """As six numbers: shift u, v, turn, bend u, v, twist."""
+        shift, bend = complex(self.shift), complex(self.bend)
+        return np.array([shift.real, shift.imag, self.turn, bend.real, bend.imag, self.twist])
 
 
 @dataclass(frozen=True)
@@ -38,6 +59,17 @@ class Look:
     light: NDArray[np.float64]  # amount of light for each code of the picture, (256,)
     rim: float  # distance from the centre up to which the picture shows the disk [pixels]
     lens: Lens = PLAIN  # from the picture to the plane of the disk
+    readout: float = 0.0  # time from the exposure of the first row to that of the last [s]
+
+    @cached_property
+    def table(self) -> NDArray[np.float64]:
+        """The marks as rows of six numbers, (n, 6)."""
+        return np.array([m.row for m in self.marks])
+
+    @cached_property
+    def places(self) -> NDArray[np.complex128]:
+        """The marks' centres, (n,)."""
+        return np.array([m.place for m in self.marks])
 
 
 @dataclass

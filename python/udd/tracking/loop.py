@@ -14,6 +14,7 @@ from .look import Look, Motion, Pose
 from .marks import MISFIT
 from .pivot import Contact
 from .pose import Fit, align
+from .readout import Readout
 
 Array = NDArray[np.float64]
 CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
@@ -25,6 +26,9 @@ MOST_TRIED = 3  # starting poses
 FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
 STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
 BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
+SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
+COPIED = 10  # codes by which a copy may differ
+UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
 FLAT = 6.0  # brightness contrast of a black frame
 
 
@@ -41,6 +45,7 @@ class Tracks:
     complete: list[Array]  # (4,) share of each mark's edges in view
     streak: list[float]  # blur length at the marks [pixels]
     flag: list[str]
+    method: list[str]  # "fast" or "refined", empty where the disk was not held
 
 
 @dataclass
@@ -53,6 +58,7 @@ class Known:
     exposure: float
     white: float  # brightness code of the bare disk
     contact: Contact | None
+    readout: Readout
 
 
 @dataclass(frozen=True)
@@ -65,10 +71,15 @@ class Held:
 
 
 def follow(
-    pictures: Iterable[Picture], known: Known, tick: Callable[[int], object] = lambda _: None
+    pictures: Iterable[Picture],
+    known: Known,
+    tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
 ) -> Tracks:
-    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held."""
-    tracks = Tracks([], [], [], [], [], [], [], [], [])
+    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held.
+
+    After each picture `tick` is told where the disk is in it, NaN where it is not held.
+    """
+    tracks = Tracks(*([] for _ in range(10)))
     past: list[Held] = []
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
@@ -76,9 +87,8 @@ def follow(
         last = picture.y
         _append(tracks, picture.t, flag, fit, pose, _streak(motion, known.look))
         if fit is not None:
-            rate = motion.turn / known.exposure if known.exposure > 0 else 0.0
-            past = [*past[-2:], Held(picture.t, pose, rate)]
-        tick(picture.index)
+            past = [*past[-2:], Held(picture.t, pose, motion.spin)]
+        tick(picture, pose)
     return tracks
 
 
@@ -96,12 +106,12 @@ def _one(
     if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
         motion = _motion(past, guess, picture.t, known)
-        fit = _hold(picture, known, pose, motion, CLOSE)
+        fit = hold(picture, known, pose, motion, CLOSE)
         if fit is not None:
             better = _motion(past, pose, picture.t, known)
             if abs(_streak(better, known.look) - _streak(motion, known.look)) > 0.3:
                 motion = better
-                fit = _hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
+                fit = hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
             return "", fit, pose, motion
     best = _anywhere(picture, known, guess, past)
     if best is None:
@@ -110,7 +120,7 @@ def _one(
     return "", fit, pose, motion
 
 
-def _hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
+def hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
     """Align and check; a mark that disagrees with three others is left out."""
     most_off = MOST_OFF + STREAK_OFF * _streak(motion, known.look)
     start = Pose(pose.centre, pose.angle)
@@ -170,7 +180,7 @@ def _anywhere(
             start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
         for motion in _motions(past, start, picture.t, known, fresh):
             pose = Pose(start.centre, start.angle)
-            fit = _hold(picture, known, pose, motion, FAR)
+            fit = hold(picture, known, pose, motion, FAR)
             if fit is not None:
                 score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
                 if best is None or score > best[0]:
@@ -188,13 +198,9 @@ def _motions(past: list[Held], pose: Pose, t: float, known: Known, fresh: bool) 
     step = 2 * STREAK_STEP / (abs(known.look.marks[0].place) * known.exposure)
     count = int(np.ceil(FASTEST / step))
     rates = step * np.arange(-count, count + 1)
-    return [
-        Motion(
-            (known.contact.velocity(pose.centre, r) if known.contact else 0j) * known.exposure,
-            r * known.exposure,
-        )
-        for r in rates
-    ]
+    if known.contact is not None:
+        return [along_contact(known, pose, r) for r in rates]
+    return [Motion(0j, r * known.exposure, spin=r) for r in rates]
 
 
 def predict(past: list[Held], t: float, contact: Contact | None) -> Pose | None:
@@ -220,20 +226,32 @@ def predict(past: list[Held], t: float, contact: Contact | None) -> Pose | None:
 def _motion(past: list[Held], pose: Pose, t: float, known: Known) -> Motion:
     """Movement during the exposure, from the derivative at `t` of the curve through the last poses."""
     points = [h for h in past[-2:] if t - h.t < 0.5]
-    if not points or known.exposure <= 0:
+    if not points:
         return Motion()
     t1, p1 = points[-1].t, points[-1].pose
     shift, turn = (pose.centre - p1.centre) / (t - t1), (pose.angle - p1.angle) / (t - t1)
+    change = 0.0  # of the rate of turning [rad/s^2]
     if len(points) == 2:
         t0, p0 = points[0].t, points[0].pose
         s0, a0 = (p1.centre - p0.centre) / (t1 - t0), (p1.angle - p0.angle) / (t1 - t0)
         lean = (t - t1) / (t - t0)
+        change = 2 * (turn - a0) / (t - t0)
         shift, turn = shift + (shift - s0) * lean, turn + (turn - a0) * lean
     else:
         turn = 2 * turn - points[-1].rate  # the mean rate over the step, and the rate at its beginning
-    if known.contact is not None:
-        shift = known.contact.velocity(pose.centre, turn)
-    return Motion(shift * known.exposure, turn * known.exposure)
+    if known.contact is None:
+        return Motion(shift * known.exposure, turn * known.exposure, rate=shift, spin=turn)
+    return along_contact(known, pose, turn, change)
+
+
+def along_contact(known: Known, pose: Pose, spin: float, change: float = 0.0) -> Motion:
+    """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
+    contact, open_for = known.contact, known.exposure
+    assert contact is not None
+    rate = contact.velocity(pose.centre, spin)
+    bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
+    half = 0.5 * open_for**2
+    return Motion(rate * open_for, spin * open_for, bending * half, change * half, rate, spin)
 
 
 def _streak(motion: Motion, look: Look) -> float:
@@ -245,10 +263,14 @@ def _repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before:
     reach = abs(look.marks[0].place)
     if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
         return False
-    r, c, n = int(before.centre.imag), int(before.centre.real), int(1.3 * reach)
-    a = y[max(0, r - n) : r + n, max(0, c - n) : c + n]
-    b = last[max(0, r - n) : r + n, max(0, c - n) : c + n]
-    return a.size > 0 and float(np.abs(a.astype(np.int16) - b).mean()) < 0.1
+    changed, size = 0, 0
+    for place in look.lens.picture(before.centre + look.places * np.exp(1j * before.angle)):
+        r, c, n = int(place.imag), int(place.real), int(SURROUNDINGS * np.hypot(*look.marks[0].half))
+        part = slice(max(0, r - n), max(0, r + n)), slice(max(0, c - n), max(0, c + n))
+        # a codec does not copy exactly, but it moves no edge
+        changed += int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED))
+        size += y[part].size
+    return size > 0 and changed < UNCHANGED
 
 
 def _append(tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float) -> None:
@@ -257,16 +279,22 @@ def _append(tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, st
     tracks.centre.append(pose.centre)
     tracks.angle.append(pose.angle)
     tracks.streak.append(streak)
-    if fit is None:
-        tracks.information.append(np.full((3, 3), np.nan))
-        tracks.leftover.append(np.full((4, 2), np.nan))
-        tracks.chi2.append(np.full(4, np.nan))
-        tracks.complete.append(np.zeros(4))
-        return
+    tracks.information.append(np.full((3, 3), np.nan))
+    tracks.leftover.append(np.full((4, 2), np.nan))
+    tracks.chi2.append(np.full(4, np.nan))
+    tracks.complete.append(np.zeros(4))
+    tracks.method.append("" if fit is None else "fast")
+    if fit is not None:
+        put(tracks, -1, fit, pose, streak)
+
+
+def put(tracks: Tracks, k: int, fit: Fit, pose: Pose, streak: float) -> None:
+    """Write what was found in a frame into its row."""
+    tracks.centre[k], tracks.angle[k], tracks.streak[k] = pose.centre, pose.angle, streak
     used = fit.used[:, None]
-    tracks.information.append(fit.step.information)
-    tracks.leftover.append(np.where(used, fit.step.leftover, np.nan))
-    tracks.chi2.append(np.where(fit.used, fit.step.chi2, np.nan))
-    tracks.complete.append(
-        np.array([s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)])
+    tracks.information[k] = fit.step.information
+    tracks.leftover[k] = np.where(used, fit.step.leftover, np.nan)
+    tracks.chi2[k] = np.where(fit.used, fit.step.chi2, np.nan)
+    tracks.complete[k] = np.array(
+        [s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]
     )

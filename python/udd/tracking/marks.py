@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .lens import SAME, Local
+from udd import _core
+
+from .lens import UNBENT
 from .look import Look, Mark, Motion, Pose
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-UNBENT = Local(0j, 0j, SAME)
+Box = tuple[int, int, int, int]  # rows from, to, columns from, to
+
+FAINT = 0.04  # of full light: a mark that differs by less from the disk is none
+MISFIT = 0.12  # pixels by which edges of real marks, lenses and codecs differ from the ideal shape
 
 
 @dataclass(frozen=True)
@@ -29,9 +34,9 @@ class Sighting:
     in_view: float  # share of them before which nothing is known to stand
     rms: float  # residual brightness over the window
     gain: float  # contrast against that expected
-    box: tuple[int, int, int, int]  # rows from, to, columns from, to
-    weight: Array  # of each pixel of the window, flat
-    residual: Array  # brightness left over, flat
+    box: Box
+    weight: Array | None = None  # of each pixel of the window, flat, where asked for
+    residual: Array | None = None  # brightness left over, flat
 
 
 def coverage(
@@ -40,8 +45,8 @@ def coverage(
     angle: float,
     motion: Motion,
     psf: float,
-    box: tuple[int, int, int, int],
-    local: Local | None = None,
+    box: Box,
+    local: Array | None = None,
 ) -> Array:
     """Share of each pixel of a window that the mark covers, averaged over the exposure.
 
@@ -51,147 +56,80 @@ def coverage(
     motion : movement over the exposure.
     psf : standard deviation of the blur of lens and pixel [pixels].
     box : rows from, to, columns from, to.
-    local : the map from the picture to the plane of the disk here; the identity if not given.
+    local : row of `Lens.locals`, the map from the picture to the plane of the disk here; none if not given.
     """
-    r0, r1, c0, c1 = box
-    local = local or UNBENT
-    u = np.arange(c0, c1, dtype=np.float32) - np.float32(local.picture.real)
-    v = np.arange(r0, r1, dtype=np.float32) - np.float32(local.picture.imag)
-    (uu, uv), (vu, vv) = local.slope
-    path = abs(motion.shift + 1j * motion.turn * mark.place * np.exp(1j * angle))
-    count = min(32, int(np.ceil(path / (2.0 * psf + 0.3))) + 1) if path > 0.5 else 1
-    total = np.zeros((len(v), len(u)), dtype=np.float32)
-    for k in range(count):
-        s = (k + 0.5) / count - 0.5
-        a = angle + s * motion.turn
-        m = centre + s * motion.shift + mark.place * np.exp(1j * a) - local.plane
-        c, d = np.cos(a + mark.turn), np.sin(a + mark.turn)
-        across = np.add.outer(
-            np.float32(c * vv - d * uv) * v - np.float32(c * m.imag - d * m.real),
-            np.float32(c * vu - d * uu) * u,
-        )
-        along = np.add.outer(
-            np.float32(c * uv + d * vv) * v - np.float32(c * m.real + d * m.imag),
-            np.float32(c * uu + d * vu) * u,
-        )
-        across = _slab(across, mark.half[1], psf)
-        across *= _slab(along, mark.half[0], psf)
-        total += across
-    return np.asarray(total, dtype=np.float64) / count
-
-
-def _slab(x: NDArray[np.float32], half: float, psf: float) -> NDArray[np.float32]:
-    """Blurred indicator of |x| < half, in place of `x`.
-
-    The quintic smooth step of equal variance stands for the error function.
-    """
-    width = 2.646 * psf  # x / width has variance 1/7 under the step's derivative 15/16 (1 - x^2)^2
-    np.abs(x, out=x)
-    np.subtract(np.float32(half), x, out=x)
-    x *= np.float32(1 / width)
-    np.minimum(x, np.float32(1), out=x)
-    np.maximum(x, np.float32(-1), out=x)
-    square = x * x
-    square *= np.float32(0.1875) * square - np.float32(0.625)
-    square += np.float32(0.9375)
-    x *= square
-    x += np.float32(0.5)
-    return x
-
-
-def window(
-    mark: Mark,
-    centre: complex,
-    angle: float,
-    motion: Motion,
-    shape: tuple[int, int],
-    local: Local,
-    margin: float = 5.0,
-) -> tuple[int, int, int, int]:
-    """Rows and columns that hold the mark over the exposure, clipped to the picture."""
-    ends = [
-        local.back(centre + s * motion.shift + mark.place * np.exp(1j * (angle + s * motion.turn)))
-        for s in (-0.5, 0.5)
-    ]
-    reach = np.hypot(*mark.half) + margin
-    us, vs = [e.real for e in ends], [e.imag for e in ends]
-    return (
-        max(0, int(min(vs) - reach)),
-        min(shape[0], int(max(vs) + reach) + 2),
-        max(0, int(min(us) - reach)),
-        min(shape[1], int(max(us) + reach) + 2),
-    )
-
-
-MISFIT = 0.12  # pixels by which edges of real marks, lenses and codecs differ from the ideal shape
+    pose = np.array([centre.real, centre.imag, angle])
+    here = UNBENT if local is None else local
+    flat = _core.mark_coverage(mark.row, pose, motion.row, float(psf), box, here)
+    return flat.reshape(box[1] - box[0], box[3] - box[2])
 
 
 def locate(
     y: NDArray[np.uint8],
     view: Bools,
     look: Look,
-    mark: Mark,
     pose: Pose,
     motion: Motion,
     *,
     psf: float | None = None,
     gain_slack: float = 0.1,
     misfit: float = MISFIT,
-) -> Sighting | None:
-    """Offset of a mark from its expected place by least squares on the visible pixels.
+    keep: bool = False,
+) -> list[Sighting | None]:
+    """Offsets of the marks from their expected places by least squares on the visible pixels.
 
-    The light in the window is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
+    The light about a mark is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
     gain, du, dv free, the gain within `gain_slack` of 1. `view` is False where something stands in
     front; pixels that nothing of this explains (a hand, a cable) lose their weight. `psf` overrides
     the film's own sharpness; edges count as known to `misfit` pixels.
     """
-    centre, angle, rim, lens = pose.centre, pose.angle, look.rim, look.lens
-    psf = look.psf if psf is None else psf
-    local = lens.local(centre + mark.place * np.exp(1j * angle))
-    box = window(mark, centre, angle, motion, y.shape, local)
-    r0, r1, c0, c1 = box
-    if r1 - r0 < 6 or c1 - c0 < 6:
-        return None
-    cover = coverage(mark, centre, angle, motion, psf, box, local)
-    grad_v, grad_u = np.gradient(cover)
-    edge2 = grad_u * grad_u + grad_v * grad_v
-    total = float(edge2.sum())
-    middle = local.back(centre)
-    away_u, away_v = np.arange(c0, c1) - middle.real, np.arange(r0, r1) - middle.imag
-    inside = np.add.outer(away_v**2, away_u**2) < (rim - 0.5 * abs(motion.shift)) ** 2
-    seen = (view[r0:r1, c0:c1] & inside).ravel()
-    if total <= 0 or seen.sum() < 25:
-        return None
-    patch = look.light[y[r0:r1, c0:c1]].ravel()
-    level = mark.level
-    columns = np.stack(
-        [np.ones(cover.size), level * cover.ravel(), -level * grad_u.ravel(), -level * grad_v.ravel()]
-    )
-    precise = seen / (look.noise**2 + (misfit * level) ** 2 * edge2.ravel())
-    weight = precise
-    prior = np.diag([1e-12, gain_slack**-2, 1e-12, 1e-12])
-    x = np.zeros(4)
+    marks = look.table
+    poses, locals_ = seen_at(look, pose, motion, y.shape[0])
+    how = np.array([look.psf if psf is None else psf, look.noise, misfit, gain_slack, look.rim])
+    found = _core.locate_marks(y, view, look.light, how, marks, poses, motion.row, locals_, keep)
+    faint = FAINT * float(look.light[-1])
+    return [
+        None if s is None or abs(mark.level) < faint else _sighting(*s)
+        for s, mark in zip(found, look.marks, strict=True)
+    ]
+
+
+def _sighting(
+    offset: tuple[float, float],
+    information: tuple[float, float, float, float],
+    shares: tuple[float, float, float, float],
+    box: Box,
+    pixels: tuple[Array, Array] | None,
+) -> Sighting:
+    weight, residual = (None, None) if pixels is None else pixels
+    matrix = np.array(information).reshape(2, 2)
+    return Sighting(np.array(offset), matrix, *shares, box, weight, residual)
+
+
+def seen_at(look: Look, pose: Pose, motion: Motion, height: int) -> tuple[Array, Array]:
+    """For each mark the pose (n, 3) that its rows of the picture see, and its map (n, 8).
+
+    A rolling shutter sees each row at a time of its own; within a mark that is a shear.
+    """
+    places = look.places
+    centre, angle = np.full(len(places), pose.centre), np.full(len(places), pose.angle)
+    turn = np.exp(1j * pose.angle)
+    if not look.readout:
+        at = pose.centre + places * turn
+        return np.column_stack([centre.real, centre.imag, angle]), look.lens.locals(at)
+    per_row = look.readout / height
+    late = np.zeros(len(places))
+    at = pose.centre + places * turn
     for _ in range(3):
-        weighted = columns * weight
-        normal = weighted @ columns.T + prior
-        x = np.linalg.solve(normal, weighted @ patch + prior[:, 1])
-        residual = patch - x @ columns
-        z2 = residual * residual * precise / 36.0  # beyond 6 standard deviations a pixel shows something else
-        weight = precise * np.clip(1 - z2, 0, None) ** 2
-        if np.count_nonzero(weight) < 25:
-            return None
-    covariance: Array = local.slope @ np.linalg.inv(normal)[2:, 2:] @ local.slope.T
-    complete = float(edge2.ravel()[weight > 0.1 * precise].sum()) / total
-    in_view = float(edge2.ravel()[seen].sum()) / total
-    rms = float(np.sqrt((weight * residual**2).sum() / weight.sum()))
-    return Sighting(
-        local.slope @ x[2:],
-        np.asarray(np.linalg.inv(covariance), dtype=np.float64),
-        complete,
-        in_view,
-        rms,
-        float(x[1]),
-        box,
-        weight,
-        residual,
-    )
+        late = per_row * (look.lens.picture(at).imag + 0.5 - height / 2)
+        centre, angle = pose.centre + motion.rate * late, pose.angle + motion.spin * late
+        at = centre + places * np.exp(1j * angle)
+    locals_ = look.lens.locals(at)
+    speed = motion.rate + 1j * motion.spin * (at - centre)
+    if not locals_.flags.writeable or look.lens.plain:
+        locals_ = locals_.copy()
+        locals_[:, 0], locals_[:, 1] = at.real, at.imag
+        locals_[:, 2], locals_[:, 3] = at.real, at.imag
+    locals_[:, 5] -= speed.real * per_row
+    locals_[:, 7] -= speed.imag * per_row
+    return np.column_stack([centre.real, centre.imag, angle]), locals_

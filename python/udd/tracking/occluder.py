@@ -24,29 +24,26 @@ def visible(seen: Sequence[tuple[Picture, Sight]]) -> tuple[NDArray[np.bool_], f
     import cv2
 
     height, width = seen[0][0].y.shape
-    rows, cols = np.mgrid[0:height, 0:width].astype(np.float32)
     bare = np.zeros((height, width), dtype=np.int32)
     white = np.zeros((height, width), dtype=np.int32)
     brightest = np.zeros((height, width), dtype=np.uint8)
     levels = []
     for picture, sight in seen:
-        du, dv = cols - np.float32(sight.centre.real), rows - np.float32(sight.centre.imag)
-        clear = np.float32(1.1 * np.sqrt(sight.area))
-        here = du * du + dv * dv < np.float32((1.08 * sight.reach) ** 2)
-        for direction in BODY * sight.reach * np.exp(1j * sight.angle):
-            here &= (du - np.float32(direction.real)) ** 2 + (dv - np.float32(direction.imag)) ** 2 > clear**2
-        y = picture.y
+        np.maximum(brightest, picture.y, out=brightest)
+        box = _box(sight, height, width)
+        here = _should_be_bare(sight, box)
+        y = picture.y[box]
         level = float(np.median(y[here])) if here.any() else 255.0
         level = float(np.median(y[here & (y > 0.8 * level)])) if here.any() else level
         levels.append(level)
-        u = cv2.resize(picture.u, (width, height), interpolation=cv2.INTER_LINEAR)
-        v = cv2.resize(picture.v, (width, height), interpolation=cv2.INTER_LINEAR)
         good = here & (np.abs(y - np.float32(level)) < DARKER * level)
-        tint_u, tint_v = np.median(u[good]) if good.any() else 128, np.median(v[good]) if good.any() else 128
-        good &= (np.abs(u - np.float32(tint_u)) < TINTED) & (np.abs(v - np.float32(tint_v)) < TINTED)
-        np.maximum(brightest, y, out=brightest)
-        bare += here
-        white += good
+        for plane in (picture.u, picture.v):
+            half = slice(box[0].start // 2, box[0].stop // 2), slice(box[1].start // 2, box[1].stop // 2)
+            tint = cv2.resize(plane[half], y.shape[::-1], interpolation=cv2.INTER_LINEAR)
+            usual = np.median(tint[good]) if good.any() else 128
+            good &= np.abs(tint - np.float32(usual)) < TINTED
+        bare[box] += here
+        white[box] += good
     hidden = (bare > 0) & (white < 0.5 * bare)
     level = float(np.median(levels))
     # where the disk was never looked at, whatever is always dark and grown together with the mask
@@ -56,3 +53,25 @@ def visible(seen: Sequence[tuple[Picture, Sight]]) -> tuple[NDArray[np.bool_], f
     kernel = np.ones((2 * MARGIN + 1, 2 * MARGIN + 1), dtype=np.uint8)
     solid = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
     return cv2.dilate(solid, kernel) == 0, level
+
+
+def _box(sight: Sight, height: int, width: int) -> tuple[slice, slice]:
+    """Rows and columns about the square of the marks, from even numbers to even numbers."""
+    reach = 1.1 * sight.reach
+
+    def part(middle: float, size: int) -> slice:
+        low, high = int(np.clip(middle - reach, 0, size)), int(np.clip(middle + reach + 2, 0, size))
+        return slice(low & ~1, high & ~1)
+
+    return part(sight.centre.imag, height), part(sight.centre.real, width)
+
+
+def _should_be_bare(sight: Sight, box: tuple[slice, slice]) -> NDArray[np.bool_]:
+    """Pixels of the box inside the marks' reach and away from the marks."""
+    dv = (np.arange(box[0].start, box[0].stop) - sight.centre.imag).astype(np.float32)[:, None]
+    du = (np.arange(box[1].start, box[1].stop) - sight.centre.real).astype(np.float32)[None, :]
+    here = du * du + dv * dv < np.float32((1.08 * sight.reach) ** 2)
+    clear = np.float32(1.1 * np.sqrt(sight.area))
+    for direction in BODY * sight.reach * np.exp(1j * sight.angle):
+        here &= (du - np.float32(direction.real)) ** 2 + (dv - np.float32(direction.imag)) ** 2 > clear**2
+    return np.asarray(here)

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 Array = NDArray[np.float64]
 WINDOW = 1.5  # s; over longer stretches what the constraint leaves out (slip) adds up
 SHORTEST = 0.3  # s
+SLIPS = 6.0  # times the usual misfit; a window beyond shows something else
 WORST = 0.03  # of the marks' reach: a contact known no better is not taken from the motion
 
 
@@ -52,6 +53,7 @@ def pivot(
         values.append(left - left.mean())
     if not rows:
         return None
+    rows, values = _rolling(rows, values)
     design, value = np.concatenate(rows), np.concatenate(values)
     weight = np.ones(len(value))
     x = np.zeros(2, dtype=complex)
@@ -68,6 +70,23 @@ def pivot(
     if not np.isfinite(variance) or variance > (WORST * reach) ** 2:
         return None
     return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms)
+
+
+def _rolling(
+    rows: list[NDArray[np.complex128]], values: list[NDArray[np.complex128]]
+) -> tuple[list[NDArray[np.complex128]], list[NDArray[np.complex128]]]:
+    """The windows in which the disk rolls like in most: not those in which it was let go, or fell."""
+    for _ in range(3):
+        normal = sum((d.conj().T @ d for d in rows), np.zeros((2, 2), dtype=complex))
+        right = sum((d.conj().T @ v for d, v in zip(rows, values, strict=True)), np.zeros(2, dtype=complex))
+        x = np.linalg.lstsq(normal, right, rcond=None)[0]
+        off = np.array([np.sqrt(np.mean(np.abs(v - d @ x) ** 2)) for d, v in zip(rows, values, strict=True)])
+        keep = off <= SLIPS * np.median(off)
+        if keep.all() or keep.sum() < 2:
+            break
+        rows = [d for d, k in zip(rows, keep, strict=True) if k]
+        values = [v for v, k in zip(values, keep, strict=True) if k]
+    return rows, values
 
 
 @dataclass(frozen=True)

@@ -36,21 +36,21 @@ def align(
     rounds: list[float],
     gain_slack: float = 0.1,
     without: int | None = None,
+    keep: bool = False,
 ) -> Fit | None:
     """Move `pose` onto a picture by Gauss-Newton steps; None if fewer than two marks hold it.
 
     Each round has its misfit tolerance [pixels]; a large one reaches further. The mark `without` is
-    left out.
+    left out; with `keep`, sightings carry their pixels.
     """
     fit = None
     path = abs(motion.shift) + abs(motion.turn * look.marks[0].place)
     for each in rounds:
         misfit = float(np.hypot(each, STREAKY * path))
         psf = float(np.hypot(look.psf, 3 * max(0.0, each - 0.5)))
-        sightings = [
-            locate(y, view, look, m, pose, motion, psf=psf, gain_slack=gain_slack, misfit=misfit)
-            for m in look.marks
-        ]
+        sightings = locate(
+            y, view, look, pose, motion, psf=psf, gain_slack=gain_slack, misfit=misfit, keep=keep
+        )
         used = np.array([s is not None and s.complete > LEAST and abs(s.gain - 1) < 0.5 for s in sightings])
         if without is not None:
             used[without] = False

@@ -19,10 +19,12 @@ from .marks import MISFIT
 from .occluder import visible
 from .pivot import Contact, rough_contact
 from .pose import align
+from .readout import readout
 from .survey import Moving, Survey, moving, repeats_last
 
 FEWEST = 3  # frames in motion from which marks are learned a second time
 SHARP = 60  # slow frames from which the rim is measured
+FOR_LENS = 90  # frames from which tilt and lens are measured
 LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 
@@ -46,11 +48,22 @@ def prepare(
     in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
     in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
     frames = [
-        (m.picture.y, Pose(m.sight.centre, m.sight.angle), Motion(m.rate * open_for, m.turning * open_for))
+        (
+            m.picture.y,
+            Pose(m.sight.centre, m.sight.angle),
+            Motion(m.rate * open_for, m.turning * open_for, rate=m.rate, spin=m.turning),
+        )
         for m in in_motion
     ]
+    interval = float(np.median([m.interval for m in in_motion])) if in_motion else 0.0
+    rolling = readout(frames, look, view, interval)
+    if rolling.value:
+        look = replace(look, readout=rolling.value)
+        look = refine(look, frames, view)
+        rolling = readout(frames, look, view, interval)
+        look = replace(look, readout=rolling.value)
     for _ in range(LENS_ROUNDS):
-        lens = calibrate(places(look, frames, view), view.shape)
+        lens = calibrate(places(look, frames[:FOR_LENS], view), view.shape)
         if lens is None:
             break
         look = replace(look, lens=lens)
@@ -74,7 +87,7 @@ def prepare(
         raise TrackError(f"{film.path}: {error}") from None
     colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
     look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
-    return Known(look, view, colours, open_for, white, _contact(in_motion, look)), rim
+    return Known(look, view, colours, open_for, white, _contact(in_motion, look), rolling), rim
 
 
 def _contact(in_motion: list[Moving], look: Look) -> Contact | None:

@@ -14,6 +14,8 @@ from .lens import PLAIN, Lens
 from .loop import Tracks
 
 Array = NDArray[np.float64]
+OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
+NEAR_EDGE = 0.8  # of the radius; a disk that was last seen farther in is lost, not gone
 LONG = 1.0  # s: over a longer gap the rate may have done anything
 
 
@@ -23,6 +25,7 @@ class Camera:
 
     scale: float  # pixels per metre
     scale_sigma: float
+    scale_from: str  # "marks", "rim" or both
     pivot: complex  # contact point [pixels, u + iv]
     pivot_sigma: float  # [m]
     pivot_from: str  # "rolling constraint", "support" or "given"
@@ -83,6 +86,22 @@ def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     sigma = np.sqrt(np.einsum("nii->ni", c))
     rho = np.stack([c[:, a, b] / (sigma[:, a] * sigma[:, b]) for a, b in ((0, 1), (0, 2), (1, 2))], axis=1)
     return values, sigma, np.clip(rho, -0.999999, 0.999999)
+
+
+def left_the_wheels(values: Array, radius: float, pivot_sigma: float) -> NDArray[np.bool_]:
+    """Frames from the one on in which the contact lies outside the disk: it is held no more.
+
+    Also those after the last in which it was seen, where that was near its edge.
+    """
+    gone = np.zeros(len(values), dtype=bool)
+    away = np.hypot(values[:, 0], values[:, 1])
+    outside = np.flatnonzero(away > radius * (1 + OUTSIDE) + 3 * pivot_sigma)
+    seen = np.flatnonzero(np.isfinite(away))
+    if len(outside):
+        gone[outside[0] :] = True
+    elif len(seen) and away[seen[-1]] > NEAR_EDGE * radius and len(away) - seen[-1] > 3:
+        gone[seen[-1] + 1 :] = True
+    return gone
 
 
 def recount(t: Array, angle: Array) -> tuple[Array, int]:

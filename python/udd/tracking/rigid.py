@@ -12,6 +12,7 @@ from .look import Mark
 from .marks import Sighting
 
 Array = NDArray[np.float64]
+_NOTHING, _NOWHERE = np.zeros((2, 2)), np.zeros(2)
 
 
 @dataclass(frozen=True)
@@ -28,22 +29,25 @@ def solve(
     marks: Sequence[Mark], sightings: Sequence[Sighting | None], angle: float, weights: Array
 ) -> Step | None:
     """Least-squares pose correction (du, dv, dbeta) from the marks seen, or None if it is not determined."""
-    normal, right = np.zeros((3, 3)), np.zeros(3)
-    arms = [1j * m.place * np.exp(1j * angle) for m in marks]
-    maps = [np.array([[1.0, 0.0, a.real], [0.0, 1.0, a.imag]]) for a in arms]
-    for m, s, w in zip(maps, sightings, weights, strict=True):
-        if s is not None and w > 0:
-            normal += w * m.T @ s.information @ m
-            right += w * m.T @ s.information @ s.offset
+    places = np.array([m.place for m in marks])
+    arms = 1j * places * np.exp(1j * angle)
+    maps = np.zeros((len(marks), 2, 3))
+    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
+    maps[:, 0, 2], maps[:, 1, 2] = arms.real, arms.imag
+    information = np.array([_NOTHING if s is None else s.information for s in sightings])
+    offset = np.array([_NOWHERE if s is None else s.offset for s in sightings])
+    trusted = np.where(np.asarray(weights) > 0, weights, 0.0)[:, None, None] * information
+    weighted = (trusted @ maps).reshape(-1, 3)
+    normal = maps.reshape(-1, 3).T @ weighted
+    right = weighted.T @ offset.ravel()
     reach = abs(marks[0].place)
     scale = np.diag([1.0, 1.0, 1 / reach])  # so that pixels compare with pixels
     eigen = np.linalg.eigvalsh(scale @ normal @ scale)
     if eigen[0] <= 1e-4 * max(eigen[-1], 1e-12):
         return None
     change = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-    leftover, chi2 = np.full((len(marks), 2), np.nan), np.full(len(marks), np.nan)
-    for k, (m, s) in enumerate(zip(maps, sightings, strict=True)):
-        if s is not None:
-            leftover[k] = s.offset - m @ change
-            chi2[k] = leftover[k] @ s.information @ leftover[k]
+    leftover = offset - maps @ change
+    chi2 = (leftover[:, None, :] @ information @ leftover[:, :, None])[:, 0, 0]
+    unseen = np.array([s is None for s in sightings])
+    leftover[unseen], chi2[unseen] = np.nan, np.nan
     return Step(change, normal, leftover, chi2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Any
 
@@ -17,19 +17,25 @@ from udd.measurement import DISK, Measurement, check_length
 from .decode import Film, Picture, TrackError
 from .disk import Outline
 from .exposure import at_middle
-from .find import sightings
+from .find import COLOURS, FEWEST, sightings
+from .glimpse import Glimpse
 from .lens import Lens
+from .look import Pose
 from .loop import Known, Tracks, follow
 from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
-from .result import Camera, metres, recount
+from .refine import LONG, drop_weak
+from .refine import refine as second_pass
+from .result import Camera, left_the_wheels, metres, recount
+from .rgb import rgb
+from .scale import Scale, scale
 from .survey import Survey, slowest, survey
 
-FEWEST_SIGHTS = 3  # survey frames that must show all four marks
 VAGUE = 0.005  # of the disk's radius: a position known no better is not given
 VAGUE_SAYS = "vague: too blurred or hidden to be placed"
+GONE_SAYS = "gone: the disk has left the wheels"
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 
 
@@ -48,7 +54,10 @@ def track(
     video: str | os.PathLike[str],
     *,
     disk_radius: float = 0.08,
+    mark_distance: float | None = None,
+    fps: float | None = None,
     pivot: tuple[float, float] | None = None,
+    refine: bool = True,
     progress: bool = False,
 ) -> Measurement:
     """Measure the motion of a disk with four coloured marks in a film.
@@ -59,9 +68,16 @@ def track(
         A film by a camera at rest, showing the whole disk with square marks red, orange, blue,
         green (clockwise) near its rim.
     disk_radius : float
-        Radius of the disk [m]; it sets the scale.
+        Radius of the disk [m]; with the marks' distance it sets the scale.
+    mark_distance : float, optional
+        Distance of the marks' centres from the disk's centre [m]. If not given, 65/80 of the radius where
+        the film agrees with that to 1.5 %, otherwise the rim alone sets the scale.
+    fps : float, optional
+        Frames per second, where the film's header does not tell the truth (slow motion).
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
+    refine : bool
+        Go over the film a second time, with each frame's blur known from its neighbours.
     progress : bool
         Show a progress bar.
 
@@ -89,45 +105,65 @@ def track(
     >>> m = udd.track("run.mp4", disk_radius=0.08)  # doctest: +SKIP
     >>> m.to_csv("run.csv")  # doctest: +SKIP
     """
-    return track_in_detail(video, disk_radius=disk_radius, pivot=pivot, progress=progress).measurement
+    return track_in_detail(
+        video,
+        disk_radius=disk_radius,
+        mark_distance=mark_distance,
+        fps=fps,
+        pivot=pivot,
+        refine=refine,
+        progress=progress,
+    ).measurement
 
 
 def track_in_detail(
     video: str | os.PathLike[str],
     *,
     disk_radius: float = 0.08,
+    mark_distance: float | None = None,
+    fps: float | None = None,
     pivot: tuple[float, float] | None = None,
+    refine: bool = True,
     progress: bool = False,
+    watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
-    """As `track`, with everything that was found on the way, in pixels."""
-    try:
-        radius = float(disk_radius)
-    except (TypeError, ValueError):
-        raise TrackError(f"disk_radius must be a number of metres, not {disk_radius!r}") from None
-    if not (math.isfinite(radius) and radius > 0):
-        raise TrackError(f"disk_radius must be positive and finite, not {disk_radius!r}")
-    film = Film(video)
+    """As `track`, with everything that was found on the way, in pixels; `watch` is told of each frame."""
+    radius = _length(disk_radius, "disk_radius")
+    distance = None if mark_distance is None else _length(mark_distance, "mark_distance")
+    film = Film(video, fps=fps)
     look_over = survey(film)
-    sights = sightings(look_over.pictures)
+    sights, missing = sightings(look_over.pictures)
     seen = slowest(look_over.bursts, sights)
-    if len(seen) < FEWEST_SIGHTS:
+    if len(seen) < FEWEST:
         raise TrackError(
             f"{film.path}: no disk with marks in red, orange, blue and green (clockwise) was found: "
             f"{len(seen)} of {len(look_over.pictures)} frames looked at show all four"
         )
+    if missing is not None:
+        warnings.warn(
+            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=3
+        )
     known, rim = prepare(film, look_over, sights, seen)
-    tracks = _follow(film, known, look_over.frames, progress)
-    centre, angle = at_middle(
-        np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle), known.exposure
-    )
+    tracks = _follow(film, known, look_over.frames, progress, watch)
+    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
+    if known.contact is None:  # else the paths were curved, and poses stand in their middle
+        centre, angle = at_middle(np.array(tracks.t), centre, angle, known.exposure)
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
-    camera = _camera(tracks, known, rim, radius, pivot)
+    if refine:
+        tracks = _again(film, known, tracks, progress)
+    drop_weak(tracks)
+    size = scale(known.look.places, rim, radius, distance)
+    camera = _camera(tracks, known, size, pivot)
     values, sigma, rho = metres(tracks, covariance(tracks), camera)
+    gone = left_the_wheels(values, radius, camera.pivot_sigma)
+    for table in (values, sigma, rho):
+        table[gone] = np.nan
     vague = np.hypot(sigma[:, 0], sigma[:, 1]) > VAGUE * radius
     for table in (values, sigma, rho):
         table[vague] = np.nan
     tracks.flag = [VAGUE_SAYS if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
+    tracks.flag = [GONE_SAYS if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
     meta = _meta(film, look_over, tracks, known, camera, radius, doubtful)
     measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
     try:
@@ -137,26 +173,54 @@ def track_in_detail(
     return Tracking(measurement, tracks, known, camera, rim)
 
 
-def _follow(film: Film, known: Known, frames: int, progress: bool) -> Tracks:
-    if not progress:
-        return follow(film.pictures(), known)
+def _length(value: float, name: str) -> float:
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TrackError(f"{name} must be a number of metres, not {value!r}") from None
+    if not (math.isfinite(length) and length > 0):
+        raise TrackError(f"{name} must be positive and finite, not {value!r}")
+    return length
+
+
+def _follow(
+    film: Film, known: Known, frames: int, progress: bool, watch: Callable[[Glimpse], object] | None
+) -> Tracks:
     from tqdm import tqdm
 
-    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}") as bar:
-        return follow(film.pictures(), known, lambda _: bar.update())
+    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
+
+        def tick(picture: Picture, pose: Pose) -> None:
+            bar.update()
+            if watch is not None:
+                watch(Glimpse(picture, pose, known.look, frames, film.full_range))
+
+        return follow(film.pictures(), known, tick)
 
 
-def _camera(
-    tracks: Tracks, known: Known, rim: Outline, radius: float, given: tuple[float, float] | None
-) -> Camera:
-    scale = rim.radius / radius
+def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
+    streaks = [
+        s > LONG or flag.startswith("lost") for s, flag in zip(tracks.streak, tracks.flag, strict=True)
+    ]
+    for streaks_only in (False, True) if any(streaks) else (False,):
+        if not progress:
+            tracks = second_pass(film.pictures(), known, tracks, streaks_only=streaks_only)
+            continue
+        from tqdm import tqdm
+
+        with tqdm(total=len(tracks.t), unit="frame", desc=f"refine {film.path.name}") as bar:
+            tracks = second_pass(film.pictures(), known, tracks, lambda _: bar.update(), streaks_only)
+    return tracks
+
+
+def _camera(tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None) -> Camera:
     angle, centre = np.array(tracks.angle), np.array(tracks.centre)
     good = np.isfinite(angle)
     found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
-    drive = complex(np.nan, np.nan) if found is None else complex(np.conj(found.drive) / scale)
+    drive = complex(np.nan, np.nan) if found is None else complex(np.conj(found.drive) / size.value)
 
     def camera(place: complex, sigma: float, origin: str) -> Camera:
-        return Camera(scale, rim.sigma / radius, place, sigma, origin, drive)
+        return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive)
 
     if given is not None:
         place = complex(float(given[0]), float(given[1]))
@@ -164,7 +228,7 @@ def _camera(
             raise TrackError(f"pivot must be two finite numbers, not {given!r}")
         return camera(complex(known.look.lens.plane(place)), 0.0, "given")
     if found is not None:
-        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / scale, "rolling constraint")
+        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / size.value, "rolling constraint")
     guess = support(known.view)
     if guess is None:
         raise TrackError(
@@ -199,8 +263,11 @@ def _meta(
         "frames_lost": lost,
         "turns_doubtful": doubtful,
         "exposure": known.exposure,
+        "readout": known.readout.value,
+        "readout_sigma": known.readout.sigma,
         "px_per_m": camera.scale,
         "px_per_m_sigma": camera.scale_sigma,
+        "px_per_m_from": camera.scale_from,
         "pivot_u": camera.pivot.real,
         "pivot_v": camera.pivot.imag,
         "pivot_sigma": camera.pivot_sigma,
@@ -224,7 +291,7 @@ def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[ND
     film = Film(video)
     for picture in film.pictures():
         if picture.index in wanted:
-            found[picture.index] = _rgb(picture, film.full_range)
+            found[picture.index] = rgb(picture, film.full_range)
             if len(found) == len(wanted):
                 break
     lost = wanted - set(found)
@@ -241,29 +308,11 @@ def pictures_between(video: str | os.PathLike[str], t: NDArray[np.float64]) -> I
     for picture in film.pictures(float(t[0])):
         while want is not None and before is not None and picture.t > want:
             nearest = before if want - before.t < picture.t - want else picture
-            yield _rgb(nearest, film.full_range)
+            yield rgb(nearest, film.full_range)
             want = next(wanted, None)
         if want is None:
             return
         before = picture
     while want is not None and before is not None:
-        yield _rgb(before, film.full_range)
+        yield rgb(before, film.full_range)
         want = next(wanted, None)
-
-
-def _rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
-    import cv2
-
-    h, w = picture.y.shape
-    if not full_range and h % 2 == w % 2 == 0:  # OpenCV knows these: twenty times faster
-        codes = np.concatenate([picture.y.ravel(), picture.u.ravel(), picture.v.ravel()])
-        known = cv2.cvtColor(codes.reshape(h * 3 // 2, w), cv2.COLOR_YUV2RGB_I420)
-        return np.asarray(known, dtype=np.uint8)
-    y, u, v = (
-        cv2.resize(p, (w, h), interpolation=cv2.INTER_LINEAR).astype(np.float32)
-        for p in (picture.y, picture.u, picture.v)
-    )
-    if not full_range:
-        y, u, v = (y - 16) * (255 / 219), (u - 128) * (255 / 224) + 128, (v - 128) * (255 / 224) + 128
-    planes = np.clip(np.round(np.dstack([y, v, u])), 0, 255).astype(np.uint8)
-    return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YCrCb2RGB), dtype=np.uint8)

@@ -68,7 +68,7 @@ def survey(film: Film) -> Survey:
         raise TrackError(f"{film.path}: no frame can be decoded")
     if frames < FEWEST:
         raise TrackError(f"{film.path} is too short: {frames} frames, at least {FEWEST} are needed")
-    step = max(1, len(bursts) // most)
+    step = -(-len(bursts) // most)
     return Survey([b for b in bursts[::step] if b], frames, film.broken, height, width)
 
 

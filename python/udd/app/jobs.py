@@ -1,0 +1,199 @@
+"""One queue of jobs, each in a process and a folder of its own; any can be cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import contextlib
+import json
+import secrets
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from udd.errors import UddError
+
+from . import limits, wire
+
+Send = Callable[[dict[str, Any] | bytes], None]
+
+_LINE = 8 << 20  # bytes of a message from a job
+ENDED = ("done", "failed", "cancelled")
+
+
+@dataclass
+class Job:
+    """A job and what became of it.
+
+    Attributes
+    ----------
+    asked : dict
+        What the process is told.
+    state : str
+        ``"waiting"``, ``"running"``, ``"done"``, ``"failed"`` or ``"cancelled"``.
+    stages : list of str
+        What it said it was doing, in order.
+    answer : dict
+        Its result, or ``{"error": sentence}``.
+    """
+
+    asked: dict[str, Any]
+    folder: Path
+    id: str = field(default_factory=lambda: secrets.token_hex(8))
+    state: str = "waiting"
+    stages: list[str] = field(default_factory=list)
+    answer: dict[str, Any] = field(default_factory=dict)
+    watchers: set[Send] = field(default_factory=set)
+    process: asyncio.subprocess.Process | None = None
+
+    def said(self) -> dict[str, Any]:
+        """All that is known of it."""
+        return {
+            "type": "job",
+            "job": self.id,
+            "kind": self.asked["kind"],
+            "state": self.state,
+            "stages": self.stages,
+            "answer": self.answer,
+        }
+
+    def tell(self) -> None:
+        """Tell those who watch."""
+        for send in list(self.watchers):
+            send(self.said())
+
+    def file(self, name: str) -> Path | None:
+        """One of the files that it made, by a name that it gave."""
+        known = {part["name"] for part in self.answer.get("parts", ())}
+        return self.folder / "out" / name if name in known else None
+
+
+class Jobs:
+    """The queue; one job runs at a time."""
+
+    def __init__(self) -> None:
+        self.jobs: dict[str, Job] = {}
+        self._queue: asyncio.Queue[Job] = asyncio.Queue()
+        self._task: asyncio.Task[None] | None = None
+
+    def submit(self, asked: dict[str, Any], folder: Path) -> Job:
+        """Queue a job; the oldest that has ended makes room.
+
+        Raises
+        ------
+        UddError
+            Too many are waiting.
+        """
+        ended = [job for job in self.jobs.values() if job.state in ENDED]
+        while len(self.jobs) >= limits.JOBS and ended:
+            self.forget(ended.pop(0))
+        if len(self.jobs) >= limits.JOBS:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise UddError("Too many jobs are waiting: cancel one.")
+        job = Job(asked, folder)
+        self.jobs[job.id] = job
+        self._queue.put_nowait(job)
+        return job
+
+    def cancel(self, job: Job) -> None:
+        """Stop a job, whether it waits or runs."""
+        if job.state in ENDED:
+            return
+        job.state = "cancelled"
+        _kill(job)
+        _empty(job)
+        job.tell()
+
+    def forget(self, job: Job) -> None:
+        """Drop a job with all that it made."""
+        self.cancel(job)
+        self.jobs.pop(job.id, None)
+        shutil.rmtree(job.folder, ignore_errors=True)
+
+    async def __aenter__(self) -> Jobs:
+        self._task = asyncio.create_task(self._work())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task
+        for job in list(self.jobs.values()):
+            self.forget(job)
+
+    async def _work(self) -> None:
+        while True:
+            job = await self._queue.get()
+            if job.state != "waiting":
+                continue
+            job.state = "running"
+            job.tell()
+            await _run(job)
+            if job.state == "running":  # its process ended without a word
+                job.state = "failed"
+                job.answer = {
+                    "error": "The job ended early: it took too much memory or time, or its file broke it."
+                }
+            _empty(job)
+            job.tell()
+
+
+async def _run(job: Job) -> None:
+    job.process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-P", "-m", "udd.app.worker"),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+        cwd=job.folder,
+        limit=_LINE,
+    )
+    assert job.process.stdin is not None and job.process.stdout is not None
+    try:
+        await _talk(job, job.process.stdin, job.process.stdout)
+    finally:
+        _kill(job)
+        await job.process.wait()
+
+
+async def _talk(job: Job, to: asyncio.StreamWriter, back: asyncio.StreamReader) -> None:
+    to.write((json.dumps(job.asked) + "\n").encode())
+    with contextlib.suppress(ConnectionError):
+        await to.drain()
+        to.close()
+        await to.wait_closed()
+    async for line in back:
+        if job.state != "running":
+            break
+        _take(job, json.loads(line))
+
+
+def _take(job: Job, message: dict[str, Any]) -> None:
+    if "say" in message:
+        job.stages.append(str(message["say"]))
+        job.tell()
+    elif "frame" in message:
+        picture = wire.frame({"job": job.id, **message["frame"]}, base64.b64decode(message["jpeg"]))
+        for send in list(job.watchers):
+            send(picture)
+    elif "done" in message:
+        job.state, job.answer = "done", message["done"]
+    elif "error" in message:
+        job.state, job.answer = "failed", {"error": str(message["error"])}
+
+
+def _kill(job: Job) -> None:
+    if job.process is not None and job.process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            job.process.kill()
+
+
+def _empty(job: Job) -> None:
+    """Delete what was uploaded, and what a job that failed has left."""
+    if job.state == "done":
+        (job.folder / job.asked.get("file", "none")).unlink(missing_ok=True)
+    else:
+        shutil.rmtree(job.folder, ignore_errors=True)

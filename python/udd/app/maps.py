@@ -1,0 +1,131 @@
+"""Sections, diagrams and exponents for the page, from udd's public functions."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.branching import bifurcation
+from udd.errors import ModelError
+from udd.exponents import lyapunov
+from udd.models import DLE, Model
+from udd.sections import poincare
+
+from . import limits
+from .spec import Start, beyond_the_edge, drive_of
+
+Array = NDArray[np.float64]
+
+_TRANSIENT = 60  # crossings left out
+_VALUES = (90, 300)  # of the drive: a first picture, then a better one
+_KEPT = 40  # points of every orbit in a diagram
+_EXPONENT = {"dle": (1200.0, 0.03), "disk": (160.0, 0.25)}  # time of a run, and the error that is enough
+
+#: The surfaces that the page offers, and the component that its return map shows.
+SURFACES = {
+    "dle": {"zero": ("z", "y"), "maxima": ("maxima of z", "z"), "reversals": ("reversal", "z")},
+    "disk": {"zero": ("Z", "Y"), "maxima": ("maxima of Z", "Z"), "reversals": ("reversal", "Z")},
+}
+
+
+def _crew() -> int:
+    """Leave a core to the run that is watched."""
+    return max(1, (os.cpu_count() or 2) - 1)
+
+
+def section(start: Start, surface: str, count: int) -> tuple[Array, str]:
+    """Crossings of a surface, shape (n, dim), and how the orbit ended."""
+    known = SURFACES[start.model.kind]
+    if surface not in known:
+        raise ModelError(f"no section is called {surface!r}; there are {', '.join(known)}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the outcome says it
+        found = poincare(
+            beyond_the_edge(start.model),
+            known[surface][0],
+            min(count, limits.POINTS),
+            state0=list(start.state),
+            transient=_TRANSIENT,
+            threads=_crew(),
+            progress=False,
+        )
+    return np.ascontiguousarray(found.state), str(found.outcome)
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Section points over the drive: ``points`` is (starts, values, points, dim)."""
+
+    values: Array
+    label: Array
+    period: Array
+    points: Array
+
+
+@dataclass(frozen=True)
+class Exponents:
+    """The largest exponent over the drive, with its standard error."""
+
+    values: Array
+    exponent: Array
+    error: Array
+
+
+def starts_of(start: Start) -> Array:
+    """Where the orbits of a diagram begin: the page's state, its mirror image, and a third one."""
+    state = np.array(start.state)
+    mirrored = state.copy()
+    mirrored[:2] *= -1.0
+    third = np.zeros(len(state))
+    third[:3] = [0.1, 0.2, 1.5] if isinstance(start.model, DLE) else [3.0, 0.005, 0.0]
+    return np.array([state, mirrored, third])
+
+
+def diagram(start: Start, low: float, high: float) -> Iterator[Diagram | Exponents]:
+    """A diagram over the drive and the exponents under it, first coarse, then fine."""
+    model, name = beyond_the_edge(start.model), drive_of(start.model)
+    for count in _VALUES:
+        values = np.linspace(low, high, count)
+        yield _diagram(model, name, values, starts_of(start))
+        yield _exponents(model, name, values)
+
+
+def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what has no verdict has label 0
+        found = bifurcation(
+            model,
+            name,
+            values,
+            n=_KEPT,
+            transient=2 * _TRANSIENT,
+            starts=starts,
+            extend=6,
+            threads=_crew(),
+            progress=False,
+        )
+    points = np.stack([found[state].values[0] for state in model.state_names], axis=-1)
+    label, period = (found[key].values[0].astype(float) for key in ("attractor", "period"))
+    return Diagram(values, label, period, np.ascontiguousarray(points))
+
+
+def _exponents(model: Model, name: str, values: Array) -> Exponents:
+    time, enough = _EXPONENT[model.kind]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the error is drawn
+        value, error = lyapunov(
+            model,
+            parameters={name: values},
+            t=time,
+            transient=time / 4,
+            tol=enough,
+            threads=_crew(),
+            progress=False,
+            with_error=True,
+        )
+    return Exponents(values, value, error)

@@ -1,0 +1,65 @@
+"""A discovery as the page says it: the verdict and the numbers that it rests on."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from typing import Any
+
+from udd.models import Disk
+from udd.report import tables, words
+from udd.sweeping.models_json import model_to_dict
+
+_RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
+
+
+def text_of(markup: object) -> str:
+    """What the report writes with tags, as text alone."""
+    raised = re.sub(r"<sup>(.*?)</sup>", lambda m: m[1].translate(_RAISED), str(markup))
+    return html.unescape(re.sub(r"<[^>]*>", "", raised))
+
+
+def of(found: Any) -> dict[str, Any]:
+    """What stands at the top of the result."""
+    numbers = words.headline(found)
+    return {
+        "verdict": found.verdict,
+        "sentence": words.verdict(found),
+        "effects": [
+            {"title": e.title, "equation": text_of(words.pretty(e.equation)), "values": _values(e), "p": e.p}
+            for e in found.effects
+        ],
+        "limits": [text_of(text) for text in words.short_limits(found)],
+        "before": numbers.before,
+        "after": numbers.after if found.effects else None,
+        "floor": numbers.floor,
+        "span": numbers.span,
+        "ratio": numbers.ratio if found.effects else None,
+        "interval": numbers.interval if found.effects else None,
+        "errors": [{key: text_of(text) for key, text in row.items()} for row in tables.errors(found)],
+        "evidence": [
+            {"title": s.candidate.title, "chi2": s.chi2 if math.isfinite(s.chi2) else None}
+            for s in found.scans[0][:8]
+        ],
+        "explore": _explore(found),
+    }
+
+
+def _values(effect: Any) -> list[str]:
+    units = {p.name: p.unit for p in effect.effect.spec.parameters}
+    return [
+        text_of(
+            f"{words.pretty(name)} = {words.with_error(value, effect.errors.get(name))} {units.get(name, '')}"
+        )
+        for name, value in effect.parameters.items()
+        if not words.is_curve(effect.effect)
+    ]
+
+
+def _explore(found: Any) -> dict[str, Any] | None:
+    """The fitted model and its first state, to run on the page; None for what the page does not show."""
+    model = found.fit.models[0]
+    if not isinstance(model, Disk) or any(e.made is not None for e in model.effects):
+        return None
+    return {"model": model_to_dict(model), "state": found.fit.states[0].tolist()}

@@ -1,0 +1,159 @@
+"""The server: the page, its WebSocket, uploads and downloads."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import secrets
+import shutil
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+from udd.errors import UddError
+
+from . import limits, uploads
+from .catalogue import catalogue
+from .jobs import Jobs
+from .runs import as_csv
+from .security import REPORT_POLICY, Guard
+from .spec import start_of
+from .stream import Page
+
+STATIC = Path(__file__).parent / "static"
+
+
+def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Starlette:
+    """The application; it answers to these hosts (``name:port``) and those who know the token."""
+    jobs, crew = Jobs(), ThreadPoolExecutor(1, "udd-maps")
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        async with jobs:
+            yield
+        crew.shutdown(wait=False, cancel_futures=True)
+
+    async def page(_: Request) -> Response:
+        return FileResponse(STATIC / "index.html")
+
+    async def about(_: Request) -> Response:
+        return JSONResponse(catalogue())
+
+    async def table(request: Request) -> Response:
+        start = start_of(_json(request.query_params.get("run", "")))
+        text = as_csv(start, _number(request, "seconds") or math.nan)
+        return _download(Response(text, media_type="text/csv"), "udd-run.csv")
+
+    async def new_job(request: Request) -> Response:
+        kind = request.path_params["kind"]
+        folder = uploads.private_folder()
+        try:
+            asked = await _asked(kind, request, folder)
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        return JSONResponse({"job": jobs.submit(asked, folder).id})
+
+    async def result(request: Request) -> Response:
+        job = jobs.jobs.get(request.path_params["job"])
+        file = job.file(request.path_params["name"]) if job is not None else None
+        if file is None:
+            return PlainTextResponse("There is no such file any more.", 404)
+        response = FileResponse(file)
+        if file.suffix in (".html", ".svg"):
+            response.headers["content-security-policy"] = REPORT_POLICY
+        return _download(response, f"udd-{file.name}") if "download" in request.query_params else response
+
+    async def socket(websocket: WebSocket) -> None:
+        await Page(websocket, jobs, crew).serve()
+
+    routes = [
+        Route("/", page),
+        Route("/api/catalogue", about),
+        Route("/api/run.csv", table),
+        Route("/api/jobs/{kind}", new_job, methods=["POST"]),
+        Route("/api/jobs/{job}/{name}", result),
+        WebSocketRoute("/api/socket", socket),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    handlers: dict[Any, Callable[..., Any]] = {UddError: _refused, uploads.TooLarge: _too_large}
+    guard = Middleware(Guard, token=token, hosts=hosts, any_address=any_address)
+    app = Starlette(routes=routes, middleware=[guard], exception_handlers=handlers, lifespan=lifespan)
+    app.state.jobs = jobs
+    return app
+
+
+def new_token() -> str:
+    """What only those know who were given the link."""
+    return secrets.token_urlsafe(24)
+
+
+async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
+    """What a job is told, with its file in its folder."""
+    known = {name: value for name in ("W", "R", "length") if (value := _number(request, name)) is not None}
+    if kind == "film":
+        declared = request.headers.get("content-length", "0")
+        if declared.isdigit() and int(declared) > limits.UPLOAD:
+            raise uploads.TooLarge(f"The file is larger than {limits.UPLOAD >> 20} MB.")
+        file = await uploads.receive(request.stream(), folder)
+        return {"kind": "loop", "file": file.name, "film": file.suffix == ".film", **known}
+    if kind == "sample":
+        from udd import demo
+
+        with as_file(files("udd") / "data" / "sample.mp4") as sample:
+            shutil.copyfile(sample, folder / "sample.mp4")
+        return {"kind": "loop", "file": "sample.mp4", "film": True, "W": demo.W, "R": demo.R}
+    if kind == "render":
+        start = _json((await request.body())[: limits.MESSAGE].decode("utf-8", "replace"))
+        seconds = _number(request, "seconds") or 0.0
+        if start_of(start).model.kind != "disk":
+            raise UddError("Only a run of the disk can be filmed.")
+        if not 0.5 <= seconds <= limits.RENDERED:
+            raise UddError(f"A film lasts from 0.5 to {limits.RENDERED:g} s.")
+        return {"kind": "render", "start": start, "seconds": seconds}
+    raise UddError("There is no such job.")
+
+
+def _json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        raise UddError("The request is not JSON.") from None
+
+
+def _number(request: Request, name: str) -> float | None:
+    text = request.query_params.get(name)
+    if text is None or not text.strip():
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        raise UddError(f"{name} must be a number.") from None
+    if not math.isfinite(value):
+        raise UddError(f"{name} must be finite.")
+    return value
+
+
+def _download(response: Response, name: str) -> Response:
+    response.headers["content-disposition"] = f'attachment; filename="{name}"'
+    return response
+
+
+async def _refused(_: Request, error: Exception) -> Response:
+    text = " ".join(str(error).split())
+    return PlainTextResponse(text[:1].upper() + text[1:], 400)
+
+
+async def _too_large(_: Request, error: Exception) -> Response:
+    return PlainTextResponse(str(error), 413)

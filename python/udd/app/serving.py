@@ -1,0 +1,106 @@
+"""From the command to a page that is served."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+import sys
+import webbrowser
+from collections.abc import Callable
+
+from udd.errors import UddError
+
+from . import limits
+
+
+def serve(
+    host: str, port: int, *, fragment: str = "", browser: bool = True, ready: Callable[[str], object] = print
+) -> None:
+    """Serve the page until Ctrl-C.
+
+    Parameters
+    ----------
+    host, port : str, int
+        Where; port 0 is any that is free.
+    fragment : str
+        The run that the browser is opened with, as the page's links hold it.
+    browser : bool
+        Whether to open one.
+    ready : callable
+        Told the link once the server listens.
+
+    Raises
+    ------
+    UddError
+        The address cannot be used.
+    """
+    import uvicorn
+
+    from .server import make_app, new_token
+
+    listening = _listen(host, port)
+    port = listening.getsockname()[1]
+    names, any_address = hosts_of(host, port)
+    if not _is_local(host):
+        print(
+            "udd: warning: everybody on this network who is given the link can use this page, and what "
+            "passes is not encrypted",
+            file=sys.stderr,
+        )
+    token = new_token()
+    shown = names[0] if not any_address else f"{_own_name()}:{port}"
+    link = f"http://{shown}/?token={token}"
+    config = uvicorn.Config(
+        make_app(token, names, any_address=any_address),
+        log_level="warning",
+        access_log=False,
+        ws_max_size=limits.MESSAGE,
+        proxy_headers=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+    )
+    server = uvicorn.Server(config)
+    ready(link)
+    if browser:
+        webbrowser.open(link + (f"#{fragment}" if fragment else ""))
+    server.run(sockets=[listening])
+
+
+def hosts_of(host: str, port: int) -> tuple[list[str], bool]:
+    """What a browser may call this server, and whether any address will do."""
+    bracketed = f"[{host}]" if ":" in host else host
+    any_address = host in ("0.0.0.0", "::")
+    if any_address:
+        return [f"127.0.0.1:{port}", f"localhost:{port}", f"{_own_name()}:{port}"], True
+    names = [f"{bracketed}:{port}"]
+    if _is_local(host):
+        names += [f"localhost:{port}"]
+    return names, False
+
+
+def _own_name() -> str:
+    return socket.gethostname().lower()
+
+
+def _is_local(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except OSError as error:
+        raise UddError(f"{host}:{port} cannot be served: {error.strerror or error}") from None
+    listening = socket.socket(family, kind, protocol)
+    try:
+        if sys.platform != "win32":
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(64)
+    except OSError as error:
+        listening.close()
+        raise UddError(f"{host}:{port} cannot be served: {error.strerror or error}") from None
+    return listening

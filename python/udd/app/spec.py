@@ -1,0 +1,82 @@
+"""What the page asks for, checked: models and states from JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from udd.errors import ModelError
+from udd.models import DLE, Disk, Model
+from udd.sweeping.models_json import model_from_dict
+from udd.trajectory import initial_state
+
+
+@dataclass(frozen=True)
+class Start:
+    """A model and the state that a run begins at."""
+
+    model: Model
+    state: tuple[float, ...]
+
+
+def start_of(data: Any) -> Start:
+    """A model and a state, as the page writes them down.
+
+    Raises
+    ------
+    ModelError
+        Naming what cannot be used.
+    """
+    if not isinstance(data, dict):
+        raise ModelError("a run must be given as a table with model and state")
+    model = model_of(data.get("model"))
+    state = initial_state(model, data.get("state"))  # type: ignore[arg-type]  # checked there
+    return Start(model, tuple(state.tolist()))
+
+
+def model_of(data: Any) -> Model:
+    """A disk or the DLE from JSON, with effects of the library."""
+    if isinstance(data, dict) and data.get("kind") not in ("disk", "dle"):
+        raise ModelError(f"the page shows a disk or the dle, not {data.get('kind')!r}")
+    return model_from_dict(data)
+
+
+def key_of(start: Start) -> str:
+    """The same text for the same run."""
+    return f"{start.model!r} {start.state!r}"
+
+
+def beyond_the_edge(model: Model) -> Model:
+    """The equations alone: a disk that does not leave the wheels."""
+    return model.replace(edge="ignore") if isinstance(model, Disk) else model
+
+
+def drive_of(model: Model) -> str:
+    """The name of the drive among the parameters."""
+    return "w" if isinstance(model, DLE) else "W"
+
+
+def message_of(text: str) -> dict[str, Any]:
+    """A message from the page.
+
+    Raises
+    ------
+    ModelError
+        It is no JSON object.
+    """
+    try:
+        data = json.loads(text)
+    except ValueError:
+        raise ModelError("a message must be JSON") from None
+    if not isinstance(data, dict):
+        raise ModelError("a message must be a JSON object")
+    return data
+
+
+def whole(data: dict[str, Any], name: str, least: int, most: int) -> int:
+    """A whole number of a message."""
+    value = data.get(name)
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise ModelError(f"{name} must be a whole number from {least} to {most}, not {value!r}")
+    return value

@@ -1,0 +1,71 @@
+// The state of the page in its address: numbers are written so that they come back as the same bits.
+
+/** The run that stands behind the # of the address; null where there is none. */
+export function read(hash, catalogue) {
+  const given = new URLSearchParams(hash.replace(/^#/, ""));
+  const kind = given.get("model");
+  const about = catalogue.models[kind];
+  if (!about) return null;
+  const model = { kind };
+  for (const p of about.parameters) {
+    model[p.name] = given.has(p.name) ? Number(given.get(p.name)) : p.default;
+  }
+  if (kind === "disk") {
+    model.edge = given.get("edge") === "ignore" ? "ignore" : "stop";
+    model.effects = given.getAll("effect").map(effectOf);
+  }
+  const state = (given.get("state") ?? "").split(",").map(Number);
+  const numbers = [...about.parameters.map((p) => model[p.name]), ...state];
+  if (state.length !== about.states.length || !numbers.every(Number.isFinite)) return null;
+  return { model, state, twin: given.get("twin") === "1", tab: given.get("tab"), speed: Number(given.get("speed")) };
+}
+
+function effectOf(text) {
+  const [name, rest] = [text.split(":")[0], text.split(":").slice(1).join(":")];
+  const effect = { name };
+  for (const part of rest.split(",").filter(Boolean)) {
+    const [key, value] = part.split("=");
+    effect[key] = key === "momentum" || key === "treatment" ? value : Number(value);
+  }
+  return effect;
+}
+
+/** The address of a run. */
+export function write({ model, state, twin, tab, speed }, catalogue) {
+  const out = new URLSearchParams({ model: model.kind });
+  for (const p of catalogue.models[model.kind].parameters) out.set(p.name, String(model[p.name]));
+  if (model.edge === "ignore") out.set("edge", "ignore");
+  for (const { name, ...rest } of model.effects ?? []) {
+    out.append("effect", `${name}:${Object.entries(rest).map(([k, v]) => `${k}=${v}`).join(",")}`);
+  }
+  out.set("state", state.map(String).join(","));
+  if (twin) out.set("twin", "1");
+  if (tab) out.set("tab", tab);
+  if (speed && speed !== 1) out.set("speed", String(speed));
+  return `#${out.toString().replaceAll("%2C", ",").replaceAll("%3A", ":").replaceAll("%3D", "=")}`;
+}
+
+/** The same run in Python. */
+export function python({ model, state }, catalogue) {
+  const { kind, effects = [], edge, ...numbers } = model;
+  const drive = kind === "dle" ? "w" : "W";
+  const rest = Object.entries(numbers).filter(([name]) => name !== drive).map(([n, v]) => `${n}=${v}`);
+  const made = effects.map(({ name, ...values }) => {
+    const list = Object.entries(values).map(([n, v]) => `${n}=${typeof v === "string" ? `"${v}"` : v}`);
+    return `udd.effects.${name}(${list.join(", ")})`;
+  });
+  if (made.length) rest.push(`effects=[${made.join(", ")}]`);
+  if (edge === "ignore") rest.push('edge="ignore"');
+  const call = kind === "dle" ? "udd.DLE" : "udd.Disk";
+  const per = catalogue.models[kind].per_unit;
+  return [
+    "import numpy as np",
+    "import udd",
+    "",
+    "n = 10_000  # states; a run twice as long, as its last step is cut to its end",
+    `t = np.arange(2 * n) / ${per}`,
+    `run = udd.simulate(${call}(${[numbers[drive], ...rest].join(", ")}), t, [${state.join(", ")}])`,
+    "t, state = t[:n], run.state[:n]",
+    "",
+  ].join("\n");
+}

@@ -1,0 +1,236 @@
+// The loop: a film or a table goes in, the verdict comes out.
+import { address, request } from "./link.js";
+import { t } from "./texts.js";
+
+const $ = (id) => document.getElementById(id);
+const MARKS = ["#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b"];
+
+export class Loop {
+  constructor(link, page) {
+    this.link = link;
+    this.page = page;
+    this.job = null;
+    $("file").addEventListener("change", () => this.choose($("file").files[0]));
+    $("go").addEventListener("click", () => this.send());
+    $("sample").addEventListener("click", () => this.begin("sample"));
+    $("cancel").addEventListener("click", () => this.cancel());
+    $("another").addEventListener("click", () => this.show("ask"));
+    $("explore-fit").addEventListener("click", () => page.open(this.fitted.model, this.fitted.state));
+    const drop = $("drop");
+    for (const name of ["dragover", "dragenter"]) {
+      drop.addEventListener(name, (e) => {
+        e.preventDefault();
+        drop.classList.add("over");
+      });
+    }
+    drop.addEventListener("dragleave", () => drop.classList.remove("over"));
+    drop.addEventListener("drop", (e) => {
+      e.preventDefault();
+      drop.classList.remove("over");
+      this.choose(e.dataTransfer.files[0]);
+    });
+    link.on("job", (message) => message.job === this.job && this.take(message));
+    link.on("frame", ({ numbers: [length], body }) => this.frame(length, body));
+    link.on("open", () => this.job && link.say({ type: "watch", job: this.job }));
+    this.show("ask");
+  }
+
+  show(name) {
+    for (const id of ["ask", "work", "found"]) $(id).hidden = id !== name;
+    if (name !== "found") $("report").removeAttribute("src");
+  }
+
+  choose(file) {
+    this.file = file ?? null;
+    $("failed").textContent = "";
+    $("go").disabled = !file;
+    $("chosen").textContent = file ? t("loop_chosen", { name: file.name, size: (file.size / 2 ** 20).toFixed(1) }) : "";
+  }
+
+  async send() {
+    const most = this.page.catalogue.limits.upload;
+    if (this.file.size > most) return this.fail(t("loop_too_large", { size: most >> 20 }));
+    const number = (id, scale) => $(id).value.trim() && String(Number($(id).value.replace(",", ".")) / scale);
+    const known = { W: number("loop-W", 100), R: number("loop-R", 100), length: number("loop-length", 1) };
+    await this.begin("film", Object.fromEntries(Object.entries(known).filter(([, v]) => v)), this.file);
+  }
+
+  async begin(kind, values = {}, body = undefined) {
+    $("failed").textContent = "";
+    this.stages([t(body ? "loop_uploading" : "loop_waiting")]);
+    const canvas = $("frames");
+    canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
+    canvas.parentElement.hidden = true;
+    $("progress").removeAttribute("value");
+    this.job = null;
+    this.show("work");
+    try {
+      const answer = await request(`/api/jobs/${kind}`, values, { method: "POST", body });
+      this.job = (await answer.json()).job;
+      this.link.say({ type: "watch", job: this.job });
+    } catch (error) {
+      this.fail(error.message);
+    }
+  }
+
+  cancel() {
+    if (this.job) this.link.say({ type: "cancel", job: this.job });
+    else this.show("ask");
+  }
+
+  fail(text) {
+    this.show("ask");
+    $("failed").textContent = text;
+  }
+
+  stages(list) {
+    const items = list.map((text) => {
+      const item = document.createElement("li");
+      item.textContent = text;
+      return item;
+    });
+    $("stages").replaceChildren(...items);
+    $("stages").scrollTop = 1e6;
+  }
+
+  take({ state, stages, answer }) {
+    if (state === "waiting") this.stages([t("loop_waiting")]);
+    else this.stages(stages);
+    if (stages.length && !stages.at(-1).includes("film")) $("progress").removeAttribute("value");
+    if (state === "cancelled") this.fail(t("loop_cancelled"));
+    if (state === "failed") this.fail(answer.error);
+    if (state === "done") this.done(answer);
+  }
+
+  async frame(length, body) {
+    const about = JSON.parse(new TextDecoder().decode(body.subarray(0, length)));
+    if (about.job !== this.job) return;
+    const picture = await createImageBitmap(new Blob([body.subarray(length)], { type: "image/jpeg" }));
+    const canvas = $("frames"), c = canvas.getContext("2d");
+    canvas.parentElement.hidden = false;
+    if (canvas.width !== picture.width || canvas.height !== picture.height) {
+      canvas.width = picture.width;
+      canvas.height = picture.height;
+    }
+    c.drawImage(picture, 0, 0);
+    c.lineWidth = 2.5;
+    for (const [k, [u, v]] of (about.marks ?? []).entries()) {
+      for (const [colour, radius] of [["#fff", 11], [MARKS[k], 9]]) {
+        c.strokeStyle = colour;
+        c.beginPath();
+        c.arc(u, v, radius, 0, 2 * Math.PI);
+        c.stroke();
+      }
+    }
+    if (about.centre) {
+      const [u, v] = about.centre;
+      c.strokeStyle = "#00b7cf";
+      c.beginPath();
+      c.moveTo(u - 8, v);
+      c.lineTo(u + 8, v);
+      c.moveTo(u, v - 8);
+      c.lineTo(u, v + 8);
+      c.stroke();
+    }
+    $("progress").value = about.number / about.of;
+    $("frame-said").textContent = t(about.marks ? "loop_frame" : "loop_frame_lost", about);
+  }
+
+  part(name, more = {}) {
+    return address(`/api/jobs/${this.job}/${name}`, more);
+  }
+
+  done(found) {
+    this.show("found");
+    this.fitted = found.explore;
+    $("explore-fit").hidden = !found.explore;
+    $("verdict").textContent = found.verdict;
+    $("sentence").textContent = found.sentence;
+    $("added").replaceChildren(...found.effects.map((e) => {
+      const p = document.createElement("p");
+      p.className = "formula";
+      const b = document.createElement("b");
+      b.textContent = e.equation;
+      p.append(`${e.title}: `, b, e.values.length ? ` with ${e.values.join(", ")}` : "");
+      return p;
+    }), ...[...found.limits, ...(found.warnings ?? [])].map((text) => {
+      const p = document.createElement("p");
+      p.textContent = text;
+      return p;
+    }));
+    const figures = [["before", t("loop_before"), found.before, found.span]];
+    if (found.after) {
+      figures.push(["after", t("loop_after"), found.after, found.span]);
+      figures.push(["", t("loop_ratio"), found.ratio, t("loop_interval", { interval: found.interval })]);
+    }
+    figures.push(["", t("loop_floor"), found.floor, found.span]);
+    $("figures").replaceChildren(...figures.map(([kind, name, value, small]) => {
+      const box = document.createElement("div");
+      box.className = kind;
+      for (const [tag, text] of [["dt", name], ["dd", value]]) {
+        const e = document.createElement(tag);
+        e.textContent = text;
+        box.append(e);
+      }
+      const note = document.createElement("small");
+      note.textContent = small;
+      box.lastChild.append(note);
+      return box;
+    }));
+    this.movie(found.parts, found.effects.length > 0);
+    const errors = found.errors.map((e) => [e.horizon, e.before, ...(found.after ? [e.after] : []), e.floor]);
+    const heads = [t("loop_horizon"), t("loop_before"), ...(found.after ? [t("loop_after")] : []), t("loop_floor")];
+    $("errors").replaceChildren(table(t("loop_errors"), heads, errors));
+    const evidence = found.evidence.map((e) => [e.title, e.chi2 === null ? "–" : e.chi2.toFixed(1)]);
+    $("evidence").replaceChildren(table(t("loop_evidence"), [t("loop_candidate"), t("loop_chi2")], evidence));
+    $("files").replaceChildren(...found.parts.map(({ name, title }) => {
+      const item = document.createElement("li");
+      const a = document.createElement("a");
+      a.href = this.part(name, { download: "1" });
+      a.download = `udd-${name}`;
+      a.textContent = title;
+      item.append(a);
+      return item;
+    }));
+    $("report").src = this.part("report.html");
+  }
+
+  movie(parts, more) {
+    const part = parts.find(({ name }) => /^picture-\d+\.(mp4)$/.test(name)) ?? parts.find(({ name }) => name === "picture-1.svg");
+    $("movie").replaceChildren();
+    if (!part) return;
+    const film = part.name.endsWith("mp4");
+    const shown = document.createElement(film ? "video" : "img");
+    shown.src = this.part(part.name);
+    if (film) {
+      Object.assign(shown, { controls: true, loop: true, muted: true, autoplay: !matchMedia("(prefers-reduced-motion: reduce)").matches });
+      shown.setAttribute("aria-label", part.title);
+    } else shown.alt = part.title;
+    const titles = document.createElement("div");
+    titles.className = "panels";
+    titles.append(...[t("loop_measured"), t("loop_known"), ...(more ? [t("loop_after")] : [])].map((text) => {
+      const title = document.createElement("span");
+      title.textContent = text;
+      return title;
+    }));
+    $("movie").append(titles, shown);
+  }
+}
+
+function table(caption, heads, rows) {
+  const made = document.createElement("table");
+  made.createCaption().textContent = caption;
+  const head = made.createTHead().insertRow();
+  for (const text of heads) {
+    const th = document.createElement("th");
+    th.scope = "col";
+    th.textContent = text;
+    head.append(th);
+  }
+  const body = made.createTBody();
+  for (const row of rows) {
+    const tr = body.insertRow();
+    for (const text of row) tr.insertCell().textContent = text;
+  }
+  return made;
+}

@@ -1,0 +1,184 @@
+"""One page's WebSocket: what it asks for, and the answers.
+
+A page asks for pieces of a run, and for maps; each question carries a generation, which the answer repeats.
+The server keeps nothing that the page could not ask for again, so a page whose connection dropped goes on
+where it was.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Executor
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from udd.errors import UddError
+
+from . import limits, maps, wire
+from .jobs import Jobs, Send
+from .runs import RATE, Runs, columns_of
+from .spec import message_of, start_of, whole
+
+_WAITING = 64  # messages that a page may be behind
+
+
+class Page:
+    """What one connected page has asked for."""
+
+    def __init__(self, socket: WebSocket, jobs: Jobs, crew: Executor) -> None:
+        self._socket = socket
+        self._jobs = jobs
+        self._crew = crew  # draws one map at a time, whoever asks
+        self._runs = Runs()
+        self._out: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(_WAITING)
+        self._maps: dict[str, asyncio.Task[None]] = {}
+
+    async def serve(self) -> None:
+        """Answer until the page is gone."""
+        await self._socket.accept()
+        sender = asyncio.create_task(self._sending())
+        try:
+            while True:
+                await self._answer(await self._socket.receive_text())
+        except (WebSocketDisconnect, KeyError):  # KeyError: a binary message
+            pass
+        finally:
+            for job in self._jobs.jobs.values():
+                job.watchers.discard(self.post)
+            for task in [sender, *self._maps.values()]:
+                task.cancel()
+
+    def post(self, message: dict[str, Any] | bytes) -> None:
+        """Send without waiting; a page that is far behind misses pictures, not words."""
+        if self._out.full() and isinstance(message, bytes):
+            return
+        if self._out.full():
+            self._out.get_nowait()
+        self._out.put_nowait(message)
+
+    async def _sending(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                message = await self._out.get()
+                if isinstance(message, bytes):
+                    await self._socket.send_bytes(message)
+                else:
+                    await self._socket.send_text(json.dumps(message))
+
+    async def _answer(self, text: str) -> None:
+        said: dict[str, Any] = {}
+        try:
+            if len(text) > limits.MESSAGE:
+                raise UddError("the message is too long")
+            said = message_of(text)
+            kind = said.get("type")
+            known: dict[Any, Callable[[dict[str, Any]], Any]] = {
+                "run": self._run,
+                "section": self._section,
+                "diagram": self._diagram,
+                "watch": self._watch,
+                "cancel": self._cancel,
+            }
+            if kind not in known:
+                raise UddError(f"no message is called {kind!r}")
+            await known[kind](said)
+        except (UddError, OverflowError) as error:
+            await self._out.put(_refused(said, error))
+
+    async def _run(self, said: dict[str, Any]) -> None:
+        generation = whole(said, "generation", 0, 2**32 - 1)
+        which = whole(said, "run", 0, 1)
+        first = whole(said, "first", 0, 2**31)
+        count = whole(said, "count", 1, limits.SAMPLES)
+        start = start_of(said)
+        if first > limits.MODEL_SECONDS * RATE:
+            raise UddError("the run is not that long")
+        run = await asyncio.to_thread(self._runs.of, start)
+        rows, last = await asyncio.to_thread(run.piece, first, count)
+        if first == 0:
+            about = {"columns": columns_of(start.model), "motor": run.motor}
+            await self._out.put({"type": "run", "generation": generation, "run": which, **about})
+        await self._out.put(wire.piece(generation, which, first, rows, last))
+        if last:
+            end = {"outcome": run.outcome, "t": float(run.t[-1]), "count": len(run.t)}
+            await self._out.put({"type": "end", "generation": generation, "run": which, **end})
+
+    async def _section(self, said: dict[str, Any]) -> None:
+        generation = whole(said, "generation", 0, 2**32 - 1)
+        start, surface = start_of(said), str(said.get("surface"))
+        count = whole(said, "count", 2, limits.POINTS)
+
+        async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
+            done = 0
+            while done < count:
+                done = min(count, max(200, 2 * done))
+                points, outcome = await self._drawn(maps.section, start, surface, done)
+                yield wire.section(generation, points)
+                yield {"type": "section", "generation": generation, "found": len(points), "outcome": outcome}
+                if outcome != "finished":
+                    return
+
+        self._begin("section", said, answers())
+
+    async def _diagram(self, said: dict[str, Any]) -> None:
+        generation = whole(said, "generation", 0, 2**32 - 1)
+        start = start_of(said)
+        low, high = (float(said.get(name, "nan")) for name in ("low", "high"))
+        if not 0 < low < high < float("inf"):
+            raise UddError("a diagram needs 0 < low < high")
+
+        async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
+            steps = maps.diagram(start, low, high)
+            while (found := await self._drawn(next, steps, None)) is not None:
+                pack = wire.diagram if isinstance(found, maps.Diagram) else wire.exponents
+                yield pack(generation, found)
+            yield {"type": "diagram", "generation": generation}
+
+        self._begin("diagram", said, answers())
+
+    async def _drawn(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        return await asyncio.get_running_loop().run_in_executor(self._crew, function, *arguments)
+
+    def _begin(self, name: str, said: dict[str, Any], answers: AsyncIterator[dict[str, Any] | bytes]) -> None:
+        """Send a map's answers one by one; a newer question of the same kind ends an older one."""
+
+        async def work() -> None:
+            try:
+                async for answer in answers:
+                    await self._out.put(answer)
+            except (UddError, OverflowError) as error:
+                await self._out.put(_refused(said, error))
+
+        older = self._maps.get(name)
+        if older is not None:
+            older.cancel()
+        self._maps[name] = asyncio.create_task(work())
+
+    async def _watch(self, said: dict[str, Any]) -> None:
+        job = self._jobs.jobs.get(str(said.get("job")))
+        if job is None:
+            raise UddError("there is no such job any more")
+        job.watchers.add(self.post)
+        await self._out.put(job.said())
+
+    async def _cancel(self, said: dict[str, Any]) -> None:
+        job = self._jobs.jobs.get(str(said.get("job")))
+        if job is not None:
+            self._jobs.cancel(job)
+
+
+def _refused(said: dict[str, Any], error: Exception) -> dict[str, Any]:
+    text = " ".join(str(error).split())
+    return {
+        "type": "error",
+        "of": said.get("type"),
+        "generation": said.get("generation"),
+        "text": text[:1].upper() + text[1:] + ("" if text.endswith(".") else "."),
+    }
+
+
+__all__ = ["Page", "Send"]

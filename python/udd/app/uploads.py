@@ -1,0 +1,55 @@
+"""What is sent to the server, into a private folder, and no more than fits."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from udd.errors import UddError
+
+from . import limits
+
+
+class TooLarge(UddError):
+    """More was sent than is taken."""
+
+
+def private_folder() -> Path:
+    """A new folder that only this user can read."""
+    return Path(tempfile.mkdtemp(prefix="udd-app-"))
+
+
+async def receive(chunks: AsyncIterator[bytes], folder: Path) -> Path:
+    """Write what comes to a file in the folder; its name is not the sender's.
+
+    Raises
+    ------
+    TooLarge
+        More bytes than `limits.UPLOAD`; the folder is gone then.
+    UddError
+        Nothing came.
+    """
+    target, size = folder / "upload", 0
+    try:
+        with target.open("wb") as file:
+            async for chunk in chunks:
+                size += len(chunk)
+                if size > limits.UPLOAD:
+                    raise TooLarge(f"The file is larger than {limits.UPLOAD >> 20} MB.")
+                file.write(chunk)
+        if not size:
+            raise UddError("The file is empty.")
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return _named(target)
+
+
+def _named(file: Path) -> Path:
+    """The file under a name with the ending that its content calls for."""
+    with file.open("rb") as opened:
+        start = opened.read(4096)
+    table = ".parquet" if start.startswith(b"PAR1") else ".csv"
+    return file.rename(file.with_suffix(".film" if table == ".csv" and b"\0" in start else table))

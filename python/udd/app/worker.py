@@ -1,0 +1,171 @@
+"""A job, in a process of its own: `python -m udd.app.worker` in a private folder.
+
+What it is asked comes as one line of JSON on its input; what it says goes out as lines of JSON:
+``{"say": text}``, ``{"frame": {...}, "jpeg": base64}``, and at the end ``{"done": {...}}`` or
+``{"error": sentence}``. Its memory and CPU time are limited, and a film that FFmpeg stumbles over takes only
+this process along.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import os
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from udd.cli.answer import as_json
+from udd.errors import UddError
+
+from . import limits
+
+OUT = Path("out")
+_PICTURES_EVERY = 0.2  # s between the frames that are shown
+_CUT = 0.01  # share of the promised frames that may be missing
+_PICTURE = 480  # pixels, the longer side of what is shown
+
+Tell = Callable[[dict[str, Any]], None]
+
+
+def main() -> None:
+    """Do the job that is asked for."""
+    said = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what libraries print is no message
+
+    def tell(message: dict[str, Any]) -> None:
+        said.write(json.dumps(message) + "\n")
+        said.flush()
+
+    asked = json.loads(sys.stdin.readline())
+    _limit()
+    try:
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always", UserWarning)
+            OUT.mkdir()
+            done = JOBS[asked["kind"]](asked, tell)
+        done["warnings"] = [str(w.message) for w in warned if issubclass(w.category, UserWarning)]
+        tell({"done": done})
+    except UddError as error:
+        tell({"error": _sentence(error, asked.get("file", ""))})
+    except MemoryError:
+        tell({"error": "This takes more memory than a job may have."})
+
+
+def _limit() -> None:
+    """So much and no more, where the system can do that."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    resource.setrlimit(resource.RLIMIT_CPU, (limits.CPU_SECONDS, limits.CPU_SECONDS + 5))
+    resource.setrlimit(resource.RLIMIT_AS, (limits.MEMORY, limits.MEMORY))
+
+
+def _sentence(error: Exception, file: str) -> str:
+    """What is wrong, without the name that the file has here."""
+    text = " ".join(str(error).split())
+    if file:
+        text = text.removeprefix(f"{file}: ").replace(file, "the file")
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?", ")")) else ".")
+
+
+def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
+    """From a film or a table to the verdict."""
+    from udd.discovery import discover
+    from udd.measurement import read_measurement
+    from udd.models import Disk, Pendulum
+
+    file, known = Path(asked["file"]), {k: asked[k] for k in ("W", "R") if asked.get(k) is not None}
+    film = asked["film"]
+    tell({"say": "reading the film" if film else "reading the table"})
+    if film:
+        measurement = _tracked(file, known.get("R", 0.08), tell).with_meta(**known)
+    else:
+        measurement = read_measurement(file, **known)
+    measurement.to_csv(OUT / "measurement.csv")
+    if measurement.kind == "pendulum":
+        length = asked.get("length") or measurement.meta.get("length")
+        if not length:
+            raise UddError("this is a pendulum's record: say its length in metres")
+        model: Disk | Pendulum = Pendulum(float(length))
+    else:
+        W, R = measurement.meta.get("W"), measurement.meta.get("R", 0.08)
+        if W is None:
+            raise UddError(
+                "the drive speed W is not in the file's header: say it in cm/s (0 where the wheels stand)"
+            )
+        model = Disk(float(W), R=float(R))
+    found = discover(measurement, model, progress=lambda text: tell({"say": text}))
+    tell({"say": "drawing the report"})
+    found.report(OUT / "report.html", film=file if film else None, source=file)
+    (OUT / "discovery.json").write_text(as_json(found.to_dict()), encoding="utf-8")
+    from . import parts, result
+
+    return {**result.of(found), "parts": parts.split(OUT / "report.html", OUT)}
+
+
+def _tracked(file: Path, radius: float, tell: Tell) -> Any:
+    """The motion in a film, shown while it is tracked."""
+    import cv2
+
+    from udd.tracking import Film, Glimpse, TrackError, track_in_detail
+
+    film = Film(file)
+    if math.prod(film.size) > limits.PIXELS:
+        raise TrackError(f"the film's frames of {film.size[0]} x {film.size[1]} pixels are too large")
+    if film.promised > limits.FRAMES:
+        raise TrackError(f"the film has {film.promised} frames; at most {limits.FRAMES} are tracked here")
+    missing = film.promised - film.packets
+    if missing > _CUT * film.promised:
+        raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
+    tell({"say": "looking over the film"})
+    last = 0.0
+
+    def watch(seen: Glimpse) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if seen.frames > limits.FRAMES:
+            raise TrackError(f"the film has {seen.frames} frames; at most {limits.FRAMES} are tracked here")
+        if now - last < _PICTURES_EVERY and seen.picture.index + 1 < seen.frames:
+            return
+        if last == 0.0:
+            tell({"say": "tracking the film"})
+        last = now
+        height, width = seen.picture.y.shape
+        factor = min(1.0, _PICTURE / max(height, width))
+        small = cv2.resize(seen.image[:, :, ::-1], None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        _, jpeg = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])
+        frame: dict[str, Any] = {"number": seen.picture.index + 1, "of": seen.frames, "t": seen.picture.t}
+        if seen.held:
+            frame["marks"] = (factor * seen.marks).tolist()
+            frame["centre"] = [factor * c for c in seen.centre]
+        tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
+
+    return track_in_detail(file, disk_radius=radius, watch=watch).measurement
+
+
+def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
+    """A film of a run of the page."""
+    from udd.film import render
+    from udd.trajectory import simulate
+
+    from .runs import RATE, times_of
+    from .spec import start_of
+
+    start, seconds = start_of(asked["start"]), float(asked["seconds"])
+    tell({"say": "filming the run"})
+    times = times_of(start.model, round(seconds * RATE) + 1)
+    run = simulate(start.model, times, start.state)
+    render(run, OUT / "run.mp4")
+    return {"parts": [{"name": "run.mp4", "title": "Film of the run"}]}
+
+
+JOBS: dict[str, Callable[[dict[str, Any], Tell], dict[str, Any]]] = {"loop": _loop, "render": _render}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""`udd app`: the page."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from udd.errors import UddError
+
+from .answer import Answer
+from .options import new
+
+_PORT = 8765
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    summary = "Serve the page on this machine: the disk live, its dynamics, a film in and a verdict out."
+    parser = new(commands, "app", run, summary)
+    parser.add_argument(
+        "link",
+        nargs="?",
+        metavar="LINK",
+        help="a link that the page gave, or what stands in it after #: opens with that run",
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to serve (default 127.0.0.1: this machine alone; others lets the network in)",
+    )
+    parser.add_argument("--port", type=int, default=_PORT, help=f"port (default {_PORT}; 0: any free one)")
+    parser.add_argument("--no-browser", action="store_true", help="print the link, open nothing")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Do it."""
+    from udd.app.serving import serve
+
+    if not 0 <= args.port <= 65535:
+        raise UddError(f"--port must be from 0 to 65535, not {args.port}")
+    fragment = (args.link or "").partition("#")[2] or (args.link or "")
+    if args.link and "=" not in fragment:
+        raise UddError(f"{args.link} is no link of the page: it has no # with a run behind it")
+
+    def ready(link: str) -> None:
+        print(link + (f"#{fragment}" if fragment else ""), flush=True)
+        print("Ctrl-C ends it.", file=sys.stderr, flush=True)
+
+    serve(args.host, args.port, fragment=fragment, browser=not args.no_browser, ready=ready)
+    return Answer("", {})

@@ -1,0 +1,31 @@
+"""Panels side by side, with letters, and a line that says where the data are from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FILMED = "measured: a film made by udd.render, tracked by udd.track"
+
+
+def panels(
+    rows: int, columns: int, width: float, height: float, *, note: str = "", projection: str | None = None
+) -> tuple[Figure, list[Any]]:
+    """A new figure with its Axes, row by row; sizes in inches."""
+    from matplotlib.figure import Figure as New
+
+    made = New(figsize=(width, height), layout="constrained")
+    grid: Any = made.subplots(rows, columns, squeeze=False, subplot_kw={"projection": projection})
+    if note:
+        made.suptitle(note, fontsize="small", color="#666666")
+    return made, list(np.ravel(grid))
+
+
+def titled(ax: Axes, number: int, words: str) -> None:
+    """The panel's letter and what it shows."""
+    ax.set_title(f"({'abcdefgh'[number]}) {words}", loc="left", fontsize="medium")

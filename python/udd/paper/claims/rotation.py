@@ -1,0 +1,204 @@
+"""Claims about the steadily rotating states."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from udd.ensembles import ensemble
+from udd.models import DLE
+from udd.paper import device
+from udd.paper.branches import RELAXATION, hopf, relaxed, rotation_of_disk, rotation_of_dle
+from udd.paper.lab import Lab
+from udd.paper.registry import Verdict, claim, judged
+from udd.structure import continuation
+
+
+def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarray:
+    """Which states are one of the rotating ones."""
+    goal = np.array([np.sqrt(w), np.sqrt(w), 0.0])
+    mirror = goal * [-1, -1, 1]
+    near = [np.abs(states - one).max(axis=-1) < within for one in (goal, mirror)]
+    result: np.ndarray = near[0] | near[1]
+    return result
+
+
+@claim(
+    "unstable-rotation",
+    place="Section 5 E",
+    says="The rotating states of the DLE are unstable at every drive: one negative real eigenvalue and a "
+    "growing pair.",
+)
+def unstable_rotation(_lab: Lab) -> Verdict:
+    """The branch of rotating states over six decades of the drive, against the cubic."""
+    branch = rotation_of_dle(0.0, 1e-3, 1e3)
+    pair = branch.multipliers.real.max(axis=1)
+    roots = [np.roots([1, 1, w, 2 * w]) for w in branch.values]
+    own = [np.sort_complex(one) for one in branch.multipliers]
+    gap = max(np.abs(one - np.sort_complex(root)).max() for one, root in zip(own, roots, strict=True))
+    real = branch.multipliers.real.min(axis=1)
+    evidence = (
+        f"on the branch from w = 1e-3 to 1e3 the pair's real part is at least {pair.min():.1e}, the real "
+        "eigenvalue "
+        f"at most {real.max():.2f}; all agree with the cubic to {gap:.0e}"
+    )
+    return judged(bool(pair.min() > 0 and real.max() < 0 and not branch.stable.any()), evidence)
+
+
+@claim(
+    "unstable-rotation-disk",
+    place="Section 5 E",
+    says="The full moment of inertia and friction do not make the rotating states stable (not shown there).",
+)
+def unstable_rotation_disk(_lab: Lab) -> Verdict:
+    """Growth rates of the full disk along its branch."""
+    branch = rotation_of_disk(0.0, low=0.005)
+    rates = branch.multipliers.real.max(axis=1)
+    k = int(np.argmin(rates))
+    evidence = (
+        f"from {100 * branch.values.min():.1f} to {100 * branch.values.max():.0f} cm/s the growth rate is "
+        "positive, "
+        f"least {rates[k]:.2f} /s at {100 * branch.values[k]:.1f} cm/s"
+    )
+    return judged(not branch.stable.any(), evidence)
+
+
+@claim(
+    "rotation-approximation",
+    place="Section 5 E",
+    says="In the rotating states R is much smaller than the disk's radius, and k is constant.",
+)
+def rotation_approximation(_lab: Lab) -> Verdict:
+    """At the paper's drives."""
+    found = {W: device.rotating(W) for W in (0.014, 0.039, 0.055, 0.071, 0.088)}
+    far = max(y for _, y, _ in found.values()) / device.R
+    slow = min(omega for omega, _, _ in found.values())
+    evidence = (
+        f"Y is at most {far:.1%} of the radius, |Ω| at least {slow:.2f} rad/s (the kink is at "
+        f"{device.KINK:.2f})"
+    )
+    return judged(far < 0.2 and slow > device.KINK, evidence)
+
+
+@claim(
+    "damping-stabilises",
+    place="Section 5 E",
+    says="With B = 0.2 the rotating states are stable above a minimal drive.",
+)
+def damping_stabilises(_lab: Lab) -> Verdict:
+    """The Hopf point on the branch, against the closed form; and for the full disk."""
+    branch = rotation_of_dle(device.B)
+    found, disk = hopf(branch), hopf(rotation_of_disk(RELAXATION))
+    if found is None or disk is None:
+        return judged(False, "no Hopf bifurcation was found")
+    closed = device.hopf_drive(device.B)
+    evidence = (
+        f"Hopf bifurcation at w = {found.value:.10f} with the frequency {found.frequency:.8f}; closed forms "
+        f"(1 − B)/(B (1 + B)) = {closed:.10f} and √((1 − B)/B) = 2. The full disk with b = B/L = "
+        f"{RELAXATION:.1f} /m: "
+        f"W = {100 * disk.value:.3f} cm/s"
+    )
+    above = bool(branch.stable[branch.values > found.value].all())
+    below = bool(branch.stable[branch.values < found.value].any())
+    return judged(abs(found.value - closed) < 1e-10 and above and not below, evidence)
+
+
+@functools.cache
+def _kept_below() -> tuple[int, int]:
+    """Of starts close to the rotating state, 1 % below the minimal drive, how many are still there."""
+    w = 0.99 * device.hopf_drive(device.B)
+    near = np.random.default_rng(0).normal(size=(200, 3)) * 0.05 + [np.sqrt(w), np.sqrt(w), 0]
+    ends = ensemble(DLE(w, B=device.B), 10_000.0, near, rtol=1e-8).end
+    return int(_is_rotating(ends, w, 0.1).sum()), len(near)
+
+
+@claim(
+    "stable-below",
+    place="Section 5 E",
+    says="The rotation's stability to finite disturbances may extend even below the minimal drive.",
+)
+def stable_below(_lab: Lab) -> Verdict:
+    """The Hopf bifurcation is subcritical: what surrounds the rotation is above, and unstable."""
+    point = hopf(rotation_of_dle(device.B))
+    if point is None:
+        return judged(False, "no Hopf bifurcation was found")
+    cycles = continuation(point, bounds=(2.0, 4.0))
+    kept, of = _kept_below()
+    evidence = (
+        f"the Hopf bifurcation is {point.criticality} (first Lyapunov coefficient "
+        f"{point.lyapunov_coefficient:.3e}): "
+        f"the cycles born there live at w = {cycles.values.min():.4f} to {cycles.values.max():.2f} and "
+        f"{'some are stable' if cycles.stable.any() else 'are unstable'}. 1 % below w_H, of {of} starts "
+        "within 0.05 of the "
+        f"rotation {kept} are there at t = 10,000"
+    )
+    otherwise = (
+        "finite disturbances are survived above w_H only, where the unstable cycle bounds the rotation's "
+        "basin; "
+        "below, there is nothing to keep it"
+    )
+    return judged(kept > 0 or bool(cycles.stable.any()), evidence, otherwise=otherwise)
+
+
+@functools.cache
+def _transients() -> tuple[float, float, bool]:
+    """Mean life of the chaos at w = 3.7, B = 0.2, its error, and whether -3.2 and -3.5 part ways."""
+    w = 3.7
+    model = DLE(w, B=device.B)
+    s = np.sqrt(w)
+    start = np.array([s, s, -3.5]) + np.random.default_rng(0).normal(size=(200, 3)) * 1e-3
+    times = np.linspace(0, 20_000, 401)
+    states = ensemble(model, times, start, rtol=1e-7).state
+    there = _is_rotating(states, w, 0.05)
+    lived = np.where(there.any(axis=1), times[there.argmax(axis=1)], times[-1])
+    deaths = int(there.any(axis=1).sum())
+    mean = float(lived.sum() / max(deaths, 1))
+    early = ensemble(model, 1500.0, np.array([[s, s, -3.2], [s, s, -3.5]])).end
+    parted = _is_rotating(early, w, 0.05)
+    return mean, mean / np.sqrt(max(deaths, 1)), bool(parted[0] and not parted[1])
+
+
+@claim(
+    "bistable",
+    place="Section 5 E, Figure 16 b",
+    says="At B = 0.2, w = 3.7 a stable rotation (from z = −3.2) and a chaotic state (from −3.5) exist "
+    "together.",
+)
+def bistable(_lab: Lab) -> Verdict:
+    """The two starts, and how long the chaos lives."""
+    mean, error, parted = _transients()
+    evidence = (
+        "the two starts part as said; of 200 orbits from about z = −3.5 the chaos ends in rotation after "
+        f"{mean:,.0f} ± {error:,.0f} "
+        "units on average"
+    )
+    remark = "the chaotic orbit is a transient, though a long one: in the end the disk rotates"
+    return judged(parted, evidence, remark)
+
+
+@claim(
+    "not-from-rest",
+    place="Section 3 C",
+    says="The rotating states cannot be reached from rest.",
+)
+def not_from_rest(_lab: Lab) -> Verdict:
+    """Starts at rest all over the disk, with the relaxation of the constraint."""
+    shares = {}
+    for W in (0.06, 0.071, 0.088):
+        random = np.random.default_rng(0)
+        radius, angle = 0.04 * np.sqrt(random.uniform(0, 1, 300)), random.uniform(0, 2 * np.pi, 300)
+        starts = np.stack([0 * radius, radius * np.sin(angle), radius * np.cos(angle), 0 * radius], axis=-1)
+        ends = ensemble(relaxed(W, RELAXATION), 60.0, starts, rtol=1e-7).end
+        goal = device.rotating(W)[0]
+        shares[W] = float((np.abs(np.abs(ends[:, 0]) - goal) < 0.05 * goal).mean())
+    words = ", ".join(f"{share:.0%} at {100 * W:.1f} cm/s" for W, share in shares.items())
+    evidence = (
+        f"of 300 starts at rest up to 4 cm from the contact, with b = 43.6 /m, rotate after a minute: {words}"
+    )
+    otherwise = (
+        "it was seen on the device, and is nearly so in the model just above the lower bound on W; at "
+        "larger drives "
+        "the model's swings fall into rotation"
+    )
+    return judged(max(shares.values()) < 0.01, evidence, otherwise=otherwise)

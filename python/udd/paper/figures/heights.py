@@ -1,0 +1,93 @@
+"""The map of successive heights, and its limit for small drives."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import IncompleteWarning
+from udd.models import DLE
+from udd.paper.canvas import panels, titled
+from udd.paper.lab import Lab
+from udd.paper.registry import figure
+from udd.plot.style import AFTER, BEFORE, FAINT, tidy
+from udd.sections import poincare
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: The sideways motion left at the end of the swings is of size exp(-1/w), and all that follows hangs on it.
+TINY = 1e-200
+
+
+def next_heights(w: float, low: float = 0.5, high: float = 2.6, n: int = 3000) -> tuple[Array, Array]:
+    """Heights from which the centre falls, each with the next one, of orbits let go all over a range.
+
+    The maxima of z below the contact belong to the swings and are left out.
+    """
+    heights = np.linspace(low, high, n)
+    starts = np.stack([np.full(n, np.sqrt(w)), np.full(n, np.sqrt(w)), heights], axis=-1)
+    z = maxima(w, starts, 60, 40 / w + 60)
+    pairs = []
+    for row in z:
+        tops = row[np.isfinite(row) & (row > 0)]
+        if len(tops) >= 2:
+            pairs.append(tops[:2])
+    first, following = np.array(pairs).T
+    return first, following
+
+
+def maxima(w: float, starts: Array, n: int, time: float) -> Array:
+    """The maxima of z in a time, at most n for each start; rows of several starts end in NaN."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IncompleteWarning)  # it is the time that is asked for, not the number
+        found = poincare(DLE(w), "maxima of z", n, state0=starts, transient=0, t_max=time, atol=TINY)
+    return found.component("z")
+
+
+def limit(following: Array) -> Array:
+    """The height from which the centre fell, if it rises to `following` next, as the drive vanishes.
+
+    With z rising as w t the spin obeys ``omega'' + omega' = z omega``: it decays as ``exp(-t/2)`` while the
+    centre swings (z < -1/4), then changes at the rate ``(sqrt(1 + 4 z) - 1)/2``. The next fall begins where
+    it is back at its old size, to leading order in w: ``6 (h + h') = (1 + 4 h')^(3/2)``.
+    """
+    result: Array = (1 + 4 * following) ** 1.5 / 6 - following
+    return result
+
+
+@figure(
+    "heights",
+    paper="Section 5 B, the map of successive heights",
+    title="From one height to the next",
+    caption="How high the centre rises (z at its maximum) over the height from which it fell before, in "
+    "the DLE. The map has cusps, at "
+    "which the swings end with hardly any sideways motion left and the centre rises higher; they crowd as "
+    "w falls, by π w/√(h − 1/4). Black: the limit w → 0, 6 (h + h′) = (1 + 4 h′)^(3/2), whose fixed "
+    "point 1.353 is stable: "
+    "the chaos is in the cusps.",
+)
+def heights(_lab: Lab) -> Figure:
+    """The map at three drives."""
+    made, axes = panels(1, 3, 12.6, 4.4)
+    curve = np.linspace(0.6, 2.2, 200)
+    for k, w in enumerate((0.1, 0.03, 0.01)):
+        first, following = next_heights(w)
+        axes[k].plot(first, following, ".", color=AFTER, markersize=1.5, rasterized=True)
+        axes[k].plot(limit(curve), curve, color="black", linewidth=1.0)
+        axes[k].plot([0.5, 2.6], [0.5, 2.6], color=FAINT, linewidth=1, zorder=0)
+        tops = maxima(w, np.array([0.1, 0.1, 1.4]), 600, 500 / w)
+        tops = tops[tops > 0][10:]
+        axes[k].plot(tops[:-1], tops[1:], ".", color=BEFORE, markersize=3, label="on the attractor")
+        axes[k].set_xlim(0.5, 2.6)
+        axes[k].set_xlabel("height h [1]")
+        axes[k].set_ylabel("next height h′ [1]")
+        titled(axes[k], k, f"w = {w}")
+        tidy(axes[k])
+    axes[0].legend(frameon=False, loc="lower right")
+    return made

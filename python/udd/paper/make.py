@@ -1,0 +1,150 @@
+"""All figures and claims, drawn, checked, and put on one page."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from udd.errors import UddError
+from udd.files import write_whole
+
+from . import page
+from .lab import Lab
+from .registry import CLAIMS, FIGURES, Claim, Figure, Verdict
+
+_DPI = 150
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure as a picture.
+
+    Attributes
+    ----------
+    figure : Figure
+    path : Path
+        The picture, PNG.
+    seconds : float
+        What drawing it took, films aside where they were there already.
+    """
+
+    figure: Figure
+    path: Path
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A claim and what has become of it.
+
+    Attributes
+    ----------
+    claim : Claim
+    verdict : Verdict
+    seconds : float
+        What checking it took.
+    """
+
+    claim: Claim
+    verdict: Verdict
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What :func:`reproduce` made.
+
+    Attributes
+    ----------
+    page : Path
+        The page with all pictures and the table of claims.
+    figures : tuple of Drawn
+    claims : tuple of Checked
+    """
+
+    page: Path
+    figures: tuple[Drawn, ...]
+    claims: tuple[Checked, ...]
+
+
+def reproduce(
+    out: str | os.PathLike[str],
+    *,
+    only: Iterable[str] | None = None,
+    films: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Reproduction:
+    """Draw the paper's figures, check its claims, and write the page.
+
+    Parameters
+    ----------
+    out : path
+        Folder to write to; made if it is not there. Films and what was tracked in them stay in its folder
+        ``films`` and are used again.
+    only : iterable of str, optional
+        Keys of figures and claims (see :data:`FIGURES`, :data:`CLAIMS`); by default all.
+    films : bool
+        Whether to make the figures and check the claims that need films, which takes minutes the first time.
+    progress : callable, optional
+        Told in a few words what is being done.
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    UddError
+        An unknown key, one that needs films while there are to be none, a folder that cannot be written to.
+
+    Examples
+    --------
+    >>> import tempfile, udd
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = udd.paper.reproduce(folder, only=["eigenvalues", "scales"])
+    >>> made.claims[0].verdict.verdict
+    'holds'
+    """
+    chosen_figures, chosen_claims = _chosen(only, films)
+    tell = progress or (lambda _text: None)
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UddError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    lab = Lab(folder / "films", tell)
+    drawn = []
+    for one in chosen_figures:
+        tell(f"drawing {one.key}")
+        start = time.perf_counter()
+        path = folder / f"{one.key}.png"
+        write_whole(path, page.png(one.draw(lab), _DPI))
+        drawn.append(Drawn(one, path, time.perf_counter() - start))
+    checked = []
+    for own in chosen_claims:
+        tell(f"checking {own.key}")
+        start = time.perf_counter()
+        checked.append(Checked(own, own.check(lab), time.perf_counter() - start))
+    target = folder / "index.html"
+    write_whole(target, page.render(drawn, checked).encode())
+    return Reproduction(target, tuple(drawn), tuple(checked))
+
+
+def _chosen(only: Iterable[str] | None, films: bool) -> tuple[list[Figure], list[Claim]]:
+    """The figures and claims that are meant, in the paper's order."""
+    keys = None if only is None else set([only] if isinstance(only, str) else only)
+    for key in sorted(keys or ()):
+        entry = FIGURES.get(key) or CLAIMS.get(key)
+        if entry is None:
+            raise UddError(
+                f"no figure or claim is called {key!r}; the figures are {', '.join(FIGURES)}; the claims "
+                f"are {', '.join(CLAIMS)}"
+            )
+        if entry.filmed and not films:
+            raise UddError(f"{key} needs a film, and there are to be none")
+    figures = [one for one in FIGURES.values() if keys is None or one.key in keys]
+    claims = [one for one in CLAIMS.values() if keys is None or one.key in keys]
+    return [f for f in figures if films or not f.filmed], [c for c in claims if films or not c.filmed]

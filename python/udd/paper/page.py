@@ -1,0 +1,74 @@
+"""The page: pictures and the table of claims, in one file that needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import platform
+import re
+from collections import Counter
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+from .registry import FAILS, HOLDS, REMARK
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .make import Checked, Drawn
+
+_CLASSES = {HOLDS: "holds", REMARK: "remark", FAILS: "fails"}
+
+
+def png(figure: Figure, dpi: int) -> bytes:
+    """A figure as a PNG file, the same bytes every time."""
+    picture = BytesIO()
+    figure.savefig(picture, format="png", dpi=dpi, metadata={"Software": None})
+    return picture.getvalue()
+
+
+def sentence(text: str) -> str:
+    """With a capital where it begins with a word, true minus signs, and a full stop."""
+    start = text[0].upper() if text[1:2].islower() else text[0]
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", f"{start}{text[1:]}.")
+
+
+def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
+    """The page as HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("udd.paper"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["sentence"] = sentence
+    return environment.get_template("index.html").render(
+        figures=[(one, _embedded(one)) for one in figures],
+        claims=claims,
+        classes=_CLASSES,
+        counts=Counter(one.verdict.verdict for one in claims),
+        order=(HOLDS, REMARK, FAILS),
+        filmed=any(one.figure.filmed for one in figures),
+        versions=_versions(),
+    )
+
+
+def _embedded(one: Drawn) -> str:
+    return f"data:image/png;base64,{base64.b64encode(one.path.read_bytes()).decode()}"
+
+
+def _versions() -> str:
+    """What the numbers may depend on."""
+    found = []
+    for name in ("udd", "numpy", "scipy", "matplotlib"):
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            found.append(f"{name} (of unknown version)")
+    return (
+        f"{', '.join(found)}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+    )

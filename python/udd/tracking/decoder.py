@@ -1,0 +1,166 @@
+"""The process that decodes a film for `udd.tracking.decode` (PyAV): pictures out through a pipe.
+
+    python -m udd.tracking.decoder PATH SINCE LOOK_ONLY MEMORY
+
+A line of JSON (what the header says; or error), then each picture's head and planes, then an end.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.decode import _NO_FILM, HEAD
+
+Plane = NDArray[np.uint8]
+MOST_BROKEN = 200  # consecutive undecodable packets after which a film is given up
+MOST_PIXELS = 1 << 26  # of a picture
+
+
+class Refused(Exception):
+    """Why the file is no film."""
+
+
+def main(path: str, since: float, look_only: bool, memory: int) -> None:
+    """Decode `path` to the standard output."""
+    out = sys.stdout.buffer
+    limit(memory)
+    try:
+        with opened(path) as container:
+            stream = container.streams.video[0]
+            said = facts(stream)
+            if look_only:
+                said["packets"] = packets(container, stream)
+            out.write(json.dumps(said).encode() + b"\n")
+            out.flush()
+            if not look_only:
+                send(container, stream, since, out)
+    except Refused as error:
+        out.write(json.dumps({"error": str(error)}).encode() + b"\n")
+    out.flush()
+
+
+def limit(memory: int) -> None:
+    """Keep the process from taking the machine's memory."""
+    try:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    except (ImportError, ValueError, OSError):
+        pass  # a system without such limits
+
+
+def opened(path: str) -> Any:
+    """The container, if it holds a video of a reasonable size."""
+    import av
+
+    try:
+        container = av.open(path, metadata_errors="ignore")
+    except (av.error.FFmpegError, OSError, ValueError):
+        raise Refused(_NO_FILM) from None
+    if not container.streams.video:
+        raise Refused("holds no video")
+    stream = container.streams.video[0]
+    if stream.width * stream.height > MOST_PIXELS:
+        raise Refused(f"has pictures of {stream.width} x {stream.height} pixels, more than can be tracked")
+    return container
+
+
+def facts(stream: Any) -> dict[str, Any]:
+    """What the header says."""
+    rate = stream.average_rate or stream.guessed_rate
+    pixel = stream.codec_context.pix_fmt or ""
+    full = stream.codec_context.color_range == 2 or pixel.startswith(("yuvj", "rgb", "bgr", "gbr"))
+    return {
+        "frames": int(stream.frames),
+        "fps": float(rate) if rate else None,
+        "full_range": full,
+        "width": int(stream.width),
+        "height": int(stream.height),
+    }
+
+
+def packets(container: Any, stream: Any) -> int:
+    """How many coded frames the file holds; none is decoded."""
+    import av
+
+    count = 0
+    try:
+        for packet in container.demux(stream):
+            count += packet.size > 0 and not packet.is_corrupt
+    except av.error.FFmpegError:
+        pass  # cut off in the middle of one
+    return count
+
+
+def send(container: Any, stream: Any, since: float, out: IO[bytes]) -> None:
+    """Write all pictures, then the end with the number of packets that did not decode."""
+    broken = [0]
+    for index, t, planes, damaged in pictures(container, stream, since, broken):
+        y, u, v = planes
+        out.write(HEAD.pack(index, t, *y.shape, *u.shape, damaged))
+        for plane in (y, u, v):
+            out.write(np.ascontiguousarray(plane).data.cast("B"))
+    out.write(HEAD.pack(-1, 0.0, broken[0], 0, 0, 0, False))
+
+
+def pictures(
+    container: Any, stream: Any, since: float, broken: list[int]
+) -> Iterator[tuple[int, float, list[Plane], bool]]:
+    """All frames that decode, in order of presentation, with increasing times."""
+    import av
+
+    rate = stream.average_rate or stream.guessed_rate
+    fps = float(rate) if rate else math.nan
+    index, last, row, damaged = 0, -math.inf, 0, False
+    origin = stream.start_time or 0
+    if since > 0 and stream.time_base:
+        container.seek(origin + int(since / stream.time_base), stream=stream)
+    packets = container.demux(stream)
+    while row < MOST_BROKEN:
+        try:
+            packet = next(packets)
+            frames = packet.decode()
+            row = 0
+        except StopIteration:
+            return
+        except av.error.FFmpegError:
+            broken[0], row, damaged = broken[0] + 1, row + 1, True
+            continue
+        for frame in frames:
+            wrong = bool(frame.is_corrupt or packet.is_corrupt)
+            # frames are coded as changes: after a broken one all are wrong up to the next whole one
+            damaged = wrong or (damaged and not frame.key_frame)
+            if frame.pts is None or frame.time_base is None:
+                t = index / fps
+            else:
+                t = float((frame.pts - origin) * frame.time_base)
+            if not t > last or frame.width * frame.height > MOST_PIXELS:
+                broken[0] += 1  # a time stamp that stands still carries no new instant
+                continue
+            broken[0] += wrong
+            yield index, t, planes_of(frame), damaged
+            index, last = index + 1, t
+
+
+def planes_of(frame: Any) -> list[Plane]:
+    """Brightness and colour differences (4:2:0), upright."""
+    if frame.format.name not in ("yuv420p", "yuvj420p"):
+        frame = frame.reformat(format="yuv420p")
+    planes = []
+    for plane in frame.planes[:3]:
+        pixels = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
+        planes.append(pixels[: plane.height, : plane.width])
+    turns = round((frame.rotation or 0) / 90) % 4  # phones note how they were held
+    return [np.rot90(p, turns) for p in planes] if turns else planes
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], float(sys.argv[2]), sys.argv[3] == "1", int(sys.argv[4]))

@@ -1,0 +1,145 @@
+"""The second pass: every frame again, its blur path known from the frames on both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Picture
+from .look import Motion, Pose
+from .loop import Known, Tracks, hold, put
+from .marks import MISFIT
+
+Array = NDArray[np.float64]
+EACH_SIDE = 2  # neighbours on each side
+NEAR = 3.5  # intervals within which a neighbour tells anything
+KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
+FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
+APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
+APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
+LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
+WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
+WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
+FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
+
+
+@dataclass(frozen=True)
+class Local:
+    """Pose and its rates at one instant [pixels, rad, s]."""
+
+    pose: Pose
+    rate: complex
+    spin: float
+    bending: complex  # second derivative of the centre
+    twisting: float
+    held: bool  # by the first pass
+
+    def motion(self, open_for: float) -> Motion:
+        """What the exposure sees of it."""
+        half = 0.5 * open_for**2
+        return Motion(
+            self.rate * open_for,
+            self.spin * open_for,
+            self.bending * half,
+            self.twisting * half,
+            self.rate,
+            self.spin,
+        )
+
+
+def refine(
+    pictures: Iterable[Picture],
+    known: Known,
+    first: Tracks,
+    tick: Callable[[int], object] = lambda _: None,
+    streaks_only: bool = False,
+) -> Tracks:
+    """Fit every frame again from what the first pass says about it and its neighbours.
+
+    A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
+    the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
+    streaks stay as they are.
+    """
+    tracks = replace(
+        first,
+        **{name: list(getattr(first, name)) for name in Tracks.__dataclass_fields__},
+    )
+    around = Around(first)
+    for k, picture in enumerate(pictures):
+        if k < len(first.t) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
+            _again(picture, k, known, around, tracks)
+        tick(picture.index)
+    return tracks
+
+
+def _again(picture: Picture, k: int, known: Known, around: Around, tracks: Tracks) -> None:
+    if tracks.flag[k] and not tracks.flag[k].startswith("lost"):
+        return
+    here = around.at(k)
+    if here is None:
+        return
+    motion = here.motion(known.exposure)
+    pose = Pose(here.pose.centre, here.pose.angle)
+    fit = hold(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
+    reach = abs(known.look.marks[0].place)
+    streak = abs(motion.shift) + abs(motion.turn) * reach
+    if fit is None:
+        return
+    away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
+    if away > (APART if here.held else FORESEEN_APART) + APART_BY_STREAK * streak:
+        return
+    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.held:
+        return  # two pale streaks agree with much
+    put(tracks, k, fit, pose, streak)
+    tracks.flag[k], tracks.method[k] = "", "refined"
+
+
+def weak(tracks: Tracks) -> NDArray[np.bool_]:
+    """Frames with long streaks of too few marks, or of marks that disagree."""
+    used = np.array([np.isfinite(c).sum() for c in tracks.chi2])
+    off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.leftover])
+    long = np.array(tracks.streak) > LONG
+    return np.asarray(long & ((used < WEAK_MARKS) | (off > WEAK_OFF + 0.03 * np.array(tracks.streak))))
+
+
+def drop_weak(tracks: Tracks) -> None:
+    """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
+    for k in np.flatnonzero(weak(tracks)):
+        if tracks.flag[k] == "":
+            tracks.flag[k], tracks.method[k] = "lost: too few marks in a long streak", ""
+            tracks.centre[k], tracks.angle[k] = complex(np.nan, np.nan), np.nan
+            tracks.information[k] = np.full((3, 3), np.nan)
+            tracks.chi2[k], tracks.leftover[k] = np.full(4, np.nan), np.full((4, 2), np.nan)
+
+
+class Around:
+    """A first pass, to be looked at around each of its frames."""
+
+    def __init__(self, tracks: Tracks) -> None:
+        self.t = np.array(tracks.t)
+        self.centre, self.angle = np.array(tracks.centre), np.array(tracks.angle)
+        self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
+        self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+
+    def at(self, k: int) -> Local | None:
+        """Polynomials through the nearest poses on both sides; None where too few are near."""
+        place = int(np.searchsorted(self.good, k))
+        held = place < len(self.good) and self.good[place] == k
+        low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + held
+        near = self.good[low:high]
+        x = (self.t[near] - self.t[k]) / self.interval
+        near, x = near[np.abs(x) < NEAR], x[np.abs(x) < NEAR]
+        if len(near) < 3 or (not held and not (x.min() < 0 < x.max())):
+            return None
+        powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]
+        c, a = powers @ self.centre[near], powers @ self.angle[near]
+        pose = (
+            Pose(complex(self.centre[k]), float(self.angle[k])) if held else Pose(complex(c[0]), float(a[0]))
+        )
+        h = self.interval
+        return Local(
+            pose, complex(c[1]) / h, float(a[1]) / h, 2 * complex(c[2]) / h**2, 2 * float(a[2]) / h**2, held
+        )

@@ -1,0 +1,50 @@
+"""How many pixels a metre has: from the marks' spacing and from the disk's rim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .disk import Outline
+from .find import BODY
+
+REACH = 65 / 80  # of the radius: where the marks of the standard disk have their centres
+RIM_EDGE = 0.35  # pixels: how well light and lens let one say where a bright disk ends
+PLACED = 0.02  # pixels: how well the marks' mean places are known
+UNLIKE = 0.015  # relative difference from the rim's scale at which the marks are not the standard ones
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Pixels per metre, its standard error (a factor common to all positions), and what it comes from."""
+
+    value: float
+    sigma: float
+    origin: str
+
+
+def scale(
+    places: NDArray[np.complex128], rim: Outline, radius: float, mark_distance: float | None = None
+) -> Scale:
+    """Combine the marks' spacing, their distance from the disk's centre known, with the rim's radius.
+
+    Each counts by its uncertainty: that of the rim is where its edge lies; that of the marks shows in how far
+    they are from a perfect square. Without a given distance the marks count where they fit the standard disk.
+    """
+    by_rim, rim_sigma = rim.radius / radius, float(np.hypot(rim.sigma, RIM_EDGE)) / radius
+    reach = REACH * radius if mark_distance is None else mark_distance
+    body = BODY * reach
+    away = places - places.mean()
+    factor = complex(np.vdot(body, away) / np.vdot(body, body).real)
+    rest = away - factor * body
+    # eight coordinates, of which a shift, a turn and a factor take four
+    glued = float(np.sqrt((np.abs(rest) ** 2).sum() / 4))
+    by_marks, marks_sigma = abs(factor), float(np.hypot(glued, PLACED) / 2 / reach)
+    if mark_distance is None and abs(by_marks / by_rim - 1) > UNLIKE:
+        return Scale(by_rim, rim_sigma, "rim")
+    w_rim, w_marks = rim_sigma**-2, marks_sigma**-2
+    value = (w_rim * by_rim + w_marks * by_marks) / (w_rim + w_marks)
+    origin = "marks and rim" if 0.1 < w_rim / w_marks < 10 else "marks" if w_marks > w_rim else "rim"
+    return Scale(value, float((w_rim + w_marks) ** -0.5), origin)
