@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -245,6 +247,94 @@ def test_damping_moves_where_the_symmetry_breaks(figure_eight: udd.Branch) -> No
     # The same from a branch at that damping.
     there = udd.continuation(udd.periodic_orbit(udd.DLE(9.0, B=0.04)), "w", (5.0, 12.0))
     assert curve.values[-1][0] == pytest.approx(there.find("symmetry breaking")[0].value, abs=1e-9)
+
+
+def test_rotation_has_a_homoclinic_orbit_as_shilnikov_says() -> None:
+    cycles = udd.continuation(udd.periodic_orbit(udd.DLE(0.3)), "w", (0.29, 3.0), direction="up", period=50.0)
+    found = udd.connection(cycles)
+    assert found.kind == "homoclinic" and found.wild
+    assert found.error < 1e-9
+    # The folds of the branch accumulate there, from both sides, at the ratio that the eigenvalues give.
+    away = np.array([fold.value for fold in cycles.find("fold")]) - found.value
+    periods = np.array([fold.period for fold in cycles.find("fold")])
+    assert (np.sign(away[1:]) == -np.sign(away[:-1])).all()
+    assert -away[-1] / away[-2] == pytest.approx(found.fold_ratio, rel=0.02)
+    assert (periods[-1] - periods[-3]) / 2 == pytest.approx(found.fold_spacing, rel=0.1)
+    # Forward from its beginning it leaves and comes back, by another integrator.
+    k = len(found.t) // 2
+    run = udd.simulate(
+        udd.DLE(found.value),
+        found.t[k - 3 : k + 4],
+        found.state[k - 3],
+        method="dop853",
+        rtol=1e-12,
+        atol=1e-13,
+    )
+    np.testing.assert_allclose(run.state, found.state[k - 3 : k + 4], atol=1e-7)
+
+
+def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) -> None:
+    found = udd.connection(udd.continuation(rotation.find("Hopf")[0], period=16.0))
+    np.testing.assert_allclose(found.equilibrium.state, [0.0, 0.0, 5.0], atol=1e-12)
+    longer = udd.continuation(rotation.find("Hopf")[0], period=22.0)
+    # The cycles come nearer by exp(-0.85 T): the branch itself is not there yet.
+    assert longer.values[-1] == pytest.approx(found.value, abs=1e-6)
+    assert found.error < 1e-9 and not found.wild
+
+
+def test_the_disks_connection_has_cycles_that_wind_towards_it() -> None:
+    # From the lower end of the symmetric cycles; 0.0126 is where the folds of the branch born there gather.
+    lower = udd.continuation(udd.periodic_orbit(udd.Disk(0.088)), "W", (0.009, 0.09), direction="down")
+    born = udd.continuation(lower.find("symmetry breaking")[-1], bounds=(0.005, 0.05), period=9.0)
+    found = udd.connection(born)
+    assert found.kind == "homoclinic" and found.wild and found.error < 1e-9
+    folds = np.array([fold.value for fold in born.find("fold")])
+    assert folds[-2:].min() < found.value < folds[-2:].max()
+
+
+def test_a_diagram_joins_what_is_seen_and_what_is_behind_it() -> None:
+    found = udd.diagram(udd.DLE(6.0), "w", np.linspace(5.2, 7.4, 12), n=40, transient=100, generations=1)
+    kinds = {(point.kind, round(point.value, 8)) for point in found.points}
+    assert kinds == {("symmetry breaking", 7.09642643), ("period doubling", 5.39471322)}
+    # Stable branches pass through the points of the scan.
+    scan, w = found.scan, 6.2
+    seen = scan["omega"].sel(w=w, path="up").to_numpy().ravel()
+    at = [(branch, orbit) for branch in found.branches if branch.kind == "cycle" for orbit in branch.at(w)]
+    stable = [orbit for _, orbit in at if orbit.stable]
+    assert stable
+    section = udd.poincare(udd.DLE(w), n=2, state0=stable[0].state, transient=0, rtol=1e-12, atol=1e-14)
+    own = section.component("omega")
+    # The scan shows one of two mirror images.
+    assert min(np.abs(np.sort(sign * own) - np.unique(seen.round(9))).max() for sign in (1, -1)) < 1e-6
+    assert found.hysteresis.shape[1] == 2 and len(found.as_dict()["branches"]) == len(found.branches)
+
+
+def test_pictures_of_branches(figure_eight: udd.Branch, rotation: udd.Branch) -> None:
+    for view in ("section", "extremes", "period"):
+        ax = udd.plot.branches([figure_eight], view=view)
+        labels = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert labels == ["stable", "unstable", "symmetry breaking"]
+        ax.figure.clear()
+    ax = udd.plot.branches(rotation, component="y")
+    assert ax.get_xlabel() == "w" and ax.get_ylabel() == "y [1]"
+    with pytest.raises(udd.UddError, match="no branches"):
+        udd.plot.branches([])
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from udd.cli import main
+
+    files = [tmp_path / "branches.png", tmp_path / "branches.json"]
+    out = [word for path in files for word in ("--out", str(path))]
+    code = main(["continuation", "w", "--from", "5", "--to", "9", "--at", "8", "--born", "1", "--json", *out])
+    assert code == 0
+    data = json.loads(capsys.readouterr().out)
+    points = [(p["kind"], round(p["value"], 8)) for branch in data["branches"] for p in branch["points"]]
+    assert points == [("symmetry breaking", 7.09642643), ("period doubling", 5.39471322)]
+    assert files[0].read_bytes()[:4] == b"\x89PNG"
+    assert json.loads(files[1].read_text())["parameter"] == "w"
+    assert main(["continuation", "w", "--from", "9", "--to", "5"]) == 1
+    assert "must be below" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

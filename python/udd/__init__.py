@@ -16,6 +16,7 @@ _PUBLIC = {
     "BifurcationPoint": "udd.structure",
     "Branch": "udd.structure",
     "Cascade": "udd.structure",
+    "Connection": "udd.structure",
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
@@ -39,6 +40,7 @@ _PUBLIC = {
     "basins": "udd.branching",
     "bifurcation": "udd.branching",
     "cascade": "udd.structure",
+    "connection": "udd.structure",
     "continuation": "udd.structure",
     "covariant_vectors": "udd.spectra",
     "diagram": "udd.structure",
@@ -106,11 +108,13 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import BifurcationPoint as BifurcationPoint
     from udd.structure import Branch as Branch
     from udd.structure import Cascade as Cascade
+    from udd.structure import Connection as Connection
     from udd.structure import Diagram as Diagram
     from udd.structure import Equilibrium as Equilibrium
     from udd.structure import Locus as Locus
     from udd.structure import PeriodicOrbit as PeriodicOrbit
     from udd.structure import cascade as cascade
+    from udd.structure import connection as connection
     from udd.structure import continuation as continuation
     from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria

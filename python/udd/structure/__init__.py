@@ -3,6 +3,7 @@
 from .branch import BifurcationPoint, Branch
 from .branches import continuation
 from .cascades import Cascade, cascade
+from .connections import Connection, connection
 from .diagrams import Diagram, diagram
 from .loci import Locus, locus
 from .orbits import periodic_orbit
@@ -13,11 +14,13 @@ __all__ = [
     "BifurcationPoint",
     "Branch",
     "Cascade",
+    "Connection",
     "Diagram",
     "Equilibrium",
     "Locus",
     "PeriodicOrbit",
     "cascade",
+    "connection",
     "continuation",
     "diagram",
     "equilibria",

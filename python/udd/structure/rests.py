@@ -16,7 +16,7 @@ from .normal_forms import first_lyapunov_coefficient
 from .rest_curve import expansion
 from .solutions import Equilibrium, kind_of_rest
 
-__all__ = ["equilibria", "rest_at"]
+__all__ = ["equilibria", "refined", "rest_at"]
 
 _SAME = 1e-7  # two within this part of the typical sizes are one
 _REST = 1e-9  # rates, in typical sizes per typical time, that are as good as none
@@ -75,7 +75,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
         guesses += [*((2.0 * box[k :: len(_REACHES)] - 1.0) * reach * flow.size)]
     found: list[Floats] = []
     for guess in guesses:
-        x = _refined(flow, guess)
+        x = refined(flow, flow.values, guess)
         if x is None:
             continue
         for image in (x,) if flow.mirror is None else (x, flow.mirror * x):
@@ -96,16 +96,17 @@ def rest_at(flow: Flow, values: Floats, x: Floats) -> Equilibrium:
     return Equilibrium(model, flow.full(x), eigenvalues, kind_of_rest(eigenvalues), residual, coefficient)
 
 
-def _refined(flow: Flow, guess: Floats) -> Floats | None:
-    unit = flow.clock / flow.size
+def refined(flow: Flow, values: Floats, guess: Floats) -> Floats | None:
+    """The equilibrium that Powell's method finds from a guess, if it is one."""
+    unit, model = flow.clock / flow.size, flow.with_values(values)
 
     def rates(scaled: Floats) -> Floats:
-        found = flow.model.rates(0.0, flow.full(scaled * flow.size))[flow.kept]
+        found = model.rates(0.0, flow.full(scaled * flow.size))[flow.kept]
         scaled_rates: Floats = found * unit
         return scaled_rates
 
     def slopes(scaled: Floats) -> Floats:
-        by_state = expansion(flow, flow.values, scaled * flow.size).by_state
+        by_state = expansion(flow, values, scaled * flow.size).by_state
         return by_state * unit[:, None] * flow.size
 
     with np.errstate(all="ignore"):
