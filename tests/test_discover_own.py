@@ -128,7 +128,7 @@ def test_a_users_candidate_is_tried_and_a_wrong_one_named(tmp_path: Path) -> Non
     found.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "The rate v&#39; has one more term." in page and "c*(tanh(5*v))" in page
-    assert page.count("<img") == 5 and "data:image/svg+xml" in page  # no picture comes from elsewhere
+    assert page.count("<img") == 6 and "data:image/svg+xml" in page  # no picture comes from elsewhere
     for wrong, said in [
         (("w", "v"), "no equation of 'w'"),
         (("v", "u"), "unknown name u"),

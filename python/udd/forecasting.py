@@ -447,7 +447,7 @@ def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
 
 
 def _size(difference: Array, kind: str, spread: Array) -> Array:
-    """How far two motions are apart: the disk's centre, m; a pendulum's angle; else in units of the spread."""
+    """How far two motions are apart: a disk's centre, m; a pendulum's angle; else in units of the spread."""
     if kind == "disk":
         result: Array = np.hypot(difference[:, 0], difference[:, 1])
         return result

@@ -202,7 +202,7 @@ fn add(
 /// Blurred indicator of |x| < half: the quintic smooth step of equal variance stands for the error function.
 #[inline(always)]
 fn slab(x: f32, half: f32, inverse: f32) -> f32 {
-    let z = ((half - x.abs()) * inverse).min(1.0).max(-1.0);
+    let z = ((half - x.abs()) * inverse).clamp(-1.0, 1.0);
     let square = z * z;
     0.5 + z * (0.9375 + square * (0.1875 * square - 0.625))
 }

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
@@ -70,6 +71,8 @@ class Film:
             raise TrackError(f"{self.path}: the file is empty")
         if fps is not None and not (math.isfinite(fps) and fps > 0):
             raise TrackError(f"fps must be positive and finite, not {fps!r}")
+        if find_spec("av") is None:  # what decodes runs elsewhere, where nobody would be told
+            raise ModuleNotFoundError("No module named 'av'", name="av")
         self.broken = 0  # packets that did not decode in the last run
         with _Decoder(self.path, 0.0, look_only=True) as decoder:
             said = decoder.header

@@ -13,6 +13,7 @@ from udd.measurement import Measurement
 
 from .decode import Film
 from .result import Pixels, pixels
+from .rgb import rgb
 
 COLOURS = ((230, 40, 40), (240, 140, 30), (40, 90, 230), (30, 160, 60))
 FOUND, CONTACT, SAID = (0, 220, 220), (255, 0, 200), (255, 230, 0)
@@ -63,7 +64,6 @@ def overlay(video: str | os.PathLike[str], measurement: Measurement, path: str |
 
 
 def _drawn(film: Film, measurement: Measurement, where: Pixels) -> Iterator[NDArray[np.uint8]]:
-    from .rgb import rgb
 
     for picture in film.pictures():
         if picture.index >= len(measurement):
