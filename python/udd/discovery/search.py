@@ -350,7 +350,8 @@ class Search:
     def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
         """Formulas that may explain the data as well as what the library has."""
         trials: list[Trial] = []
-        for curve in look.curves[:1]:
+        # Of curves over angles for which formulas have no word another is about as likely.
+        for curve in [c for c in look.curves if c.coordinates[0].text is not None][:1]:
             written = self._formulas(current, curve)
             trials += self._written(
                 current, curve, [f for f in written if curve.evidence + f.nats > known - NATS]
