@@ -140,8 +140,8 @@ impl Work for Locate<'_> {
             x = normal.lu().solve(&(sums.1 + prior.column(1)))?;
             let mut used = 0_usize;
             for k in 0..size {
-                let fit = x[0]
-                    + mark.level * (x[1] * f64::from(cover[k]) - x[2] * slope_u[k] - x[3] * slope_v[k]);
+                let fit =
+                    x[0] + mark.level * (x[1] * f64::from(cover[k]) - x[2] * slope_u[k] - x[3] * slope_v[k]);
                 let rest = patch[k] - fit;
                 let inside = (1.0 - rest * rest * precise[k] / (EXPLAINED * EXPLAINED)).max(0.0);
                 residual[k] = rest;
@@ -166,12 +166,7 @@ impl Work for Locate<'_> {
         let offset = map * x.fixed_rows::<2>(2);
         Some(Sighting {
             offset: [offset[0], offset[1]],
-            information: [
-                information[(0, 0)],
-                information[(0, 1)],
-                information[(1, 0)],
-                information[(1, 1)],
-            ],
+            information: [information[(0, 0)], information[(0, 1)], information[(1, 0)], information[(1, 1)]],
             complete: complete / total,
             in_view: visible / total,
             rms: (squares / weights).sqrt(),
