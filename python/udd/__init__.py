@@ -64,6 +64,7 @@ _PUBLIC = {
     "relatives": "udd.relatives",
     "render": "udd.film",
     "simulate": "udd.trajectory",
+    "smooth": "udd.smoothing",
     "sweep": "udd.sweeping",
     "track": "udd.tracking",
 }
@@ -101,6 +102,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.models import Pendulum as Pendulum
     from udd.sections import Section as Section
     from udd.sections import poincare as poincare
+    from udd.smoothing import smooth as smooth
     from udd.spectra import Covariant as Covariant
     from udd.spectra import Spectrum as Spectrum
     from udd.spectra import covariant_vectors as covariant_vectors

@@ -48,6 +48,15 @@ def add(commands: Any) -> None:
     parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
     parser.add_argument("--fast", action="store_true", help="without the second pass")
     parser.add_argument(
+        "--smooth", action="store_true", help="average the noise over neighbouring frames (not for fits)"
+    )
+    parser.add_argument(
+        "--slip",
+        type=float,
+        metavar="M/S",
+        help="with --smooth: take dY/dT = Z Omega for true, up to this standard error",
+    )
+    parser.add_argument(
         "--overlay", type=Path, metavar="MP4", help="film to write, what was found drawn upon it"
     )
     add_partial(parser)
@@ -58,12 +67,16 @@ def run(args: argparse.Namespace) -> Answer:
     """Do it."""
     from udd._validate import number
 
+    if args.slip is not None and not args.smooth:
+        raise UddError("--slip is an option of --smooth")
+    if args.slip is not None:
+        number("--slip", args.slip, above=0.0)
     if args.file.is_dir():
         return _folder(args)
     if args.out is not None and not args.out.parent.is_dir():
         raise UddError(f"{args.out}: there is no folder {args.out.parent}")
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
-    m = tracked(args, args.disk_radius, **_options(args)).with_meta(**more)
+    m = _tracked(args, _options(args)).with_meta(**more)
     text, data = _summary(m)
     if args.overlay is not None:
         from udd.tracking import overlay
@@ -81,6 +94,15 @@ def run(args: argparse.Namespace) -> Answer:
             sys.stdout.write(table.read_text(encoding="utf-8"))
         print(f"udd: {text}", file=sys.stderr)
     return Answer("", data)
+
+
+def _tracked(args: argparse.Namespace, options: dict[str, Any]) -> Measurement:
+    m = tracked(args, args.disk_radius, **options)
+    if not args.smooth:
+        return m
+    from udd.smoothing import smooth
+
+    return smooth(m, slip=args.slip)
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -127,7 +149,7 @@ def _folder(args: argparse.Namespace) -> Answer:
     for film in films:
         args.file = film
         try:
-            m = tracked(args, args.disk_radius, **options)
+            m = _tracked(args, options)
         except UddError as error:
             failed += 1
             lines.append(f"{film.name}: {error}")
