@@ -203,7 +203,7 @@ def _smoothed(
             x[k], p[k] = _update(x[k], p[k], shows, stretch.what[k], stretch.noise[k])
         if rolling is not None:
             row, value, off = (part[k : k + 1] for part in rolling)
-            x[k], p[k] = _update(x[k], p[k], row, value, off[:, None] * off[:, None])
+            x[k], p[k] = _update(x[k], p[k], row, value, np.asarray(off[:, None] ** 2, dtype=np.float64))
     for k in range(n - 2, -1, -1):
         back = np.linalg.solve(ahead_p[k + 1], moves[k + 1] @ p[k]).T
         x[k] += back @ (x[k + 1] - ahead_x[k + 1])

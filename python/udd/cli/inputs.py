@@ -88,7 +88,7 @@ def add_partial(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--partial", action="store_true", help="use what there is of a film that is cut off")
 
 
-def tracked(args: argparse.Namespace, radius: float, **options: Any) -> Measurement:
+def tracked(args: argparse.Namespace, radius: float | None, **options: Any) -> Measurement:
     """Track a film; one that is cut off is refused, unless its user knows."""
     from udd.tracking import track
 

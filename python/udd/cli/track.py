@@ -33,9 +33,7 @@ def add(commands: Any) -> None:
         metavar="CSV",
         help="file to write (for a folder: folder); otherwise standard output",
     )
-    parser.add_argument(
-        "--disk-radius", type=float, default=0.08, metavar="M", help="sets the scale (default 0.08)"
-    )
+    parser.add_argument("--disk-radius", type=float, metavar="M", help="sets the scale (default 0.08)")
     parser.add_argument(
         "--pivot", metavar="U,V", help="contact in the picture [pixels]; found where not given"
     )
@@ -46,6 +44,12 @@ def add(commands: Any) -> None:
         help="from the marks' centres to the disk's (default 65/80 R)",
     )
     parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="TOML",
+        help="file with disk_radius, mark_distance, fps, pivot, refine; options given beside it win",
+    )
     parser.add_argument("--fast", action="store_true", help="without the second pass")
     parser.add_argument(
         "--smooth", action="store_true", help="average the noise over neighbouring frames (not for fits)"
@@ -112,7 +116,8 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         if len(place) != 2:
             raise UddError(f"--pivot must be two numbers U,V, not {args.pivot}")
         pivot = (place[0], place[1])
-    return {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps, "refine": not args.fast}
+    options = {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps}
+    return {**options, "refine": False if args.fast else None, "config": args.config}
 
 
 def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:

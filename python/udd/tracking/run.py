@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from udd.measurement import DISK, Measurement, check_length
 
+from .config import Config, settings
 from .decode import Film, Picture, TrackError
 from .disk import Outline
 from .exposure import at_middle
@@ -54,11 +55,12 @@ class Tracking:
 def track(
     video: str | os.PathLike[str],
     *,
-    disk_radius: float = 0.08,
+    disk_radius: float | None = None,
     mark_distance: float | None = None,
     fps: float | None = None,
     pivot: tuple[float, float] | None = None,
-    refine: bool = True,
+    refine: bool | None = None,
+    config: Config | None = None,
     progress: bool = False,
 ) -> Measurement:
     """Measure the motion of a disk with four coloured marks in a film.
@@ -68,8 +70,8 @@ def track(
     video : path
         A film by a camera at rest, showing the whole disk with square marks red, orange, blue,
         green (clockwise) near its rim.
-    disk_radius : float
-        Radius of the disk [m]; with the marks' distance it sets the scale.
+    disk_radius : float, optional
+        Radius of the disk [m], 0.08 if not given; with the marks' distance it sets the scale.
     mark_distance : float, optional
         Distance of the marks' centres from the disk's centre [m]. If not given, 65/80 of the radius where
         the film agrees with that to 1.5 %, otherwise the rim alone sets the scale.
@@ -77,8 +79,10 @@ def track(
         Frames per second, where the film's header does not tell the truth (slow motion).
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
-    refine : bool
-        Go over the film a second time, with each frame's blur known from its neighbours.
+    refine : bool, optional
+        Go over the film a second time, with each frame's blur known from its neighbours; so if not given.
+    config : path or mapping, optional
+        A TOML file (or what would stand in one) with any of the arguments above; what is given here wins.
     progress : bool
         Show a progress bar.
 
@@ -93,7 +97,7 @@ def track(
     ------
     TrackError
         The file is missing, empty, not a film or too short; no marks are found; the radius is not a
-        positive number.
+        positive number; the config holds an unknown key or a value of the wrong kind.
 
     Notes
     -----
@@ -105,16 +109,17 @@ def track(
     >>> import udd
     >>> m = udd.track("run.mp4", disk_radius=0.08)  # doctest: +SKIP
     >>> m.to_csv("run.csv")  # doctest: +SKIP
+    >>> m = udd.track("run.mp4", config={"fps": 240.0, "pivot": [275, 310.5]})  # doctest: +SKIP
     """
-    return track_in_detail(
-        video,
-        disk_radius=disk_radius,
-        mark_distance=mark_distance,
-        fps=fps,
-        pivot=pivot,
-        refine=refine,
-        progress=progress,
-    ).measurement
+    given = {
+        "disk_radius": disk_radius,
+        "mark_distance": mark_distance,
+        "fps": fps,
+        "pivot": pivot,
+        "refine": refine,
+    }
+    known = settings({} if config is None else config, **given)
+    return track_in_detail(video, **known, progress=progress).measurement
 
 
 def track_in_detail(

@@ -1,0 +1,91 @@
+"""What is known of a film, from a TOML file."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from .decode import TrackError
+
+Config = str | os.PathLike[str] | Mapping[str, Any]
+
+
+def settings(config: Config, **given: Any) -> dict[str, Any]:
+    """Arguments of `udd.track`: those of a config, and those given (not None), which win.
+
+    Parameters
+    ----------
+    config : path or mapping
+        A TOML file, or what would stand in one: ``disk_radius``, ``mark_distance`` [m], ``fps`` [1/s],
+        ``pivot`` (two numbers [pixels]), ``refine`` (true or false).
+    **given
+        The same by name; None is not given.
+
+    Raises
+    ------
+    TrackError
+        No such file, no TOML, a key that there is not, or a value of the wrong kind.
+
+    Examples
+    --------
+    >>> settings({"disk_radius": 0.08, "pivot": [275, 310.5]}, disk_radius=0.075)
+    {'disk_radius': 0.075, 'pivot': (275.0, 310.5)}
+    """
+    where, said = ("config", config) if isinstance(config, Mapping) else _read(Path(config))
+    found = {}
+    for key, value in said.items():
+        if key not in _KINDS:
+            raise TrackError(f"{where}: there is no setting {key!r}; there are {', '.join(_KINDS)}")
+        kind, read = _KINDS[key]
+        try:
+            found[key] = read(value)
+        except (TypeError, ValueError, OverflowError):
+            raise TrackError(f"{where}: {key} must be {kind}, not {value!r}") from None
+    return {**found, **{key: value for key, value in given.items() if value is not None}}
+
+
+def _read(path: Path) -> tuple[str, dict[str, Any]]:
+    try:
+        return str(path), tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TrackError(f"{path} cannot be read: {error.strerror}") from None
+    except ValueError as error:  # no TOML, or no UTF-8
+        raise TrackError(f"{path} is not a TOML file: {error}") from None
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TypeError
+    return float(value)
+
+
+def _positive(value: Any) -> float:
+    if not _number(value) > 0:
+        raise ValueError
+    return float(value)
+
+
+def _place(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list | tuple):
+        raise TypeError
+    u, v = value
+    return _number(u), _number(v)
+
+
+def _switch(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError
+    return value
+
+
+_KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "disk_radius": ("a positive number of metres", _positive),
+    "mark_distance": ("a positive number of metres", _positive),
+    "fps": ("a positive number of frames per second", _positive),
+    "pivot": ("two numbers of pixels [u, v]", _place),
+    "refine": ("true or false", _switch),
+}
