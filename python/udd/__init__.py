@@ -61,6 +61,7 @@ _PUBLIC = {
     "poincare": "udd.sections",
     "prune": "udd.discovery",
     "read_measurement": "udd.measurement",
+    "record": "udd.tracking",
     "relatives": "udd.relatives",
     "render": "udd.film",
     "simulate": "udd.trajectory",
@@ -124,6 +125,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec
     from udd.sweeping.sweeps import sweep as sweep
+    from udd.tracking import record as record
     from udd.tracking import track as track
     from udd.trajectory import Trajectory as Trajectory
     from udd.trajectory import simulate as simulate

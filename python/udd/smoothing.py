@@ -189,7 +189,7 @@ def _smoothed(
     n, m = stretch.what.shape
     x, p = np.zeros((n, 3 * m)), np.zeros((n, 3 * m, 3 * m))
     ahead_x, ahead_p, moves = x.copy(), p.copy(), np.zeros((n, 3 * m, 3 * m))
-    shows = np.kron(np.eye(m), [[1.0, 0.0, 0.0]])
+    shows = np.eye(3 * m)[::3]  # the positions
     for k in range(n):
         if k:
             f, q = _motion(stretch.t[k] - stretch.t[k - 1])
@@ -203,7 +203,7 @@ def _smoothed(
             x[k], p[k] = _update(x[k], p[k], shows, stretch.what[k], stretch.noise[k])
         if rolling is not None:
             row, value, off = (part[k : k + 1] for part in rolling)
-            x[k], p[k] = _update(x[k], p[k], row, value, np.asarray(off[:, None] ** 2, dtype=np.float64))
+            x[k], p[k] = _update(x[k], p[k], row, value, off[:, None] ** 2)
     for k in range(n - 2, -1, -1):
         back = np.linalg.solve(ahead_p[k + 1], moves[k + 1] @ p[k]).T
         x[k] += back @ (x[k + 1] - ahead_x[k + 1])

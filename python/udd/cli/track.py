@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
-from .answer import Answer
+from .answer import Answer, watched
 from .inputs import add_partial, is_film, tracked
 from .options import new, numbers
 
@@ -24,6 +24,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "file",
         type=Path,
+        nargs="?",
         metavar="FILM",
         help="a film by a camera at rest, the four colour marks in view; or a folder of films",
     )
@@ -33,6 +34,11 @@ def add(commands: Any) -> None:
         metavar="CSV",
         help="file to write (for a folder: folder); otherwise standard output",
     )
+    parser.add_argument(
+        "--camera", type=int, metavar="N", help="record a film from webcam N (0: the first), and track that"
+    )
+    parser.add_argument("--seconds", type=float, metavar="S", help="with --camera: how long (default 20)")
+    parser.add_argument("--film", type=Path, metavar="MP4", help="with --camera: the film to write")
     parser.add_argument("--disk-radius", type=float, metavar="M", help="sets the scale (default 0.08)")
     parser.add_argument(
         "--pivot", metavar="U,V", help="contact in the picture [pixels]; found where not given"
@@ -71,17 +77,21 @@ def run(args: argparse.Namespace) -> Answer:
     """Do it."""
     from udd._validate import number
 
+    _check_source(args)
     if args.slip is not None and not args.smooth:
         raise UddError("--slip is an option of --smooth")
     if args.slip is not None:
         number("--slip", args.slip, above=0.0)
-    if args.file.is_dir():
+    if args.camera is None and args.file.is_dir():
         return _folder(args)
     if args.out is not None and not args.out.parent.is_dir():
         raise UddError(f"{args.out}: there is no folder {args.out.parent}")
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
-    m = _tracked(args, _options(args)).with_meta(**more)
+    options = _options(args)
+    said, recording = ("", {}) if args.camera is None else _record(args)
+    m = _tracked(args, options).with_meta(**more)
     text, data = _summary(m)
+    text, data = said + text, {**recording, **data}
     if args.overlay is not None:
         from udd.tracking import overlay
 
@@ -98,6 +108,30 @@ def run(args: argparse.Namespace) -> Answer:
             sys.stdout.write(table.read_text(encoding="utf-8"))
         print(f"udd: {text}", file=sys.stderr)
     return Answer("", data)
+
+
+def _check_source(args: argparse.Namespace) -> None:
+    if args.camera is None:
+        if args.file is None:
+            raise UddError("say which film to track, or --camera 0 to record one")
+        for name in ("seconds", "film"):
+            if getattr(args, name) is not None:
+                raise UddError(f"--{name} is an option of --camera")
+    elif args.file is not None:
+        raise UddError(f"{args.file} and --camera are two sources: say one (--film is the film to write)")
+    elif args.film is None:
+        raise UddError("say with --film which film to write from the camera")
+
+
+def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
+    """Record a film, which is then the file to track."""
+    from udd.tracking import record
+
+    seconds = 20.0 if args.seconds is None else args.seconds
+    made = record(args.film, camera=args.camera, seconds=seconds, progress=watched())
+    args.file = made.path
+    told = {"frames": len(made.t), "lost": made.lost, "gaps_s": made.gaps, "clock": made.clock}
+    return f"{made}\nwritten: {made.path}\n", {"recording": {**told, "film": made.path}}
 
 
 def _tracked(args: argparse.Namespace, options: dict[str, Any]) -> Measurement:

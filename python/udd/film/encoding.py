@@ -51,10 +51,11 @@ def write_film(
     quality: float,
     codec: str = "h264",
     numbers: Iterable[int] | None = None,
+    ticks: int = 1,
 ) -> None:
     """Encode RGB frames (height, width, 3) and put the film in place; a failed one leaves nothing.
 
-    Frame k of them has the time stamp numbers[k] / rate, without `numbers` k / rate.
+    Frame k of them has the time stamp numbers[k] / (rate ticks), without `numbers` k / rate.
     """
     try:
         handle, name = tempfile.mkstemp(
@@ -67,7 +68,8 @@ def write_film(
         if codec == "mp4v":
             _encode_as_opencv(name, frames, size, rate)
         else:
-            _encode(name, frames, count() if numbers is None else numbers, size, rate, quality, codec)
+            stamps = count(0, ticks) if numbers is None else numbers
+            _encode(name, frames, stamps, size, rate, quality, codec, ticks)
         os.chmod(name, 0o666 & ~_umask())  # mkstemp's file is for the owner alone
         os.replace(name, target)
     except OSError as error:
@@ -84,18 +86,19 @@ def _encode(
     rate: Fraction,
     quality: float,
     codec: str,
+    ticks: int,
 ) -> None:
     av = require_video()
     with av.open(name, "w", options={"movflags": "+faststart"}) as container:
         stream = _stream(container, rate, quality, codec)
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
-        stream.time_base = stream.codec_context.time_base = 1 / rate
+        stream.time_base = stream.codec_context.time_base = 1 / (rate * ticks)
         # one thread: x264's choices depend on their number, and the same call must give the same film
         stream.codec_context.thread_count = 1
         for number, picture in zip(numbers, frames, strict=False):
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            frame.pts, frame.time_base = number, 1 / rate
+            frame.pts, frame.time_base = number, 1 / (rate * ticks)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .camera import Recording, record
 from .decode import Film, TrackError
 from .glimpse import Glimpse
 from .overlay import overlay
@@ -12,12 +13,14 @@ __all__ = [
     "Film",
     "Glimpse",
     "Pixels",
+    "Recording",
     "TrackError",
     "Tracking",
     "overlay",
     "pictures_at",
     "pictures_between",
     "pixels",
+    "record",
     "track",
     "track_in_detail",
 ]
