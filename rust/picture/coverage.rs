@@ -237,7 +237,9 @@ mod tests {
             let (p, _) = at(&mark(), &pose, &motion, (k as f64 + 0.5) / fine as f64 - 0.5);
             path = [path[0] + p[0] / fine as f64, path[1] + p[1] / fine as f64];
         }
-        assert!((mean[0] - path[0]).abs() < 3e-3 && (mean[1] - path[1]).abs() < 3e-3, "{mean:?} {path:?}");
+        // A copy stands in the middle of its part of the path: of n = 16 on a path that bends by c = 10 pixels that
+        // misses the mean by c/(12 n^2) = 3e-3.
+        assert!((mean[0] - path[0]).abs() < 5e-3 && (mean[1] - path[1]).abs() < 5e-3, "{mean:?} {path:?}");
     }
 
     #[test]
