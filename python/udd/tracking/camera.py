@@ -159,7 +159,12 @@ def _opened(camera: int | Source) -> tuple[Source, str]:
     else:
         import cv2
 
-        source, name = cv2.VideoCapture(camera), f"camera {camera}"
+        level = cv2.utils.logging.getLogLevel()
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong is said below
+        try:
+            source, name = cv2.VideoCapture(camera), f"camera {camera}"
+        finally:
+            cv2.utils.logging.setLogLevel(level)
     if not source.isOpened():
         source.release()
         raise TrackError(f"{name} cannot be opened: there is none, or another program uses it")
