@@ -122,6 +122,21 @@ def test_a_job_ends_in_a_verdict_whose_parts_can_be_taken(client: TestClient) ->
     assert [path.name for path in folder.iterdir()] == ["out"]
 
 
+def test_a_run_of_the_page_becomes_a_film(client: TestClient, tmp_path: Path) -> None:
+    pytest.importorskip("av")
+    from udd.tracking import Film
+
+    job = client.post("/api/jobs/render?seconds=2", content=json.dumps(CHAOS).encode()).json()["job"]
+    said = ended(client, job)
+    assert said["state"] == "done", said
+    (part,) = said["answer"]["parts"]
+    film = tmp_path / "run.mp4"
+    film.write_bytes(client.get(f"/api/jobs/{job}/{part['name']}").content)
+    times = [picture.t for picture in Film(film).pictures()]
+    assert len(times) in (49, 50)  # 25 a second; the last one's exposure must end within the run
+    np.testing.assert_allclose(np.diff(times), 0.04, atol=1e-4)
+
+
 def test_a_job_can_be_cancelled(client: TestClient) -> None:
     job = client.post("/api/jobs/sample").json()["job"]
     waiting = client.post("/api/jobs/sample").json()["job"]
