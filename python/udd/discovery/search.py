@@ -319,15 +319,14 @@ class Search:
         where it is held tightly. The scores with the stronger explanation count.
         """
         found = []
-        looks = 0
         for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
             scanned = scan(current, [*library(current.model, self.given), *best])
             curves = scan_curves(current)
-            looks += len(scanned.scored) + len(rippled) + curves.looks
-            found.append(Look(current, scanned, curves.curves, 0))
-        return replace(max(found, key=Look.strongest), looks=looks)
+            looks = len(scanned.scored) + len(rippled) + curves.looks
+            found.append(Look(current, scanned, curves.curves, looks))
+        return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
 
     def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
         """The best thing to add that passes: an effect of the library, some of them together, or a curve.
@@ -385,9 +384,11 @@ class Search:
             and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
         self._trying([" with ".join(c.title for c in group) for group in likely])
-        nothing = [[0.0 for c in group for _name in c.amplitude_names] for group in likely]
-        trials = together(lambda k: _of_library(current.part, likely[k], nothing[k]), range(len(likely)))
-        return self._accept(current, _fitted(trials), replace(look, looks=len(best)))
+
+        def tried(group: list[Candidate]) -> Trial | None:
+            return _of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
+
+        return self._accept(current, _fitted(together(tried, likely)), replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""

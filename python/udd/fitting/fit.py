@@ -208,7 +208,7 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
         if shown:
             return tighten(measurements, problem, point, problem.schedule[number:])
     # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
-    believed = replace(as_stated, weight=np.ones(len(problem.record.t)))
+    believed = as_stated.everywhere(len(problem.record.t))
     return tighten(measurements, replace(problem, noise=believed), first, problem.schedule)
 
 

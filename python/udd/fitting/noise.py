@@ -141,9 +141,8 @@ def remembered(record: Record, misfit: Array, sd: Array, weight: Array) -> Array
     weight : ndarray (n,)
         Frames that are farther out than honest ones say nothing.
     """
-    scaled = np.where(np.isfinite(misfit), misfit, 0.0) / np.where(np.isfinite(sd), sd, np.inf)
     there = record.observed & (weight == 1.0)[:, None]
-    scaled = np.where(there, scaled, 0.0)
+    scaled = np.divide(misfit, sd, out=np.zeros(misfit.shape), where=there)
     pairs = there[1:] & there[:-1] & record.linked[:, None]
     power = (scaled**2).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     count = np.maximum(pairs.sum(axis=0), 1)
