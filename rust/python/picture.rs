@@ -92,7 +92,7 @@ fn locate_marks<'py>(
     let found = py.detach(|| {
         let look = Look { light: &light, psf, noise, misfit, gain_slack, rim };
         jobs.iter()
-            .map(|(mark, pose, local)| locate(plane, &look, mark, pose, &motion, local))
+            .map(|(mark, pose, local)| locate(plane, &look, mark, pose, &motion, local, keep))
             .collect::<Vec<_>>()
     });
     let shown = found.into_iter().map(|s| {
@@ -103,7 +103,7 @@ fn locate_marks<'py>(
                 s.information.into(),
                 (s.complete, s.in_view, s.rms, s.gain),
                 (rows.0, rows.1, columns.0, columns.1),
-                keep.then(|| (PyArray1::from_vec(py, s.weight), PyArray1::from_vec(py, s.residual))),
+                s.pixels.map(|(w, r)| (PyArray1::from_vec(py, w), PyArray1::from_vec(py, r))),
             )
         })
     });
