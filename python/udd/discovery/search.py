@@ -212,7 +212,8 @@ def _of_library(current: Fit, candidates: list[Candidate], start: list[float]) -
 def _of_curve(current: Fit, curve: Curve) -> Trial | None:
     """A curve, located in full."""
     try:
-        located = fit_curve(current, curve, _unused(current, "curve"))
+        kind = "curve" if len(curve.coordinates) == 1 else "surface"
+        located = fit_curve(current, curve, _unused(current, kind))
     except FitError:
         return None
     if not located.fit.converged:
@@ -326,7 +327,7 @@ class Search:
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
             scanned = scan(current, [*library(current.model, self.given), *best])
-            curves = scan_curves(current)
+            curves = scan_curves(current, pairs=True)
             looks = len(scanned.scored) + len(rippled) + curves.looks
             found.append(Look(current, scanned, curves.curves, looks))
         return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
@@ -355,7 +356,7 @@ class Search:
         """Formulas that may explain the data as well as what the library has."""
         trials: list[Trial] = []
         # Of curves over angles for which formulas have no word another is about as likely.
-        for curve in [c for c in look.curves if c.coordinates[0].text is not None][:1]:
+        for curve in [c for c in look.curves if c.sayable and len(c.coordinates) == 1][:1]:
             written = self._formulas(current, curve)
             trials += self._written(
                 current, curve, [f for f in written if curve.evidence + f.nats > known - NATS]

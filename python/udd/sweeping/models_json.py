@@ -89,7 +89,7 @@ def _effect_to_dict(effect: Effect) -> dict[str, Any]:
 
 def _effect_from_dict(data: object) -> Effect:
     given = _mapping("an effect", data)
-    if given.keys() & {"formula", "curve"}:
+    if given.keys() & {"formula", "curve", "surface"}:
         return as_json.from_dict(given)
     name = given.pop("name", None)
     choices = given.pop("momentum", None), given.pop("treatment", None)
