@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import secrets
 import shutil
@@ -28,7 +27,7 @@ from .catalogue import catalogue
 from .jobs import Jobs
 from .runs import as_csv
 from .security import REPORT_POLICY, Guard
-from .spec import start_of
+from .spec import from_json, start_of
 from .stream import Page
 
 STATIC = Path(__file__).parent / "static"
@@ -51,7 +50,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         return JSONResponse(catalogue())
 
     async def table(request: Request) -> Response:
-        start = start_of(_json(request.query_params.get("run", "")))
+        start = start_of(from_json("the run", request.query_params.get("run", "")))
         text = as_csv(start, _number(request, "seconds") or math.nan)
         return _download(Response(text, media_type="text/csv"), "udd-run.csv")
 
@@ -115,7 +114,8 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             shutil.copyfile(sample, folder / "sample.mp4")
         return {"kind": "loop", "file": "sample.mp4", "film": True, "W": demo.W, "R": demo.R}
     if kind == "render":
-        start = _json((await request.body())[: limits.MESSAGE].decode("utf-8", "replace"))
+        text = (await request.body())[: limits.MESSAGE].decode("utf-8", "replace")
+        start = from_json("the run", text)
         seconds = _number(request, "seconds") or 0.0
         if start_of(start).model.kind != "disk":
             raise UddError("Only a run of the disk can be filmed.")
@@ -123,13 +123,6 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             raise UddError(f"A film lasts from 0.5 to {limits.RENDERED:g} s.")
         return {"kind": "render", "start": start, "seconds": seconds}
     raise UddError("There is no such job.")
-
-
-def _json(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        raise UddError("The request is not JSON.") from None
 
 
 def _number(request: Request, name: str) -> float | None:

@@ -57,6 +57,20 @@ def drive_of(model: Model) -> str:
     return "w" if isinstance(model, DLE) else "W"
 
 
+def from_json(what: str, text: str) -> Any:
+    """What a text says.
+
+    Raises
+    ------
+    ModelError
+        It is no JSON, or nested too deeply.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise ModelError(f"{what} must be JSON") from None
+
+
 def message_of(text: str) -> dict[str, Any]:
     """A message from the page.
 
@@ -65,10 +79,7 @@ def message_of(text: str) -> dict[str, Any]:
     ModelError
         It is no JSON object.
     """
-    try:
-        data = json.loads(text)
-    except ValueError:
-        raise ModelError("a message must be JSON") from None
+    data = from_json("a message", text)
     if not isinstance(data, dict):
         raise ModelError("a message must be a JSON object")
     return data

@@ -16,6 +16,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from udd._validate import number
 from udd.errors import UddError
 
 from . import limits, maps, wire
@@ -75,8 +76,8 @@ class Page:
             if len(text) > limits.MESSAGE:
                 raise UddError("the message is too long")
             said = message_of(text)
-            kind = said.get("type")
-            known: dict[Any, Callable[[dict[str, Any]], Any]] = {
+            kind = str(said.get("type"))
+            known: dict[str, Callable[[dict[str, Any]], Any]] = {
                 "run": self._run,
                 "section": self._section,
                 "diagram": self._diagram,
@@ -127,8 +128,8 @@ class Page:
     async def _diagram(self, said: dict[str, Any]) -> None:
         generation = whole(said, "generation", 0, 2**32 - 1)
         start = start_of(said)
-        low, high = (float(said.get(name, "nan")) for name in ("low", "high"))
-        if not 0 < low < high < float("inf"):
+        low, high = (number(name, said.get(name)) for name in ("low", "high"))
+        if not 0 < low < high:
             raise UddError("a diagram needs 0 < low < high")
 
         async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
