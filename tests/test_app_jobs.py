@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -146,6 +147,26 @@ def test_a_job_can_be_cancelled(client: TestClient) -> None:
     assert ended(client, job)["state"] == "cancelled"
     assert ended(client, waiting)["state"] == "cancelled"
     assert not any(folder.exists() for folder in folders(client))
+
+
+def test_a_job_that_breaks_off_does_not_stop_the_queue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def outcomes() -> list[jobs.Job]:
+        async with jobs.Jobs() as queue:
+            gone = queue.submit({"kind": "loop"}, tmp_path / "gone")
+            cut = queue.submit({"kind": "loop"}, tmp_path)
+            while not {gone.state, cut.state} <= set(jobs.ENDED):
+                await asyncio.sleep(0.01)
+            return [gone, cut]
+
+    echo = shutil.which("echo")
+    if echo is None:
+        pytest.skip("needs a program that says something that is no message")
+    monkeypatch.setattr("sys.executable", echo)
+    ended = asyncio.run(asyncio.wait_for(outcomes(), 30))
+    assert [job.state for job in ended] == ["failed", "failed"]
+    assert all("ended early" in job.answer["error"] for job in ended)
 
 
 def test_only_so_many_jobs_wait(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
