@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import math
 import secrets
@@ -29,6 +30,7 @@ from .runs import as_csv
 from .security import REPORT_POLICY, Guard
 from .spec import from_json, start_of
 from .stream import Page
+from .words import sentence
 
 STATIC = Path(__file__).parent / "static"
 
@@ -51,7 +53,8 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
 
     async def table(request: Request) -> Response:
         start = start_of(from_json("the run", request.query_params.get("run", "")))
-        text = as_csv(start, _number(request, "seconds") or math.nan)
+        # A long run takes seconds, in which the pages are answered.
+        text = await asyncio.to_thread(as_csv, start, _number(request, "seconds") or math.nan)
         return _download(Response(text, media_type="text/csv"), "udd-run.csv")
 
     async def new_job(request: Request) -> Response:
@@ -86,7 +89,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         WebSocketRoute("/api/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    handlers: dict[Any, Callable[..., Any]] = {UddError: _refused, uploads.TooLarge: _too_large}
+    handlers: dict[Any, Callable[..., Any]] = {UddError: _refused}
     guard = Middleware(Guard, token=token, hosts=hosts, any_address=any_address)
     app = Starlette(routes=routes, middleware=[guard], exception_handlers=handlers, lifespan=lifespan)
     app.state.jobs = jobs
@@ -144,9 +147,4 @@ def _download(response: Response, name: str) -> Response:
 
 
 async def _refused(_: Request, error: Exception) -> Response:
-    text = " ".join(str(error).split())
-    return PlainTextResponse(text[:1].upper() + text[1:], 400)
-
-
-async def _too_large(_: Request, error: Exception) -> Response:
-    return PlainTextResponse(str(error), 413)
+    return PlainTextResponse(sentence(error), 413 if isinstance(error, uploads.TooLarge) else 400)

@@ -23,6 +23,7 @@ from . import limits, maps, wire
 from .jobs import Jobs, Send
 from .runs import RATE, Runs, columns_of
 from .spec import message_of, start_of, whole
+from .words import sentence
 
 _WAITING = 64  # messages that a page may be behind
 
@@ -173,12 +174,11 @@ class Page:
 
 
 def _refused(said: dict[str, Any], error: Exception) -> dict[str, Any]:
-    text = " ".join(str(error).split())
     return {
         "type": "error",
         "of": said.get("type"),
         "generation": said.get("generation"),
-        "text": text[:1].upper() + text[1:] + ("" if text.endswith(".") else "."),
+        "text": sentence(error),
     }
 
 
