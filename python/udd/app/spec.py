@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from udd.errors import ModelError
-from udd.models import DLE, Disk, Model
+from udd.models import DLE, Model
 from udd.sweeping.models_json import model_from_dict
 from udd.trajectory import initial_state
 
@@ -45,11 +45,6 @@ def model_of(data: Any) -> Model:
 def key_of(start: Start) -> str:
     """The same text for the same run."""
     return f"{start.model!r} {start.state!r}"
-
-
-def beyond_the_edge(model: Model) -> Model:
-    """The equations alone: a disk that does not leave the wheels."""
-    return model.replace(edge="ignore") if isinstance(model, Disk) else model
 
 
 def drive_of(model: Model) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from udd._validate import number
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, beyond_the_edge
 
 from .branch import BifurcationPoint, Branch
 from .cycle_curve import CycleCurve
@@ -158,14 +158,9 @@ def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[
     return until
 
 
-def _free(model: Model) -> Model:
-    """The model whose runs do not end on the edge."""
-    return model.replace(edge="ignore") if hasattr(model, "edge") else model
-
-
 def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, Place]:
     """The curve through a solution, and the place there."""
-    flow: Flow = flow_of(_free(start.model), np.atleast_2d(start.state))
+    flow: Flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state))
     index = flow.index(parameter)
     value = float(flow.values[index])
     curve: AnyCurve

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd import _core
 from udd.branching.coordinates import coordinates_of
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 
 __all__ = ["Flight", "Floats", "Flow", "flow_of"]
 
@@ -131,8 +131,7 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13) -> Flow:
     ModelError
         The rates depend on time, or the model has too few states.
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     # A component that happens to be small is no smaller than a tenth of the largest.
     seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
     found = coordinates_of(model, seen)

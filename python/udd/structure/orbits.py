@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from udd._validate import array, number
 from udd.errors import IntegrationError, ModelError
-from udd.models import Model
+from udd.models import Model, beyond_the_edge, require_model
 from udd.orbits import default_start
 from udd.trajectory import simulate
 
@@ -82,13 +82,12 @@ def periodic_orbit(
     >>> print(round(orbit.period, 10), orbit.symmetric, orbit.stable)
     3.3583222491 True True
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     dim = len(model.state_names)
     given = array("guess", default_start(model) if guess is None else guess)
     if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
         raise ModelError(f"the guess must be states of {dim} components, not of shape {given.shape}")
-    free = model.replace(edge="ignore") if hasattr(model, "edge") else model
+    free = beyond_the_edge(model)
     flow = flow_of(free, np.atleast_2d(given))
     if given.ndim == 2 and len(given) > 1:
         if period is None:

@@ -9,7 +9,7 @@ from scipy.stats import qmc
 
 from udd._validate import array
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 
 from .flow import Floats, Flow, flow_of
 from .normal_forms import first_lyapunov_coefficient
@@ -62,8 +62,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     [1.732051 1.732051 0.      ] saddle-focus
     [0. 0. 5.] saddle
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     dim = len(model.state_names)
     given = np.zeros((0, dim)) if near is None else np.atleast_2d(array("near", near))
     if given.ndim != 2 or given.shape[1] != dim:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.models import Model
+from udd.models import Model, beyond_the_edge
 
 from .flow import Floats
 
@@ -111,10 +111,9 @@ class PeriodicOrbit:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
         from udd.trajectory import simulate
 
-        model = self.model.replace(edge="ignore") if hasattr(self.model, "edge") else self.model
         times = np.linspace(0.0, self.period, n + 1)
         tight: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"} | options
-        return simulate(model, times, self.state, **tight)
+        return simulate(beyond_the_edge(self.model), times, self.state, **tight)
 
     def __repr__(self) -> str:
         stable = "stable" if self.stable else "unstable"
