@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,6 +17,8 @@ from udd.models import Model, require_model
 __all__ = ["Flight", "Floats", "Flow", "flow_of"]
 
 Floats = NDArray[np.float64]
+
+_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,14 @@ class Flow:
     def dim(self) -> int:
         """The number of components kept."""
         return len(self.kept)
+
+    @cached_property
+    def _angle(self) -> NDArray[np.bool_]:
+        return np.array([self.model.state_names[k] in self.model.angles for k in self.kept])
+
+    def turns(self, gap: Floats) -> Floats:
+        """Whole turns of angles that undo gaps (..., r); zero for what is no angle."""
+        return np.where(self._angle, -_TURN * np.round(gap / _TURN), 0.0)
 
     def index(self, parameter: str) -> int:
         """The place of a parameter."""

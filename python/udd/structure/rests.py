@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy import optimize
 from scipy.stats import qmc
 
-from udd._validate import array
+from udd._validate import array, whole
 from udd.errors import ModelError
 from udd.models import Model, require_model
 
@@ -69,7 +69,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
         raise ModelError(f"near must be states of {dim} components, not of shape {given.shape}")
     flow = flow_of(model, given if len(given) else np.ones((1, dim)))
     guesses = [*flow.reduced(given)]
-    box = qmc.Sobol(flow.dim, seed=3).random(max(int(starts), len(_REACHES)))
+    box = qmc.Sobol(flow.dim, seed=3).random(max(whole("starts", starts, 1), len(_REACHES)))
     for k, reach in enumerate(_REACHES):
         guesses += [*((2.0 * box[k :: len(_REACHES)] - 1.0) * reach * flow.size)]
     found: list[Floats] = []
