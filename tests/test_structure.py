@@ -12,6 +12,7 @@ from scipy import optimize
 from scipy.integrate import solve_ivp
 
 import udd
+from udd.structure import loci
 
 # Values that two or three independent integrators agree on, to the digits that are printed.
 PERIODS = {7.1: 3.98808575286, 10.0: 3.35832224912}
@@ -44,6 +45,16 @@ def test_equilibria_of_the_dle_are_those_of_the_closed_form() -> None:
         np.sort_complex(focus.eigenvalues), np.sort_complex(np.roots([1, 1.6, 3.6, 6])), rtol=1e-12
     )
     assert {rest.kind for rest in rests} == {"saddle", "saddle-focus"}
+
+
+def test_a_pendulum_hangs_or_stands() -> None:
+    rests = udd.equilibria(udd.Pendulum(0.3))
+    assert [rest.kind for rest in rests] == ["centre", "saddle"]
+    assert abs(rests[0].state[1]) < 1e-9 and abs(rests[1].state[1]) == pytest.approx(math.pi)
+    # Without friction small swings have the frequency sqrt(g/l).
+    assert np.abs(rests[0].eigenvalues.imag) == pytest.approx(math.sqrt(9.81 / 0.3))
+    damped = udd.equilibria(udd.Pendulum(0.3, k0=0.01), near=[0.0, 6.0])
+    assert [rest.kind for rest in damped] == ["stable focus", "saddle"]
 
 
 def test_the_disk_has_three_rotating_states_where_friction_falls_with_speed() -> None:
@@ -234,6 +245,14 @@ def test_where_rotation_becomes_stable_over_the_damping(rotation: udd.Branch) ->
     assert (curve.lyapunov_coefficients > 0).all()
 
 
+def test_a_curve_of_points_that_turns_back_ends(
+    rotation: udd.Branch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loci._Plane, "_across", lambda self, guess, normal, step: 2 * self.start - guess)
+    curve = udd.locus(rotation.points[0], "B", (0.1, 0.4))
+    assert len(curve) == 1 and curve.ends == ("lost: the curve turns too sharply",) * 2
+
+
 def test_the_fold_of_rotation_over_the_friction_at_rest() -> None:
     start = next(rest for rest in udd.equilibria(udd.Disk(0.004)) if 1.2 < rest.state[0] < 1.65)
     (fold,) = udd.continuation(start, "W", (0.003, 0.05)).find("fold")
@@ -317,8 +336,16 @@ def test_pictures_of_branches(figure_eight: udd.Branch, rotation: udd.Branch) ->
         ax.figure.clear()
     ax = udd.plot.branches(rotation, component="y")
     assert ax.get_xlabel() == "w" and ax.get_ylabel() == "y [1]"
+    labels = [text.get_text() for text in udd.plot.branches(rotation).get_legend().get_texts()]
+    assert labels == ["stable", "unstable", "Hopf"]
     with pytest.raises(udd.UddError, match="no branches"):
         udd.plot.branches([])
+    with pytest.raises(udd.UddError, match="equilibria have no period"):
+        udd.plot.branches(rotation, view="period")
+    # Cycles that are all unstable, beside an equilibrium that has no period to be marked.
+    cycles = udd.continuation(rotation.points[0], bounds=(3.0, 3.6), longest=0.05)
+    ax = udd.plot.branches([rotation, cycles], view="period")
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["unstable"]
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -346,6 +373,12 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "q"), "no parameter 'q'"),
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", (8, 9)), "outside the bounds"),
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1))), "which parameter"),
+        (
+            lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", most=0),
+            "most must be a whole number",
+        ),
+        (lambda: udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=0), "n must be a whole number"),
+        (lambda: udd.equilibria(udd.DLE(1.0), starts="many"), "starts must be a whole number"),
         (
             lambda: udd.equilibria(udd.Model(["x", "y"], {"x": "sin(t)", "y": "-y"})),
             "depend on time",

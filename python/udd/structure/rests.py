@@ -38,7 +38,8 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     Returns
     -------
     list of Equilibrium
-        The most stable first. Those of a model with a symmetry come in mirror images, or are their own.
+        The most stable first. Those of a model with a symmetry come in mirror images, or are their own;
+        those that differ by whole turns of an angle come once, within half a turn of 0.
 
     Raises
     ------
@@ -78,10 +79,17 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
         if x is None:
             continue
         for image in (x,) if flow.mirror is None else (x, flow.mirror * x):
-            if all(np.abs((image - known) / flow.size).max() > _SAME for known in found):
+            image = image + flow.turns(image)
+            if all(_apart(flow, image, known) for known in found):
                 found.append(image + 0.0)
     rests = [rest_at(flow, flow.values, x) for x in found]
     return sorted(rests, key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
+
+
+def _apart(flow: Flow, a: Floats, b: Floats) -> bool:
+    """Whether two states differ, by more than whole turns of angles."""
+    gap = a - b
+    return bool(np.abs((gap + flow.turns(gap)) / flow.size).max() > _SAME)
 
 
 def rest_at(flow: Flow, values: Floats, x: Floats) -> Equilibrium:

@@ -25,6 +25,8 @@ Complex = NDArray[np.complex128]
 def kind_of_rest(eigenvalues: Complex) -> str:
     """What the flow near an equilibrium with these eigenvalues looks like."""
     growing, turning = eigenvalues.real > 0, np.abs(eigenvalues.imag) > 0
+    if (eigenvalues.real == 0.0).all() and turning.all():
+        return "centre"
     if growing.all() or not growing.any():
         word = "unstable" if growing.all() else "stable"
         return f"{word} focus" if turning.any() else f"{word} node"
@@ -43,7 +45,8 @@ class Equilibrium:
     eigenvalues : ndarray of complex, shape (r,)
         Of the rates' derivative by the components that the rates depend on; largest real part first.
     kind : str
-        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node" or "unstable focus".
+        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node", "unstable focus"; "centre"
+        where small swings neither grow nor decay.
     residual : float
         What is left of the rates, in typical sizes per typical time.
     lyapunov_coefficient : float
