@@ -364,6 +364,43 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "must be below" in capsys.readouterr().err
 
 
+def test_the_command_passes_over_a_branch_that_is_not_found(capsys: pytest.CaptureFixture[str]) -> None:
+    from udd.cli import main
+
+    span = ["--from", "3", "--to", "3.7", "--at", "3.2"]
+    assert (
+        main(["continuation", "w", "--of", "equilibria", "--B", "0.2", *span, "--born", "2", "--json"]) == 0
+    )
+    found = json.loads(capsys.readouterr().out)["branches"]
+    # Two rotating states, mirror images of one another; the cycles born at their Hopf points come once.
+    assert [branch["kind"] for branch in found] == ["equilibrium"] * 3 + ["cycle"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--component", "Q"], "the state has no component 'Q'; it has omega, y, z"),
+        (["--born", "-1"], "--born must not be below 0"),
+        (["--out", "branches.txt"], "must end in .json, .png, .svg, .pdf"),
+        (["--of", "equilibria", "--view", "period", "--out", "x.png"], "equilibria have no period"),
+        (["--state", "0,0,0.1", "--at", "1"], "a cycle at w = 1 is wanted: try another --at"),
+    ],
+)
+def test_the_command_refuses_in_one_sentence(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from udd.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["continuation", "w", "--from", "0.5", "--to", "9", *options]) == 1
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
