@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, ncx2
 
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, extend, frame_costs, held, loosened
@@ -97,9 +97,12 @@ class Look:
     looks: int
 
     def passing(self) -> list[Scored]:
-        """The candidates that chance does not explain, the strongest first."""
+        """The candidates that neither chance nor a film's faults explain, the strongest first."""
+        faults = self.fit.faults
         usable = [
-            s for s in self.library.scored if s.physical and not s.absorbed and s.p * self.looks < ALPHA
+            s
+            for s in self.library.scored
+            if s.physical and not s.absorbed and s.p * self.looks < ALPHA and s.chi2 > faults
         ]
         return sorted(usable, key=lambda s: -round(s.chi2, 3))
 
@@ -441,8 +444,10 @@ class Search:
             if whole is None:
                 continue
             before, after = self._level(current.whole, whole.fit)
-            fall = (before.chi2 - after.chi2) / after.inflation(before)
-            p = min(float(chi2.sf(fall, trial.freedom)) * look.looks, 1.0)
+            inflation = after.inflation(before)
+            fall = (before.chi2 - after.chi2) / inflation
+            # What a film's faults make up is no sum of squares of chance alone.
+            p = min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * look.looks, 1.0)
             if p >= ALPHA:
                 continue
             try:
