@@ -12,6 +12,7 @@ from scipy import optimize
 from scipy.integrate import solve_ivp
 
 import udd
+from udd.errors import ModelError
 from udd.structure import loci
 
 # Values that two or three independent integrators agree on, to the digits that are printed.
@@ -364,7 +365,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "must be below" in capsys.readouterr().err
 
 
-def test_the_command_passes_over_a_branch_that_is_not_found(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_follows_branches_born_at_mirror_images_once(capsys: pytest.CaptureFixture[str]) -> None:
     from udd.cli import main
 
     span = ["--from", "3", "--to", "3.7", "--at", "3.2"]
@@ -374,6 +375,22 @@ def test_the_command_passes_over_a_branch_that_is_not_found(capsys: pytest.Captu
     found = json.loads(capsys.readouterr().out)["branches"]
     # Two rotating states, mirror images of one another; the cycles born at their Hopf points come once.
     assert [branch["kind"] for branch in found] == ["equilibrium"] * 3 + ["cycle"]
+
+
+def test_the_command_passes_over_a_branch_that_is_not_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from udd.cli import main
+    from udd.structure import diagrams
+
+    def lost(*_: object, **__: object) -> udd.Branch:
+        raise ModelError("the branch is not found")
+
+    monkeypatch.setattr(diagrams, "continuation", lost)
+    assert main(["continuation", "w", "--from", "6.9", "--to", "7.3", "--born", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert "symmetry breaking at w = 7.09642643" in out
+    assert err.strip() == "udd: warning: w = 7.096426431: the branch is not found"
 
 
 @pytest.mark.parametrize(

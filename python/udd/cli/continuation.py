@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from udd.errors import ModelError, UddError
 
-from .answer import Answer, as_json
+from .answer import Answer, as_json, telling
 from .chosen import add_models, check_component, model_of
 from .options import new, numbers
 from .saving import add_out, checked, save_picture
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from udd.models import Model
-    from udd.structure import Branch, Equilibrium, PeriodicOrbit
+    from udd.structure import BifurcationPoint, Branch, Equilibrium, PeriodicOrbit
 
 
 _DATA = (".json",)
@@ -102,7 +103,19 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
                 "try another --at, or say --state and --period)"
             ) from None
     branches = [continuation(start, args.parameter, bounds, most=args.most) for start in starts]
-    return descendants(branches, args.born, bounds=bounds, most=args.most)
+
+    def missed(point: BifurcationPoint, error: ModelError) -> None:
+        warnings.warn(f"{point.parameter} = {point.value:.10g}: {error}", stacklevel=2)
+
+    with telling() as tell:
+        return descendants(
+            branches,
+            args.born,
+            begun=lambda point: tell(f"following what is born at {point.parameter} = {point.value:.10g}"),
+            missed=missed,
+            bounds=bounds,
+            most=args.most,
+        )
 
 
 def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str, Any], str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -147,10 +147,18 @@ def diagram(
     return Diagram(model, parameter, scan, (*rests, *(branch for branch in grown if branch.kind == "cycle")))
 
 
-def descendants(branches: Sequence[Branch], generations: int, **options: Any) -> list[Branch]:
+def descendants(
+    branches: Sequence[Branch],
+    generations: int,
+    *,
+    begun: Callable[[BifurcationPoint], None] = lambda point: None,
+    missed: Callable[[BifurcationPoint, ModelError], None] = lambda point, error: None,
+    **options: Any,
+) -> list[Branch]:
     """These branches, and those born at their points and at the points of those; of mirror images one.
 
-    `options` are those of :func:`udd.continuation`. A point whose branch is not found is passed over.
+    `begun` is told whose branch is followed next, `missed` whose is not found, which leaves the others.
+    `options` are those of :func:`udd.continuation`.
     """
     found = list(branches)
     waiting = [(point, 1) for branch in found for point in branch.points]
@@ -158,10 +166,12 @@ def descendants(branches: Sequence[Branch], generations: int, **options: Any) ->
         point, generation = waiting.pop(0)
         if point.kind not in _BORN or generation > generations:
             continue
+        begun(point)
         try:
             born = continuation(point, **options)
-        except ModelError:
-            continue  # a branch that is not found leaves the others
+        except ModelError as error:
+            missed(point, error)
+            continue
         middle, value = born.solution(len(born) // 2), float(born.values[len(born) // 2])
         if not any(_has(branch, middle, value) for branch in found):
             found.append(born)
