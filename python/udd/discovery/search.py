@@ -341,7 +341,9 @@ class Search:
         singles = self._singles(current, passing)
         if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             singles += self._rivals(current, look, max(look.nats(s) for s in passing))
-        likely = _states_first([c for c in look.curves if c.p * look.looks < ALPHA])[:_CURVES]
+        faults = look.fit.faults
+        known = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+        likely = _states_first(known)[:_CURVES]
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
@@ -384,6 +386,7 @@ class Search:
             [s.candidate for s in group]
             for group, fall in best[:_TRIED]
             if len({s.candidate.effect.name for s in group}) == size
+            and fall > look.fit.faults
             and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
         self._trying([" with ".join(c.title for c in group) for group in likely])
