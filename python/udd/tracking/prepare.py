@@ -56,6 +56,7 @@ def prepare(
         )
         for m in in_motion
     ]
+    paths = {m.picture.index: path for m, (_, _, path) in zip(in_motion, frames, strict=True)}
     interval = float(np.median([m.interval for m in in_motion])) if in_motion else 0.0
     rolling = readout(frames, look, view, interval)
     if rolling.value:
@@ -75,18 +76,19 @@ def prepare(
         frames = frames[:0]
     if len(frames) >= FEWEST:
         look = refine(look, frames, view, 2)
-    sharp: list[tuple[Picture, Pose]] = []
+    sharp: list[tuple[Picture, Pose, Motion]] = []
+
     for picture, sight in seen[:SHARP]:
-        pose = Pose(*_in_plane(look.lens, sight))
-        if align(picture.y, view, look, pose, Motion(), [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
-            sharp.append((picture, pose))
+        pose, motion = Pose(*_in_plane(look.lens, sight)), paths.get(picture.index, Motion())
+        if align(picture.y, view, look, pose, motion, [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
+            sharp.append((picture, pose, motion))
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
     try:
         rim = outline(sharp, look, view)
     except TrackError as error:
         raise TrackError(f"{film.path}: {error}") from None
-    colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
+    colours = colours_of([p for p, _, _ in sharp], [q for _, q, _ in sharp], look, view)
     look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
     return Known(look, view, colours, open_for, white, _contact(in_motion, look), rolling), rim
 

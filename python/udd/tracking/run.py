@@ -17,6 +17,7 @@ from udd.measurement import DISK, Measurement, check_length
 from .config import Config, settings
 from .decode import Film, Picture, TrackError
 from .disk import Outline
+from .exposure import again as retimed
 from .exposure import at_middle
 from .find import COLOURS, FEWEST, sightings
 from .glimpse import Glimpse
@@ -157,8 +158,7 @@ def track_in_detail(
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     if refine:
-        if known.readout.value:
-            known = _timed(known, look_over, tracks)
+        known = _timed(known, look_over, tracks)
         tracks = _again(film, known, tracks, progress)
     drop_weak(tracks)
     size = scale(known.look.places, rim, radius, distance)
@@ -207,17 +207,22 @@ def _follow(
 
 
 def _timed(known: Known, look_over: Survey, tracks: Tracks) -> Known:
-    """The readout once more, now that every frame's motion is known from its neighbours."""
+    """Exposure and readout once more, now that every frame's motion is known from its neighbours."""
     around = Around(tracks)
     frames = []
     for picture in look_over.pictures:
         here = around.at(picture.index) if picture.index < len(tracks.t) else None
         if here is not None and here.held and not tracks.flag[picture.index]:
-            frames.append((picture.y, here.pose, here.motion(known.exposure)))
-    again = readout(frames, known.look, known.view, around.interval)
-    if not again.value:
-        return known
-    return replace(known, look=replace(known.look, readout=again.value), readout=again)
+            frames.append((picture.y, here))
+    if known.readout.value:
+        moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
+        again = readout(moving, known.look, known.view, around.interval)
+        if again.value:
+            known = replace(known, look=replace(known.look, readout=again.value), readout=again)
+    if known.exposure:
+        paths = [(y, here.pose, here.motion) for y, here in frames]
+        known = replace(known, exposure=retimed(paths, known.exposure, known.look, known.view))
+    return known
 
 
 def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
