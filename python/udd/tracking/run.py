@@ -163,7 +163,7 @@ def track_in_detail(
     drop_weak(tracks)
     size = scale(known.look.places, rim, radius, distance)
     camera = _camera(tracks, known, size, pivot)
-    values, sigma, rho = metres(tracks, covariance(tracks), camera)
+    values, sigma, rho = metres(tracks, covariance(tracks, rim.centre_sigma), camera)
     gone = left_the_wheels(values, radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
