@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -303,7 +303,7 @@ def _meta(
 
 
 def _numbers(lens: Lens) -> list[float]:
-    return [] if lens.plain else [lens.middle.real, lens.middle.imag, *astuple(lens)[1:]]
+    return [] if lens.plain else list(lens.row)
 
 
 def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[NDArray[np.uint8]]:
