@@ -116,6 +116,13 @@ class Look:
         return max([c.evidence for c in self.curves] + singles, default=0.0)
 
 
+def _wider(look: Look) -> Look:
+    """With the surfaces over two coordinates."""
+    found = scan_curves(look.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
+    curves = sorted(look.curves + found.curves, key=lambda c: -c.evidence)
+    return replace(look, curves=curves, looks=look.looks + found.looks)
+
+
 def _price(fitted: Fit) -> float:
     """What a parameter costs, in chi2 (BIC)."""
     return math.log(np.isfinite(fitted.misfit).sum())
@@ -316,8 +323,12 @@ class Search:
         states = [State(base, whole, before)]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            looks.append(self._look(states[-1].part))
-            found = self._addition(states[-1], looks[-1])
+            look = self._look(states[-1].part)
+            found = self._known(states[-1], look)
+            if found is None:
+                look = _wider(look)
+                found = self._located(states[-1], look)
+            looks.append(look)
             if found is None:
                 break
             accepted.append(found[0])
@@ -332,18 +343,20 @@ class Search:
         A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
         where it is held tightly. The scores with the stronger explanation count.
         """
-        found = []
-        for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
+
+        def look(current: Fit) -> Look:
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
             scanned = scan(current, [*library(current.model, self.given), *best])
-            curves = scan_curves(current, pairs=True)
+            curves = scan_curves(current)
             looks = len(scanned.scored) + len(rippled) + curves.looks
-            found.append(Look(current, scanned, curves.curves, looks))
+            return Look(current, scanned, curves.curves, looks)
+
+        found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
         return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
 
-    def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, some of them together, or a curve.
+    def _known(self, current: State, look: Look) -> tuple[Step, State] | None:
+        """The best addition of the library that passes: an effect, or some of them together.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
@@ -352,15 +365,17 @@ class Search:
         singles = self._singles(current, passing)
         if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             singles += self._rivals(current, look, max(look.nats(s) for s in passing))
-        faults = look.fit.faults
-        known = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
-        likely = _states_first(known)[:_CURVES]
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
             or self._group(current, look, 3)
-            or self._accept(current, self._curves(current, likely), look)
         )
+
+    def _located(self, current: State, look: Look) -> tuple[Step, State] | None:
+        """The best curve or surface that passes."""
+        faults = look.fit.faults
+        shown = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+        return self._accept(current, self._curves(current, _states_first(shown)[:_CURVES]), look)
 
     def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
         """Formulas that may explain the data as well as what the library has."""
