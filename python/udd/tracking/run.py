@@ -27,6 +27,7 @@ from .noise import covariance
 from .pivot import pivot as rolling
 from .pivot import support
 from .prepare import prepare
+from .quality import quality, remarks
 from .readout import readout
 from .refine import LONG, Around, drop_weak
 from .refine import refine as second_pass
@@ -90,8 +91,10 @@ def track(
     -------
     Measurement
         ``Y, Z`` [m], ``beta`` [rad, unwrapped] at mid-exposure with standard errors and correlations,
-        one row per frame; a frame that cannot be used holds NaN and says why in ``flag``. ``meta``
-        holds the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``, ``exposure``, ...
+        one row per frame; a frame that cannot be used holds NaN and says why in ``flag`` (``dup``,
+        ``black``, ``damaged``, ``vague``, ``lost``, ``gone``); ``gap`` (frames are missing before it) and
+        ``degraded`` are remarks. ``quality`` holds number of marks, completeness, residual, blur and
+        method of each frame, ``meta`` the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``, ``exposure``, ...
 
     Raises
     ------
@@ -173,7 +176,10 @@ def track_in_detail(
     tracks.flag = [VAGUE_SAYS if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
     tracks.flag = [GONE_SAYS if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
     meta = _meta(film, look_over, tracks, known, camera, radius, doubtful)
-    measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
+    seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
+    tracks.flag = remarks(np.array(tracks.t), tracks.flag, seen_how, refine)
+    flag = np.array(tracks.flag)
+    measurement = Measurement(np.array(tracks.t), values, sigma, rho, flag, meta, DISK, seen_how)
     try:
         check_length(measurement)
     except ValueError as error:
