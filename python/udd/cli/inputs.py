@@ -78,7 +78,9 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 )
         return read_measurement(args.file, args.columns, states, **known), None
     if args.pendulum is not None:
-        raise UddError("a film of a pendulum cannot be tracked: --pendulum takes a table with t,theta")
+        raise UddError(
+            "a pendulum's film is tracked first (udd track --bob): --pendulum takes a table with t,theta"
+        )
     found = tracked(args, 0.08 if args.R is None else args.R)
     return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
 

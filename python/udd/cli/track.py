@@ -49,12 +49,26 @@ def add(commands: Any) -> None:
         metavar="M",
         help="from the marks' centres to the disk's (default 65/80 R)",
     )
+    parser.add_argument("--scale", type=float, metavar="PX", help="pixels per metre, given instead of found")
+    parser.add_argument(
+        "--region", metavar="U0,V0,U1,V1", help="part of the picture in which the disk moves [pixels]"
+    )
+    parser.add_argument(
+        "--calibrate",
+        metavar="ITEM=HOW,...",
+        help="on, off or a number for layout, scale, lens, tilt, readout [s], exposure [s], pivot; "
+        "such as lens=off,readout=0.02 (default: all on)",
+    )
+    parser.add_argument(
+        "--bob", metavar="COLOUR", help="the film is one of a plain pendulum with a bob of this colour"
+    )
+    parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob")
     parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
     parser.add_argument(
         "--config",
         type=Path,
         metavar="TOML",
-        help="file with disk_radius, mark_distance, fps, pivot, refine; options given beside it win",
+        help="file with any of these, and with layout (marks or tags of another disk); options win",
     )
     parser.add_argument("--fast", action="store_true", help="without the second pass")
     parser.add_argument(
@@ -150,8 +164,25 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         if len(place) != 2:
             raise UddError(f"--pivot must be two numbers U,V, not {args.pivot}")
         pivot = (place[0], place[1])
-    options = {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps}
+    options = {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps, "scale": args.scale}
+    if args.region is not None:
+        options["region"] = numbers([args.region], "--region")
+    if args.calibrate is not None:
+        options["calibrate"] = _calibrate(args.calibrate)
+    options |= {"bob": args.bob, "length": args.length}
     return {**options, "refine": False if args.fast else None, "config": args.config}
+
+
+def _calibrate(said: str) -> dict[str, Any]:
+    """From lens=off,readout=0.02."""
+    found: dict[str, Any] = {}
+    for part in said.split(","):
+        name, equals, value = (x.strip() for x in part.partition("="))
+        if not equals:
+            raise UddError(f"--calibrate must be like lens=off,readout=0.02, not {said}")
+        switch = {"on": True, "off": False}.get(value)
+        found[name] = numbers([value], f"--calibrate {name}")[0] if switch is None else switch
+    return found
 
 
 def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
@@ -167,8 +198,11 @@ def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
     }
     if m.sigma is not None:
         spread = np.nanmedian(m.sigma, axis=0)
-        y, z, beta = 1e3 * spread
-        text += f"; median standard errors {y:.2g} mm, {z:.2g} mm, {beta:.2g} mrad"
+        each = [
+            f"{1e3 * s:.2g} {'mm' if name in ('Y', 'Z') else 'mrad'}"
+            for name, s in zip(m.names, spread, strict=True)
+        ]
+        text += f"; median standard errors {', '.join(each)}"
         data["sigma_median"] = dict(zip(m.names, spread, strict=True))
     return text, data
 
@@ -197,6 +231,9 @@ def _folder(args: argparse.Namespace) -> Answer:
         table = args.out / f"{film.stem}.csv"
         m.to_csv(table)
         text, data = _summary(m)
-        lines.append(f"{film.name}: {text}; drive {100 * float(m.meta['drive_seen']):.3f} cm/s")
+        drive = m.meta.get("drive_seen")
+        lines.append(
+            f"{film.name}: {text}" + (f"; drive {100 * drive:.3f} cm/s" if drive is not None else "")
+        )
         rows.append({"film": film.name, "file": table, **data})
     return Answer("\n".join(lines), {"films": rows, "failed": failed}, 1 if failed else 0)

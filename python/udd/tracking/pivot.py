@@ -23,6 +23,7 @@ class Pivot:
     covariance: Array
     drive: complex
     rms: float  # misfit [pixels]
+    drive_sigma: float = np.nan
 
 
 def pivot(
@@ -66,10 +67,11 @@ def pivot(
     normal = (design.conj().T * weight**2) @ design
     # misfits within a window go together: count windows, not frames
     inflation = len(value) / max(len(rows) - 1, 1)
-    variance = rms**2 * inflation * np.real(np.linalg.inv(normal + 1e-12 * np.eye(2))[0, 0])
+    spread = rms**2 * inflation * np.real(np.diag(np.linalg.inv(normal + 1e-12 * np.eye(2))))
+    variance = float(spread[0])
     if not np.isfinite(variance) or variance > (WORST * reach) ** 2:
         return None
-    return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms)
+    return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms, float(np.sqrt(spread[1])))
 
 
 def _rolling(

@@ -44,7 +44,7 @@ def align(
     left out; with `keep`, sightings carry their pixels.
     """
     fit = None
-    path = abs(motion.shift) + abs(motion.turn * look.marks[0].place)
+    path = abs(motion.shift) + abs(motion.turn) * look.reach
     for each in rounds:
         misfit = float(np.hypot(each, STREAKY * path))
         psf = float(np.hypot(look.psf, 3 * max(0.0, each - 0.5)))
@@ -59,7 +59,7 @@ def align(
             return None
         pose.centre += complex(step.change[0], step.change[1])
         pose.angle += float(step.change[2])
-        moved = float(np.hypot(np.hypot(*step.change[:2]), step.change[2] * abs(look.marks[0].place)))
+        moved = float(np.hypot(np.hypot(*step.change[:2]), step.change[2] * look.reach))
         fit = Fit(step, sightings, used, moved)
         if moved < SETTLED and each == rounds[-1]:
             break
