@@ -18,6 +18,7 @@ from .pivot import support
 from .result import Camera
 from .scale import Scale
 from .setup import Setup
+from .wobble import Wobble, wobble
 
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 BLOCKS = 20  # stretches of the film whose means are the independent pieces
@@ -75,7 +76,7 @@ def meta_of(
             "the film may be cut off",
             stacklevel=5,
         )
-    look = known.look
+    look, turned = known.look, wobble(tracks, known.look)
     return {
         "source": film.path.name,
         "R": setup.radius,
@@ -100,7 +101,10 @@ def meta_of(
         "marks_rgb": [list(c) for c in setup.layout.colours],
         "psf_px": look.psf,
         "lens": _numbers(look.lens),
-        "calibration": table(tracks, known, camera, setup),
+        "wobble": turned.amplitude if math.isfinite(turned.least) else None,
+        "wobble_sigma": turned.sigma if math.isfinite(turned.least) else None,
+        "wobble_axis": turned.axis,
+        "calibration": table(tracks, known, camera, setup) | {"wobble": _wobble(turned)},
     }
 
 
@@ -140,6 +144,13 @@ def table(tracks: Tracks, known: Known, camera: Camera, setup: Setup) -> dict[st
     out["pivot"] = [[at.real, at.imag], camera.pivot_sigma * camera.scale, camera.pivot_from]
     out["W"] = [camera.drive.imag, camera.drive_sigma, "rolling constraint"]
     return {name: [_plain(value), _plain(sigma), how] for name, (value, sigma, how) in out.items()}
+
+
+def _wobble(found: Wobble) -> list[Any]:
+    if not math.isfinite(found.least):
+        return [None, None, "too few marks to tell"]
+    how = "found" if found.amplitude else f"none seen (less than {math.degrees(found.least):.1f} degrees)"
+    return [found.amplitude, found.sigma, how]
 
 
 def _plain(value: Any) -> Any:
