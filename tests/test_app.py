@@ -182,8 +182,10 @@ def test_the_diagram_tells_coexisting_attractors_apart(monkeypatch: pytest.Monke
     ("message", "words"),
     [
         ("no json", "A message must be JSON."),
+        ("[" * 60_000, "A message must be JSON."),
         ("[1]", "A message must be a JSON object."),
         ('{"type": "os.system"}', "No message is called 'os.system'."),
+        ('{"type": []}', "No message is called '[]'."),
         (json.dumps(asked(CHAOS, count=10**9)), "Count must be a whole number from 1 to 4096"),
         (json.dumps(asked(CHAOS, first=-1)), "First must be a whole number"),
         (of({"kind": "own"}), "The page shows a disk or the dle"),
@@ -197,8 +199,14 @@ def test_the_diagram_tells_coexisting_attractors_apart(monkeypatch: pytest.Monke
         ),
         (of({"kind": "disk", "W": 1}, [0, 1, 0, 0]), "outside the disk"),
         (of({"kind": "disk", "W": 1}, "x"), "State0 must be numbers"),
+        (of({"kind": "disk", "W": 1, "effects": [{"name": []}]}), "No effect is called []"),
         (json.dumps({"type": "watch", "job": "x"}), "There is no such job any more."),
         (json.dumps({"type": "diagram", "generation": 1, **CHAOS, "low": 2, "high": 1}), "0 < low < high"),
+        (
+            json.dumps({"type": "diagram", "generation": 1, **CHAOS, "low": "a", "high": 1}),
+            "Low must be a number",
+        ),
+        (json.dumps({"type": "diagram", "generation": 1, **CHAOS}), "Low must be a number"),
         ("x" * 70_000, "The message is too long."),
     ],
 )
@@ -353,5 +361,7 @@ def test_the_command_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> N
     assert "--port must be from 0 to 65535" in capsys.readouterr().err
     assert main(["app", "nonsense"]) == 1
     assert "is no link of the page" in capsys.readouterr().err
+    assert main(["app", "--host", "a..b", "--port", "0", "--no-browser"]) == 1
+    assert "a..b is no name of a machine" in capsys.readouterr().err
     assert main(["app", "--host", "192.0.2.1", "--port", "0", "--no-browser"]) == 1
     assert "cannot be served" in capsys.readouterr().err

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -148,6 +149,26 @@ def test_a_job_can_be_cancelled(client: TestClient) -> None:
     assert not any(folder.exists() for folder in folders(client))
 
 
+def test_a_job_that_breaks_off_does_not_stop_the_queue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def outcomes() -> list[jobs.Job]:
+        async with jobs.Jobs() as queue:
+            gone = queue.submit({"kind": "loop"}, tmp_path / "gone")
+            cut = queue.submit({"kind": "loop"}, tmp_path)
+            while not {gone.state, cut.state} <= set(jobs.ENDED):
+                await asyncio.sleep(0.01)
+            return [gone, cut]
+
+    echo = shutil.which("echo")
+    if echo is None:
+        pytest.skip("needs a program that says something that is no message")
+    monkeypatch.setattr("sys.executable", echo)
+    ended = asyncio.run(asyncio.wait_for(outcomes(), 30))
+    assert [job.state for job in ended] == ["failed", "failed"]
+    assert all("ended early" in job.answer["error"] for job in ended)
+
+
 def test_only_so_many_jobs_wait(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "JOBS", 1)
     first = client.post("/api/jobs/sample").json()["job"]
@@ -162,7 +183,8 @@ def test_only_so_many_jobs_wait(client: TestClient, monkeypatch: pytest.MonkeyPa
     ("path", "body", "words"),
     [
         ("/api/jobs/shell", None, "There is no such job."),
-        ("/api/jobs/render?seconds=5", b"x", "not JSON"),
+        ("/api/jobs/render?seconds=5", b"x", "must be JSON"),
+        ("/api/jobs/render?seconds=5", b"[" * 60_000, "must be JSON"),
         ("/api/jobs/render?seconds=500", json.dumps(CHAOS).encode(), "A film lasts from 0.5 to 60 s."),
         ("/api/jobs/film?W=fast", b"x", "W must be a number."),
         ("/api/jobs/film?W=nan", b"x", "W must be finite."),

@@ -276,6 +276,8 @@ def test_the_command_says_and_writes(tmp_path: Path, capsys: pytest.CaptureFixtu
         ("basins omega=-3:3:4 omega=1:2:3 --w 6", "given twice"),
         ("basins omega=-3:3:4", "say which model"),
         ("basins omega=-3:3:0 --w 6", "at least one value"),
+        ("basins omega=-3:3:9 --w 6 --out a.png", "a picture of basins needs a grid over two components"),
+        ("basins omega=-3:3:9 --w 6 --points 3", "--points must be at least 12, not 3"),
     ],
 )
 def test_the_command_refuses_in_one_sentence(

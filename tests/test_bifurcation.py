@@ -379,6 +379,8 @@ def test_the_command_writes_data_and_picture(tmp_path: Path, capsys: pytest.Capt
         ("bifurcation R --from 1 --to 2 --w 1", "DLE has no parameter 'R'"),
         ("bifurcation w --from 1 --to nan", "must be finite"),
         ("bifurcation w --from 2 --to 1", "must increase"),
+        ("bifurcation w --from 1 --to 2 --component Q", "the state has no component 'Q'"),
+        ("bifurcation w --from 1 --to 2 --transient -1", "--transient must be at least 0, not -1"),
     ],
 )
 def test_the_command_refuses_in_one_sentence(

@@ -384,10 +384,28 @@ def test_what_cannot_be_added_is_said(null):
     only = scan_curves(null, only=lambda slot, own: slot.name == "torque" and own[0].name == "theta")
     with pytest.raises(FitError, match="no word for theta"):
         curve_effect(only.curves[0])
-    surface = scan_curves(
-        null,
+
+
+def test_a_surface_is_added_and_refitted():
+    law = lambda t, o, y, z, b: (6 * y * z, 0.0, 0.0)  # noqa: E731
+    base = udd.fit(unmodelled.record(law, 1), udd.Disk(W))
+    found = scan_curves(
+        base,
         pairs=True,
-        only=lambda slot, own: slot.name == "torque" and len(own) == 2 and own[0].name == "Y",
+        only=lambda slot, own: slot.name == "torque" and [c.name for c in own] == ["Y", "Z"],
     )
-    with pytest.raises(FitError, match="a surface cannot be added"):
-        curve_effect(surface.curves[0])
+    located = fit_curve(base, found.curves[0], "surface")
+    assert located.fit.converged
+    assert located.fit.chi2 < base.chi2 - 200
+    # Where the record has been the surface is the law, but for what a torque over Y or over Z alone could do
+    # as well (friction, a pivot that is off): the mixed second difference is left.
+    y, z = np.meshgrid([-0.015, 0.015], [-0.02, 0.01], indexing="ij")
+    mixed = np.diff(np.diff(located.curve.values(y, z), axis=0), axis=1).item()
+    assert mixed == pytest.approx(6 * 0.03 * 0.03, rel=0.25)
+    # The effect says what the curve says.
+    effect = located.effect
+    state = np.array([1.0, 0.012, -0.017, 0.4])
+    with_it = udd.Disk(W, effects=[effect])
+    inertia = with_it.R**2 / 2 + state[1] ** 2 + state[2] ** 2
+    change = with_it.rates(0.0, state)[0] - udd.Disk(W).rates(0.0, state)[0]
+    assert change * inertia == pytest.approx(located.curve.values(state[1], state[2]), rel=1e-9)

@@ -83,6 +83,21 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.ratio == (1.0, 1.0, 1.0)
 
 
+def test_what_a_film_gets_wrong_is_no_effect():
+    # Marks that are read a little differently in every orientation: a fifth of a milliradian, more than the
+    # noise of a precise film, four times a turn. It looks like the torque of an uneven disk.
+    camera = simulated.Camera(noise=1e-5, angle_noise=1.5e-4, per_speed=0.0, outliers=0.0, lost=0.0)
+    measured, _ = simulated.film(udd.Disk(0.03), np.random.default_rng(1), 80.0, camera)
+    seen = np.array(measured.values)
+    seen[:, 2] += 2.5e-4 * np.sin(4 * seen[:, 2])
+    told: list[str] = []
+    found = udd.discover(udd.Measurement(measured.t, seen), udd.Disk(0.03), progress=told.append)
+    (strongest,) = [s for s in found.scans[0] if s.candidate.title == "uneven disk (n = 4)"]
+    assert strongest.chi2 > 50.0  # chance alone would not explain it
+    assert found.effects == []
+    assert not [line for line in told if line.startswith("trying")]
+
+
 def test_an_effect_outside_the_library_is_located_and_written_down():
     found = discovered(E.uneven_disk(a=0.03, b=0.0, n=7), seed=4)
     (effect,) = found.effects

@@ -12,7 +12,7 @@ import pytest
 
 import udd
 from udd import effects
-from udd.effects import Effect, curve, formula
+from udd.effects import Effect, as_json, curve, formula, surface
 from udd.errors import ModelError
 from udd.sweeping.models_json import model_from_dict, model_to_dict
 
@@ -132,6 +132,25 @@ def test_a_periodic_curve_begins_anew() -> None:
     assert eval(repr(uneven), vars(effects)) == uneven
 
 
+def test_a_surface_is_the_product_of_splines() -> None:
+    from scipy.interpolate import BSpline
+
+    grid = np.random.default_rng(5).normal(size=(5, 6))
+    bent = surface("torque", ("Y", "beta"), (-0.05, 0.0), (0.07, 2 * np.pi), grid, periodic=True, name="bent")
+    y, beta = np.random.default_rng(6).uniform((-0.05, -20.0), (0.07, 20.0), (100, 2)).T
+    across = BSpline(-0.05 + 0.06 * np.arange(-3, 6), np.eye(5), 3)(y)
+    round_ = BSpline(2 * np.pi / 6 * np.arange(-3, 10), np.vstack([np.eye(6), np.eye(6)[:3]]), 3)
+    wanted = np.einsum("ni,ij,nj->n", across, grid, round_(np.mod(beta, 2 * np.pi)))
+    states = np.stack([0 * y, y, 0 * y, beta], axis=-1)
+    np.testing.assert_allclose(torque_of(bent, states), wanted, atol=1e-11)
+    assert eval(repr(bent), vars(effects)) == bent
+    assert as_json.from_dict(json.loads(json.dumps(as_json.to_dict(bent)))) == bent
+    # It keeps its value beyond the second coordinate's end, and fades beyond the first's.
+    flat = surface("torque", ("Y", "Z"), (-0.05, -0.05), (0.05, 0.05), np.ones((4, 4)))
+    ends = np.array([[0.0, 0.02, 0.07, 0.0], [0.0, 0.36, 0.0, 0.0]])
+    np.testing.assert_allclose(torque_of(flat, ends), [1.0, 0.0], atol=1e-11)
+
+
 @pytest.mark.parametrize(
     ("make", "named"),
     [
@@ -160,6 +179,9 @@ def test_a_periodic_curve_begins_anew() -> None:
         (lambda: formula("torque", "spline(Z, 0, 1, a, b)", a=1.0, b=2.0), "needs spline(x, low, high, c0"),
         (lambda: curve("torque", "Z", 1, 0, [1, 2, 3, 4]), "high must be above 1"),
         (lambda: curve("torque", "Z", 0, 1, [1, 2, 3]), "at least four coefficients"),
+        (lambda: surface("torque", ("Y", "Z"), (0, 0), (1, 1), np.ones((3, 4))), "at least four along each"),
+        (lambda: surface("torque", "YZ", (0, 0), (1, 1), np.ones((4, 4))), "needs two coordinates"),
+        (lambda: surface("torque", ("Y", "Z"), (0, 1), (1, 0), np.ones((4, 4))), "high must be above 1"),
     ],
 )
 def test_an_effect_that_cannot_be_used_is_named(make: Callable[[], object], named: str) -> None:

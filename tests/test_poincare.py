@@ -298,6 +298,12 @@ def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None
         (["poincare"], "say which model"),
         (["poincare", "--w", "1", "--section", "q"], "unknown name q"),
         (["poincare", "--w", "1", "--picture", "here.gif"], "the name must end in"),
+        (["poincare", "--w", "1", "--points", "0"], "--points must be at least 1, not 0"),
+        (["poincare", "--w", "1", "--map", "a.png", "--component", "Q"], "no component 'Q'"),
+        (
+            [*["poincare", "--w", "1", "--section", "z", "--section", "y", "--map", "a.png"]],
+            "--map takes one --section",
+        ),
     ):
         assert main(wrong) == 1
         assert message in capsys.readouterr().err

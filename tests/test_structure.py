@@ -12,6 +12,8 @@ from scipy import optimize
 from scipy.integrate import solve_ivp
 
 import udd
+from udd.errors import ModelError
+from udd.structure import loci
 
 # Values that two or three independent integrators agree on, to the digits that are printed.
 PERIODS = {7.1: 3.98808575286, 10.0: 3.35832224912}
@@ -44,6 +46,16 @@ def test_equilibria_of_the_dle_are_those_of_the_closed_form() -> None:
         np.sort_complex(focus.eigenvalues), np.sort_complex(np.roots([1, 1.6, 3.6, 6])), rtol=1e-12
     )
     assert {rest.kind for rest in rests} == {"saddle", "saddle-focus"}
+
+
+def test_a_pendulum_hangs_or_stands() -> None:
+    rests = udd.equilibria(udd.Pendulum(0.3))
+    assert [rest.kind for rest in rests] == ["centre", "saddle"]
+    assert abs(rests[0].state[1]) < 1e-9 and abs(rests[1].state[1]) == pytest.approx(math.pi)
+    # Without friction small swings have the frequency sqrt(g/l).
+    assert np.abs(rests[0].eigenvalues.imag) == pytest.approx(math.sqrt(9.81 / 0.3))
+    damped = udd.equilibria(udd.Pendulum(0.3, k0=0.01), near=[0.0, 6.0])
+    assert [rest.kind for rest in damped] == ["stable focus", "saddle"]
 
 
 def test_the_disk_has_three_rotating_states_where_friction_falls_with_speed() -> None:
@@ -234,6 +246,14 @@ def test_where_rotation_becomes_stable_over_the_damping(rotation: udd.Branch) ->
     assert (curve.lyapunov_coefficients > 0).all()
 
 
+def test_a_curve_of_points_that_turns_back_ends(
+    rotation: udd.Branch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loci._Plane, "_across", lambda self, guess, normal, step: 2 * self.start - guess)
+    curve = udd.locus(rotation.points[0], "B", (0.1, 0.4))
+    assert len(curve) == 1 and curve.ends == ("lost: the curve turns too sharply",) * 2
+
+
 def test_the_fold_of_rotation_over_the_friction_at_rest() -> None:
     start = next(rest for rest in udd.equilibria(udd.Disk(0.004)) if 1.2 < rest.state[0] < 1.65)
     (fold,) = udd.continuation(start, "W", (0.003, 0.05)).find("fold")
@@ -317,8 +337,16 @@ def test_pictures_of_branches(figure_eight: udd.Branch, rotation: udd.Branch) ->
         ax.figure.clear()
     ax = udd.plot.branches(rotation, component="y")
     assert ax.get_xlabel() == "w" and ax.get_ylabel() == "y [1]"
+    labels = [text.get_text() for text in udd.plot.branches(rotation).get_legend().get_texts()]
+    assert labels == ["stable", "unstable", "Hopf"]
     with pytest.raises(udd.UddError, match="no branches"):
         udd.plot.branches([])
+    with pytest.raises(udd.UddError, match="equilibria have no period"):
+        udd.plot.branches(rotation, view="period")
+    # Cycles that are all unstable, beside an equilibrium that has no period to be marked.
+    cycles = udd.continuation(rotation.points[0], bounds=(3.0, 3.6), longest=0.05)
+    ax = udd.plot.branches([rotation, cycles], view="period")
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["unstable"]
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -337,6 +365,59 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "must be below" in capsys.readouterr().err
 
 
+def test_the_command_follows_branches_born_at_mirror_images_once(capsys: pytest.CaptureFixture[str]) -> None:
+    from udd.cli import main
+
+    span = ["--from", "3", "--to", "3.7", "--at", "3.2"]
+    assert (
+        main(["continuation", "w", "--of", "equilibria", "--B", "0.2", *span, "--born", "2", "--json"]) == 0
+    )
+    found = json.loads(capsys.readouterr().out)["branches"]
+    # Two rotating states, mirror images of one another; the cycles born at their Hopf points come once.
+    assert [branch["kind"] for branch in found] == ["equilibrium"] * 3 + ["cycle"]
+
+
+def test_the_command_passes_over_a_branch_that_is_not_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from udd.cli import main
+    from udd.structure import diagrams
+
+    def lost(*_: object, **__: object) -> udd.Branch:
+        raise ModelError("the branch is not found")
+
+    monkeypatch.setattr(diagrams, "continuation", lost)
+    assert main(["continuation", "w", "--from", "6.9", "--to", "7.3", "--born", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert "symmetry breaking at w = 7.09642643" in out
+    assert err.strip() == "udd: warning: w = 7.096426431: the branch is not found"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--component", "Q"], "the state has no component 'Q'; it has omega, y, z"),
+        (["--born", "-1"], "--born must not be below 0"),
+        (["--out", "branches.txt"], "must end in .json, .png, .svg, .pdf"),
+        (["--of", "equilibria", "--view", "period", "--out", "x.png"], "equilibria have no period"),
+        (["--state", "0,0,0.1", "--at", "1"], "a cycle at w = 1 is wanted: try another --at"),
+    ],
+)
+def test_the_command_refuses_in_one_sentence(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from udd.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["continuation", "w", "--from", "0.5", "--to", "9", *options]) == 1
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -346,6 +427,12 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "q"), "no parameter 'q'"),
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", (8, 9)), "outside the bounds"),
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1))), "which parameter"),
+        (
+            lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", most=0),
+            "most must be a whole number",
+        ),
+        (lambda: udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=0), "n must be a whole number"),
+        (lambda: udd.equilibria(udd.DLE(1.0), starts="many"), "starts must be a whole number"),
         (
             lambda: udd.equilibria(udd.Model(["x", "y"], {"x": "sin(t)", "y": "-y"})),
             "depend on time",

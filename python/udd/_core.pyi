@@ -204,7 +204,12 @@ def shoot(
 ) -> _Pieces: ...
 def expansion(model: Model, t: float, x: list[float], all: bool) -> _Expansion: ...
 def solve(
-    model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], iterations: int
+    model: Model,
+    data: _Data,
+    start: _Start,
+    free: _Free,
+    diffusion: list[float],
+    until: tuple[int, float],
 ) -> _Solution: ...
 def score(
     model: Model,

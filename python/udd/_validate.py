@@ -36,6 +36,19 @@ def number(name: str, value: object, *, least: float | None = None, above: float
     return result
 
 
+def whole(name: str, value: object, least: int) -> int:
+    """A whole number of at least `least`.
+
+    Raises
+    ------
+    ModelError
+        Naming it.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ModelError(f"{name} must be a whole number of at least {least}, not {value!r}")
+    return int(value)
+
+
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """A C-contiguous float64 array of finite numbers.
 

@@ -9,7 +9,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from udd.discovery import Discovery, discover
-from udd.errors import UddError
+from udd.files import made_folder
 from udd.models import Disk
 from udd.tracking import track
 
@@ -57,11 +57,7 @@ def demo(
         The folder cannot be written to.
     """
     tell = progress or (lambda _text: None)
-    folder, name = Path(out), "sample_null" if null else "sample"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UddError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    folder, name = made_folder(out), "sample_null" if null else "sample"
     stem = "_null" if null else ""
     table, page = folder / f"measurement{stem}.csv", folder / f"report{stem}.html"
     with as_file(files("udd") / "data" / f"{name}.mp4") as film:

@@ -14,7 +14,7 @@ from udd import _core
 from udd._validate import array, number
 from udd.crew import bar, thread_count
 from udd.errors import IncompleteWarning, ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 from udd.orbits import orbits_of
 from udd.outcomes import OUTCOMES
 from udd.trajectory import method_for, tolerances
@@ -127,8 +127,7 @@ def ensemble(
         raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
     if not (np.diff(times) > 0).all():
         raise ModelError("the times must increase, without duplicates")
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    require_model(model)
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     runs = max(len(rows), len(starts))
     stepper = method_for(model, method, rtol)

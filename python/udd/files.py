@@ -9,6 +9,22 @@ from pathlib import Path
 from udd.errors import UddError
 
 
+def made_folder(path: str | os.PathLike[str]) -> Path:
+    """A folder to write to, made with those above it if it is not there.
+
+    Raises
+    ------
+    UddError
+        It cannot be made.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UddError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    return folder
+
+
 def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a file in one go; what stood there before stays until the new one is complete.
 

@@ -22,6 +22,22 @@ if TYPE_CHECKING:
 __all__ = ["DLE", "Disk", "Model", "Pendulum"]
 
 
+def require_model(given: object) -> None:
+    """Refuse what is no model.
+
+    Raises
+    ------
+    ModelError
+    """
+    if not isinstance(given, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {given!r}")
+
+
+def beyond_the_edge(model: Model) -> Model:
+    """The equations alone: a disk that does not leave the wheels, another model as it is."""
+    return model.replace(edge="ignore") if isinstance(model, Disk) else model
+
+
 class Model:
     """A model of the user's own; and what all models have in common.
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._validate import number
+from udd._validate import number, whole
 from udd.crew import bar, thread_count
 from udd.errors import IncompleteWarning, ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 from udd.orbits import orbits_of
 from udd.outcomes import OUTCOMES
 from udd.trajectory import tolerances
@@ -275,10 +275,9 @@ def poincare(
     >>> print(f"{points.return_times.mean():.6f}")  # half a period of the symmetric orbit
     1.679161
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     surfaces, ways = surfaces_of(model, section, direction)
-    count, skipped = _whole("n", n, 1), _whole("transient", transient, 0)
+    count, skipped = whole("n", n, 1), whole("transient", transient, 0)
     rtol, atol = tolerances(rtol, atol)
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     if t_max is None:
@@ -373,12 +372,6 @@ def _surface(model: Model, text: str, direction: str | None) -> tuple[str, int]:
     if text.strip() == "reversal":
         return model.state_names[0], _DIRECTIONS[direction or "both"]
     return text, _DIRECTIONS[direction or "up"]
-
-
-def _whole(name: str, value: Any, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ModelError(f"{name} must be a whole number of at least {least}, not {value!r}")
-    return int(value)
 
 
 def clock_of(model: Model, rows: _Floats) -> float:

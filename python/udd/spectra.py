@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._validate import number
-from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError, ModelError
+from udd._validate import number, whole
+from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError
 from udd.exponents import reason, span
-from udd.models import DLE, Disk, Model
+from udd.models import DLE, Disk, Model, require_model
 from udd.orbits import default_start
 from udd.outcomes import FINISHED, OUTCOMES
 from udd.trajectory import initial_state, tolerances
@@ -400,10 +400,8 @@ def covariant_vectors(
     >>> bool(abs(np.einsum("kn,kn->k", flow, found.vectors[:, 1])).min() > 1 - 1e-6)
     True
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise ModelError(f"n must be a whole number of at least 1, not {n!r}")
+    require_model(model)
+    n = whole("n", n, 1)
     slow = model.slow
     step = number("dt", 0.5 * slow if dt is None else dt, above=0.0)
     aside = number("transient", 200.0 * slow if transient is None else transient, least=0.0)

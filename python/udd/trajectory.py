@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import array, number
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 
 __all__ = ["Event", "Events", "Stats", "Trajectory", "simulate"]
 
@@ -195,8 +195,7 @@ def tolerances(rtol: float, atol: float) -> tuple[float, float]:
 
 def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
     """A checked initial state."""
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     state = array("state0", state0)
     if state.shape != (len(model.state_names),):
         raise ModelError(

@@ -70,6 +70,14 @@ pub struct Solution<const D: usize, const M: usize> {
     pub defect: Vec<SVector<f64, D>>,
 }
 
+/// A point and what is off there.
+struct Look<const D: usize, const M: usize> {
+    point: Point<D>,
+    misfit: Vec<SVector<f64, M>>,
+    defect: Vec<SVector<f64, D>>,
+    cost: Cost,
+}
+
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
 where
     F: Family<D>,
@@ -95,9 +103,10 @@ where
         cost
     }
 
-    fn cost_at(&self, point: &Point<D>) -> Result<Cost, EstimateError> {
-        let (misfit, defect) = self.residuals(point)?;
-        Ok(self.cost(point, &misfit, &defect))
+    fn look(&self, point: Point<D>) -> Result<Look<D, M>, EstimateError> {
+        let (misfit, defect) = self.residuals(&point)?;
+        let cost = self.cost(&point, &misfit, &defect);
+        Ok(Look { point, misfit, defect, cost })
     }
 
     /// Adds the free parameters' priors to normal equations at a point.
@@ -120,14 +129,15 @@ where
         options: &Options,
         stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
-        let mut point = start;
-        let mut cost = self.cost_at(&point)?;
+        let mut here = self.look(start)?;
         let mut damping = 0.0;
         let mut still = 0;
-        for iteration in 1..=options.iterations {
+        let mut iteration = 0;
+        loop {
+            iteration += 1;
             stop.check().map_err(|_| EstimateError::Cancelled)?;
-            let linear = self.linearise(&point)?;
-            let system = self.equations(&point, &linear);
+            let linear = self.linearise(&here.point)?;
+            let system = self.equations(&here.point, &linear);
             let reduced = system.clone().eliminate(&self.record.t)?;
             let mut gained = 0.0;
             let mut easy = false;
@@ -140,12 +150,12 @@ where
                 }
                 // Where damped parameters do not help it is the states that go too far.
                 let length = if damping > MOST_DAMPING { 0.5_f64.powi(shorter) } else { 1.0 };
-                let trial = self.moved(&point, &states, &parameters, length);
-                let new = self.cost_at(&trial).ok().filter(|new| new.total() <= cost.total());
+                let trial = self.moved(&here.point, &states, &parameters, length);
+                let new = self.look(trial).ok().filter(|new| new.cost.total() <= here.cost.total());
                 if let Some(new) = new {
-                    gained = cost.total() - new.total();
+                    gained = here.cost.total() - new.cost.total();
                     easy &= damping == 0.0;
-                    (point, cost) = (trial, new);
+                    here = new;
                     damping = if damping < 1e-2 { 0.0 } else { damping * 0.1 };
                     break;
                 }
@@ -156,11 +166,11 @@ where
             }
             // At a kink of the law the cost has one too: there full steps keep promising more than they hold.
             still = if gained < options.decrease { still + 1 } else { 0 };
-            if (easy && gained < options.decrease) || still == ENOUGH {
-                return self.finish(point, iteration, true);
+            let converged = (easy && gained < options.decrease) || still == ENOUGH;
+            if converged || iteration >= options.iterations {
+                return self.finish(here, &linear, &reduced, (iteration, converged));
             }
         }
-        self.finish(point, options.iterations, false)
     }
 
     /// The step to the minimum of the linearised problem; the parameters damped.
@@ -199,32 +209,26 @@ where
         moved
     }
 
-    /// The covariances at the minimum.
+    /// The covariances at the minimum, by the equations of the last step to it.
     fn finish(
         &self,
-        point: Point<D>,
-        iterations: usize,
-        converged: bool,
+        Look { point, misfit, defect, cost }: Look<D, M>,
+        linear: &Linear<D, M>,
+        reduced: &Eliminated<D>,
+        (iterations, converged): (usize, bool),
     ) -> Result<Solution<D, M>, EstimateError> {
-        let linear = self.linearise(&point)?;
-        let reduced = self.equations(&point, &linear).eliminate(&self.record.t)?;
         let covariance = invert(&reduced.schur).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
         let uncertain = reduced.uncertain(&covariance);
-        let misfit: Vec<_> = linear.sights.iter().map(|sight| sight.misfit).collect();
-        let seen_variance = (0..misfit.len()).map(|i| seen_variance(i, &linear, &uncertain)).collect();
-        let defect: Vec<_> = linear.flow.iter().map(|link| link.defect).collect();
-        let cost = self.cost(&point, &misfit, &defect);
-        let evidence = self.evidence(&cost, reduced.log_determinant, &reduced.schur);
         Ok(Solution {
             point,
             cost,
             converged,
             iterations,
+            evidence: self.evidence(&cost, reduced.log_determinant, &reduced.schur),
             covariance,
             state_covariance: uncertain.covariance(),
-            evidence,
+            seen_variance: (0..misfit.len()).map(|i| seen_variance(i, linear, &uncertain)).collect(),
             misfit,
-            seen_variance,
             defect,
         })
     }

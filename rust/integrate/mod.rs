@@ -22,7 +22,7 @@ pub use driver::{Counts, Driver, Ending, Progress};
 pub use landing::{TARGETS, WALL};
 pub use method::{MOST_PROBES, Method, Point, Trial};
 pub(crate) use propagate::MOST_STEPS;
-pub use propagate::{propagate, propagate_from};
+pub use propagate::propagate;
 pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};
 pub use saltation::pass;
 pub use taylor::{Taylor, order};

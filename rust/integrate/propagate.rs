@@ -34,32 +34,15 @@ pub fn propagate<S, const D: usize>(
 where
     S: Scalar<Real = f64, Mask = bool>,
 {
-    propagate_from(system, t0, t1, x0, t1 - t0, tolerance).map(|(x, _)| x)
-}
-
-/// As [`propagate`], with the size of the first trial step; returns the state and the size of the
-/// step that would be tried next, a good `h0` for the interval that follows.
-pub fn propagate_from<S, const D: usize>(
-    system: &impl System<S, D>,
-    t0: f64,
-    t1: f64,
-    x0: [S; D],
-    h0: f64,
-    tolerance: &Tolerance,
-) -> Result<([S; D], f64), Failure>
-where
-    S: Scalar<Real = f64, Mask = bool>,
-{
     if t0 == t1 {
-        return Ok((x0, h0));
+        return Ok(x0);
     }
-    let h0 = if h0 == 0.0 { t1 - t0 } else { h0.copysign(t1 - t0) };
-    let mut driver: Driver<_, S, D> = Driver::new(system, t0, x0, Some(h0), tolerance);
+    let mut driver: Driver<_, S, D> = Driver::new(system, t0, x0, Some(t1 - t0), tolerance);
     while driver.t() != t1 {
         driver.advance(t1)?;
         if driver.counts().accepted > MOST_STEPS {
             return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
         }
     }
-    Ok((*driver.x(), driver.h()))
+    Ok(*driver.x())
 }

@@ -1,9 +1,10 @@
 //! Explicit Runge-Kutta pairs.
 
+use std::array::from_fn;
 use std::marker::PhantomData;
 
 use super::dop853::Dop853Scheme;
-use super::method::{EIGHTHS, Method, Point, QUARTERS, Trial};
+use super::method::{EIGHTHS, MOST_PROBES, Method, Point, QUARTERS, Trial};
 use super::tableau::{DormandPrince, Scheme};
 use super::tolerance::ErrorNorm;
 use crate::model::{Sides, System};
@@ -91,16 +92,24 @@ where
     T: Scheme<N, P>,
     S: Scalar,
 {
-    /// The coefficient of `h θ^(j+1)` in component `n`.
+    /// The coefficient of `h θ^(j+1)` in component `n`, of the numbers or of a part of them.
     #[inline(always)]
-    fn power(&self, j: usize, n: usize) -> S {
-        let mut power = self.stages[0][n].scale(T::TABLEAU.p[0][j]);
+    fn power<A: Scalar>(&self, j: usize, n: usize, part: impl Fn(S) -> A) -> A {
+        let mut power = part(self.stages[0][n]).scale(T::TABLEAU.p[0][j]);
         for i in 1..N {
             if T::TABLEAU.p[i][j] != 0.0 {
-                power += self.stages[i][n].scale(T::TABLEAU.p[i][j]);
+                power += part(self.stages[i][n]).scale(T::TABLEAU.p[i][j]);
             }
         }
         power
+    }
+
+    /// `dt` as a part of the last trial.
+    #[inline(always)]
+    fn theta(&self, dt: S::Real) -> S::Real {
+        // No step, no way along it.
+        let moving = S::Real::zero().less(self.h * self.h);
+        S::Real::select(moving, dt / self.h, S::Real::zero())
     }
 }
 
@@ -159,21 +168,33 @@ where
 
     #[inline(always)]
     fn at(&self, dt: S::Real) -> [S; D] {
-        // No step, no way along it.
-        let moving = S::Real::zero().less(self.h * self.h);
-        let theta = S::Real::select(moving, dt / self.h, S::Real::zero());
+        let theta = self.theta(dt);
         vector!(S, D; n => {
             let mut sum = S::zero();
             for j in (0..P).rev() {
-                sum = sum.times(theta) + self.power(j, n);
+                sum = sum.times(theta) + self.power(j, n, |s| s);
             }
             self.x[n] + sum.times(theta).times(self.h)
         })
     }
 
+    #[inline(always)]
+    fn along(&self, h: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; MOST_PROBES] {
+        let mut states = [[S::Real::zero(); D]; MOST_PROBES];
+        for n in (0..D).filter(|&n| of[n]) {
+            let powers: [S::Real; P] = from_fn(|j| self.power(j, n, |s| s.real()));
+            for (state, &part) in states.iter_mut().zip(parts) {
+                let theta = self.theta(h.scale(part));
+                let sum = powers.iter().rev().fold(S::Real::zero(), |sum, &power| sum * theta + power);
+                state[n] = self.x[n].real() + sum * theta * self.h;
+            }
+        }
+        states
+    }
+
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
         coefficients.push(self.x);
-        coefficients.extend((0..P).map(|j| vector!(S, D; n => self.power(j, n).times(self.h))));
+        coefficients.extend((0..P).map(|j| vector!(S, D; n => self.power(j, n, |s| s).times(self.h))));
         self.h
     }
 }

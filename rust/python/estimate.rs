@@ -34,7 +34,7 @@ type SetTuple = (Vec<f64>, Vec<f64>, f64);
 type FreeTuple = (String, usize, Option<usize>, f64, f64);
 
 /// A frame's flow is followed much more closely than the model's smallest assumed error.
-const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
+const TOLERANCE: Tolerance = Tolerance { rtol: 1e-7, atol: 1e-9 };
 
 impl From<EstimateError> for PyErr {
     fn from(error: EstimateError) -> Self {
@@ -196,7 +196,7 @@ fn solve<'py>(
     start: Start<'py>,
     free: Vec<FreeTuple>,
     diffusion: Vec<f64>,
-    iterations: usize,
+    until: (usize, f64),
 ) -> PyResult<Bound<'py, PyDict>> {
     fn run<'py, F: Family<D> + 'static, C: Sensor<D, M> + 'static, const D: usize, const M: usize>(
         model: (F, Vec<f64>, C),
@@ -204,11 +204,10 @@ fn solve<'py>(
         (data, start): (&Data<'py>, &Start<'py>),
         free: &[FreeTuple],
         diffusion: &[f64],
-        iterations: usize,
+        options: &Options,
     ) -> PyResult<Bound<'py, PyDict>> {
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
-        let options = Options { iterations, ..Options::default() };
-        let s = interrupt::run(py, |stop| estimator.solve(point, &options, stop))?;
+        let s = interrupt::run(py, |stop| estimator.solve(point, options, stop))?;
         let (n, p) = (estimator.record.t.len(), estimator.free.len());
         let result = PyDict::new(py);
         result.set_item("states", array(py, [n, D], s.point.states.iter().flatten().copied())?)?;
@@ -225,7 +224,8 @@ fn solve<'py>(
         result.set_item("iterations", s.iterations)?;
         Ok(result)
     }
-    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &free, &diffusion, iterations))
+    let options = Options { iterations: until.0, decrease: until.1 };
+    each_family!(AnyModel::to_fit(model)?, run(py, (&data, &start), &free, &diffusion, &options))
 }
 
 /// A candidate's family, its values, and where the amplitudes stand among them.

@@ -9,7 +9,7 @@ import functools
 import math
 from typing import Any
 
-from udd.effects import library
+from udd import effects
 from udd.models import DLE, Disk, Model
 from udd.report.words import pretty
 from udd.sweeping.models_json import model_to_dict
@@ -57,7 +57,7 @@ _B = 43.6  # 1/m: the paper's B = 0.2 for the disk
 
 def _presets() -> list[tuple[str, Model, list[float]]]:
     """Key of the words, model, initial state."""
-    damped = Disk(0.03, effects=(_effect("relaxation", b=_B),))
+    damped = Disk(0.03, effects=(effects.relaxation(b=_B),))
     root = 3.7**0.5
     return [
         ("chaos", Disk(0.03), [0.0, 0.001, 0.04, 0.0]),
@@ -78,11 +78,6 @@ def _presets() -> list[tuple[str, Model, list[float]]]:
     ]
 
 
-def _effect(name: str, **values: float) -> Any:
-    spec = next(spec for spec in library() if spec.name == name)
-    return spec.make(momentum=None, treatment=None, **values)
-
-
 @functools.cache
 def catalogue() -> dict[str, Any]:
     """All of it, as JSON knows it."""
@@ -96,7 +91,7 @@ def catalogue() -> dict[str, Any]:
             "piece": limits.SAMPLES,
         },
         "models": {"disk": _model(Disk(0.03)), "dle": _model(DLE(3.9))},
-        "effects": [_effect_as_json(spec) for spec in library() if "disk" in spec.bodies],
+        "effects": [_effect_as_json(spec) for spec in effects.library() if "disk" in spec.bodies],
         "presets": [
             {"key": key, "model": model_to_dict(model), "state": state} for key, model, state in _presets()
         ],

@@ -132,8 +132,10 @@ class Jobs:
                 continue
             job.state = "running"
             job.tell()
-            await _run(job)
-            if job.state == "running":  # its process ended without a word
+            # No process can be started, its folder is gone, or it broke off within a word.
+            with contextlib.suppress(OSError, ValueError):
+                await _run(job)
+            if job.state == "running":  # it ended without a word
                 job.state = "failed"
                 job.answer = {
                     "error": "The job ended early: it took too much memory or time, or its file broke it."

@@ -12,5 +12,4 @@ JOBS = 8  # waiting or kept for download
 MODEL_SECONDS = 1200.0  # of a run, as time passes on the page
 SAMPLES = 4096  # in one piece of a run
 POINTS = 12_800  # of a section
-VALUES = 600  # of the drive in a diagram
 RENDERED = 60.0  # s of a film made of a run

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from udd.branching import bifurcation
 from udd.errors import ModelError
 from udd.exponents import lyapunov
-from udd.models import DLE, Model
+from udd.models import DLE, Model, beyond_the_edge
 from udd.sections import poincare
 
 from . import limits
-from .spec import Start, beyond_the_edge, drive_of
+from .spec import Start, drive_of
 
 Array = NDArray[np.float64]
 

@@ -66,10 +66,8 @@ class Guard:
             return "The request comes from another page."
         if scope["type"] == "http" and scope["path"].startswith(OPEN):
             return None
-        given = headers.get("x-udd-token") or parse_qs(scope["query_string"].decode("latin-1")).get(
-            "token", [""]
-        )
-        token = given if isinstance(given, str) else given[0]
+        asked = parse_qs(scope["query_string"].decode("latin-1"))
+        token = headers.get("x-udd-token") or asked.get("token", [""])[0]
         if not hmac.compare_digest(token.encode("utf-8", "replace"), self._token):
             return "The token is missing or wrong: open the link that udd app printed."
         return None

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
-import json
 import math
 import secrets
 import shutil
@@ -28,8 +28,9 @@ from .catalogue import catalogue
 from .jobs import Jobs
 from .runs import as_csv
 from .security import REPORT_POLICY, Guard
-from .spec import start_of
+from .spec import from_json, start_of
 from .stream import Page
+from .words import sentence
 
 STATIC = Path(__file__).parent / "static"
 
@@ -51,8 +52,9 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         return JSONResponse(catalogue())
 
     async def table(request: Request) -> Response:
-        start = start_of(_json(request.query_params.get("run", "")))
-        text = as_csv(start, _number(request, "seconds") or math.nan)
+        start = start_of(from_json("the run", request.query_params.get("run", "")))
+        # A long run takes seconds, in which the pages are answered.
+        text = await asyncio.to_thread(as_csv, start, _number(request, "seconds") or math.nan)
         return _download(Response(text, media_type="text/csv"), "udd-run.csv")
 
     async def new_job(request: Request) -> Response:
@@ -87,7 +89,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         WebSocketRoute("/api/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    handlers: dict[Any, Callable[..., Any]] = {UddError: _refused, uploads.TooLarge: _too_large}
+    handlers: dict[Any, Callable[..., Any]] = {UddError: _refused}
     guard = Middleware(Guard, token=token, hosts=hosts, any_address=any_address)
     app = Starlette(routes=routes, middleware=[guard], exception_handlers=handlers, lifespan=lifespan)
     app.state.jobs = jobs
@@ -115,7 +117,8 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             shutil.copyfile(sample, folder / "sample.mp4")
         return {"kind": "loop", "file": "sample.mp4", "film": True, "W": demo.W, "R": demo.R}
     if kind == "render":
-        start = _json((await request.body())[: limits.MESSAGE].decode("utf-8", "replace"))
+        text = (await request.body())[: limits.MESSAGE].decode("utf-8", "replace")
+        start = from_json("the run", text)
         seconds = _number(request, "seconds") or 0.0
         if start_of(start).model.kind != "disk":
             raise UddError("Only a run of the disk can be filmed.")
@@ -123,13 +126,6 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             raise UddError(f"A film lasts from 0.5 to {limits.RENDERED:g} s.")
         return {"kind": "render", "start": start, "seconds": seconds}
     raise UddError("There is no such job.")
-
-
-def _json(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        raise UddError("The request is not JSON.") from None
 
 
 def _number(request: Request, name: str) -> float | None:
@@ -151,9 +147,4 @@ def _download(response: Response, name: str) -> Response:
 
 
 async def _refused(_: Request, error: Exception) -> Response:
-    text = " ".join(str(error).split())
-    return PlainTextResponse(text[:1].upper() + text[1:], 400)
-
-
-async def _too_large(_: Request, error: Exception) -> Response:
-    return PlainTextResponse(str(error), 413)
+    return PlainTextResponse(sentence(error), 413 if isinstance(error, uploads.TooLarge) else 400)

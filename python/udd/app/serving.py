@@ -92,6 +92,8 @@ def _is_local(host: str) -> bool:
 def _listen(host: str, port: int) -> socket.socket:
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except UnicodeError:
+        raise UddError(f"{host} is no name of a machine") from None
     except OSError as error:
         raise UddError(f"{host}:{port} cannot be served: {error.strerror or error}") from None
     listening = socket.socket(family, kind, protocol)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from udd.errors import ModelError
-from udd.models import DLE, Disk, Model
+from udd.models import DLE, Model
 from udd.sweeping.models_json import model_from_dict
 from udd.trajectory import initial_state
 
@@ -47,14 +47,23 @@ def key_of(start: Start) -> str:
     return f"{start.model!r} {start.state!r}"
 
 
-def beyond_the_edge(model: Model) -> Model:
-    """The equations alone: a disk that does not leave the wheels."""
-    return model.replace(edge="ignore") if isinstance(model, Disk) else model
-
-
 def drive_of(model: Model) -> str:
     """The name of the drive among the parameters."""
     return "w" if isinstance(model, DLE) else "W"
+
+
+def from_json(what: str, text: str) -> Any:
+    """What a text says.
+
+    Raises
+    ------
+    ModelError
+        It is no JSON, or nested too deeply.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise ModelError(f"{what} must be JSON") from None
 
 
 def message_of(text: str) -> dict[str, Any]:
@@ -65,10 +74,7 @@ def message_of(text: str) -> dict[str, Any]:
     ModelError
         It is no JSON object.
     """
-    try:
-        data = json.loads(text)
-    except ValueError:
-        raise ModelError("a message must be JSON") from None
+    data = from_json("a message", text)
     if not isinstance(data, dict):
         raise ModelError("a message must be a JSON object")
     return data

@@ -16,12 +16,14 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from udd._validate import number
 from udd.errors import UddError
 
 from . import limits, maps, wire
 from .jobs import Jobs, Send
 from .runs import RATE, Runs, columns_of
 from .spec import message_of, start_of, whole
+from .words import sentence
 
 _WAITING = 64  # messages that a page may be behind
 
@@ -75,8 +77,8 @@ class Page:
             if len(text) > limits.MESSAGE:
                 raise UddError("the message is too long")
             said = message_of(text)
-            kind = said.get("type")
-            known: dict[Any, Callable[[dict[str, Any]], Any]] = {
+            kind = str(said.get("type"))
+            known: dict[str, Callable[[dict[str, Any]], Any]] = {
                 "run": self._run,
                 "section": self._section,
                 "diagram": self._diagram,
@@ -127,8 +129,8 @@ class Page:
     async def _diagram(self, said: dict[str, Any]) -> None:
         generation = whole(said, "generation", 0, 2**32 - 1)
         start = start_of(said)
-        low, high = (float(said.get(name, "nan")) for name in ("low", "high"))
-        if not 0 < low < high < float("inf"):
+        low, high = (number(name, said.get(name)) for name in ("low", "high"))
+        if not 0 < low < high:
             raise UddError("a diagram needs 0 < low < high")
 
         async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
@@ -172,12 +174,11 @@ class Page:
 
 
 def _refused(said: dict[str, Any], error: Exception) -> dict[str, Any]:
-    text = " ".join(str(error).split())
     return {
         "type": "error",
         "of": said.get("type"),
         "generation": said.get("generation"),
-        "text": text[:1].upper() + text[1:] + ("" if text.endswith(".") else "."),
+        "text": sentence(error),
     }
 
 

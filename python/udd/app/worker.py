@@ -23,6 +23,7 @@ from udd.cli.answer import as_json
 from udd.errors import UddError
 
 from . import limits
+from .words import sentence
 
 OUT = Path("out")
 _PICTURES_EVERY = 0.2  # s between the frames that are shown
@@ -68,10 +69,10 @@ def _limit() -> None:
 
 def _sentence(error: Exception, file: str) -> str:
     """What is wrong, without the name that the file has here."""
-    text = " ".join(str(error).split())
+    text = str(error)
     if file:
         text = text.removeprefix(f"{file}: ").replace(file, "the file")
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?", ")")) else ".")
+    return sentence(text)
 
 
 def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:

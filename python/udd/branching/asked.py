@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._validate import array, number
 from udd.crew import thread_count
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 from udd.orbits import default_start
 from udd.sections import CLOCKS, clock_of, surfaces_of
 from udd.trajectory import initial_state, tolerances
 
 from .coordinates import Floats
 from .crossings import Runner
-
-
-def whole(name: str, value: Any, least: int) -> int:
-    """A whole number of at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ModelError(f"{name} must be a whole number of at least {least}, not {value!r}")
-    return int(value)
 
 
 def runner_of(
@@ -52,8 +43,7 @@ def runner_of(
 
 def start_states(model: Model, starts: ArrayLike | None) -> Floats:
     """The initial states (n, dim)."""
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    require_model(model)
     if starts is None:
         return np.array([default_start(model)])
     given = np.atleast_2d(array("starts", starts))
@@ -64,8 +54,7 @@ def start_states(model: Model, starts: ArrayLike | None) -> Floats:
 
 def parameter_values(model: Model, parameter: str, values: ArrayLike) -> Floats:
     """The values of the parameter along a diagram."""
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {model!r}")
+    require_model(model)
     if parameter not in model.parameters:
         raise ModelError(
             f"{type(model).__name__} has no parameter {parameter!r}; it has {', '.join(model.parameters)}"

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from udd._validate import number
+from udd._validate import number, whole
 from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model
 
-from .asked import parameter_rows, parameter_values, runner_of, start_states, whole
+from .asked import parameter_rows, parameter_values, runner_of, start_states
 from .branches import intervals
 from .coordinates import Floats, coordinates_of
 from .crossings import INTERRUPTED, UNDECIDED, parts

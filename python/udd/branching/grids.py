@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._validate import whole
 from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model
 from udd.outcomes import FINISHED, OUTCOMES
 
-from .asked import increasing, parameter_rows, runner_of, start_states, whole
+from .asked import increasing, parameter_rows, runner_of, start_states
 from .attractors import KINDS, Attractor
 from .branches import partners
 from .coordinates import Floats, coordinates_of

@@ -11,7 +11,7 @@ from udd.errors import IncompleteWarning, UddError
 from .answer import Answer, watched
 from .chosen import add_models, add_runs, axis_of, model_of, runs_of, starts_of
 from .options import new
-from .saving import add_out, checked, save
+from .saving import PICTURES, add_out, checked, save
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +41,8 @@ def run(args: argparse.Namespace) -> Answer:
     grid = dict(_component(text) for text in args.grid)
     if len(grid) < len(args.grid):
         raise UddError("a component of the grid is given twice")
+    if len(grid) != 2 and any(path.suffix in PICTURES for path in args.out):
+        raise UddError("a picture of basins needs a grid over two components")
     starts = starts_of(args)
     if starts is not None and len(starts) != 1:
         raise UddError("basins take one --state, for the components that are not on the grid")

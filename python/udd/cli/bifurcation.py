@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from udd.errors import IncompleteWarning
 
 from .answer import Answer, watched
-from .chosen import add_models, add_runs, axis_of, model_of, runs_of, starts_of
+from .chosen import add_models, add_runs, axis_of, check_component, model_of, runs_of, starts_of
 from .options import new
 from .saving import add_out, checked, save
 
@@ -49,6 +49,7 @@ def run(args: argparse.Namespace) -> Answer:
     checked(args.out)
     values = axis_of(args.first, args.last, args.n)
     model = model_of(args, {args.parameter: float(values[0])})
+    check_component(model, args.component)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         found = bifurcation(

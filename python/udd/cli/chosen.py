@@ -47,6 +47,12 @@ def model_of(args: argparse.Namespace, varied: Mapping[str, float]) -> Model:
     return model.replace(edge="ignore") if args.ignore_edge else model
 
 
+def check_component(model: Model, name: str | None) -> None:
+    """Refuse a component that cannot be drawn, before the work."""
+    if name is not None and name not in model.state_names:
+        raise UddError(f"the state has no component {name!r}; it has {', '.join(model.state_names)}")
+
+
 def add_runs(parser: argparse.ArgumentParser, points: int) -> None:
     """How every motion is followed."""
     parser.add_argument(
@@ -70,10 +76,18 @@ def add_runs(parser: argparse.ArgumentParser, points: int) -> None:
 
 def runs_of(args: argparse.Namespace) -> dict[str, Any]:
     """Options of `udd.bifurcation` and `udd.basins`."""
+    for name, least in (("points", 12), ("transient", 0)):
+        check_count(name, getattr(args, name), least)
     names = {"section": "section", "direction": "direction", "points": "n", "transient": "transient"}
     options = {own: getattr(args, name) for name, own in names.items()}
     extend = {} if args.extend is None else {"extend": args.extend}
     return {**options, **extend, "rtol": args.rtol, "atol": args.atol}
+
+
+def check_count(name: str, value: int, least: int) -> None:
+    """Refuse too few by the option's own name."""
+    if value < least:
+        raise UddError(f"--{name} must be at least {least}, not {value}")
 
 
 def starts_of(args: argparse.Namespace) -> list[list[float]] | None:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+import warnings
 from typing import TYPE_CHECKING, Any
 
-from udd.errors import UddError
+from udd.errors import ModelError, UddError
 
-from .answer import Answer, as_json
-from .chosen import add_models, model_of
+from .answer import Answer, as_json, telling
+from .chosen import add_models, check_component, model_of
 from .options import new, numbers
-from .saving import PICTURES, save_picture
+from .saving import add_out, checked, save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from udd.models import Model
-    from udd.structure import Branch, Equilibrium, PeriodicOrbit
+    from udd.structure import BifurcationPoint, Branch, Equilibrium, PeriodicOrbit
+
+
+_DATA = (".json",)
 
 
 def add(commands: Any) -> None:
@@ -49,29 +52,21 @@ def add(commands: Any) -> None:
         default="extremes",
         help="what of a cycle is drawn (default extremes)",
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="file to write, by its ending: .json, .png, .svg, .pdf; repeatable",
-    )
+    add_out(parser, _DATA)
     add_models(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Do it."""
-    for path in args.out:
-        if path.suffix not in (".json", *PICTURES):
-            raise UddError(f"{path}: the name must end in .json, {', '.join(PICTURES)}")
-        if not path.parent.is_dir():
-            raise UddError(f"{path}: there is no folder {path.parent}")
+    checked(args.out, _DATA)
     if not args.first < args.last:
         raise UddError(f"--from must be below --to, not {args.first:g} and {args.last:g}")
     at = 0.5 * (args.first + args.last) if args.at is None else args.at
     model = model_of(args, {args.parameter: at})
     model = model.with_parameters({args.parameter: at})
+    check_component(model, args.component)
+    if args.born < 0:
+        raise UddError(f"--born must not be below 0, not {args.born}")
     branches = _branches(args, model)
     data: dict[str, Any] = {
         "model": repr(model),
@@ -90,6 +85,7 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
     from udd.structure import continuation, equilibria, periodic_orbit
+    from udd.structure.diagrams import descendants
 
     bounds = (args.first, args.last)
     starts: list[Equilibrium | PeriodicOrbit] = []
@@ -99,16 +95,27 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
             raise UddError("there is no equilibrium to follow")
     else:
         guess = None if args.state is None else numbers([args.state], "--state")
-        starts.append(periodic_orbit(model, guess, period=args.period))
+        try:
+            starts.append(periodic_orbit(model, guess, period=args.period))
+        except ModelError as error:
+            raise ModelError(
+                f"{error} (a cycle at {args.parameter} = {model.parameters[args.parameter]:g} is wanted: "
+                "try another --at, or say --state and --period)"
+            ) from None
     branches = [continuation(start, args.parameter, bounds, most=args.most) for start in starts]
-    new = branches
-    for _ in range(args.born):
-        born = []
-        for point in (point for branch in new for point in branch.points):
-            if point.kind in ("Hopf", "symmetry breaking", "period doubling", "branch point"):
-                born.append(continuation(point, bounds=bounds, most=args.most))
-        branches, new = branches + born, born
-    return branches
+
+    def missed(point: BifurcationPoint, error: ModelError) -> None:
+        warnings.warn(f"{point.parameter} = {point.value:.10g}: {error}", stacklevel=2)
+
+    with telling() as tell:
+        return descendants(
+            branches,
+            args.born,
+            begun=lambda point: tell(f"following what is born at {point.parameter} = {point.value:.10g}"),
+            missed=missed,
+            bounds=bounds,
+            most=args.most,
+        )
 
 
 def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str, Any], str]:

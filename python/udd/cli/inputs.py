@@ -140,7 +140,7 @@ def own_model(args: argparse.Namespace) -> Model:
         data = json.loads(args.model.read_text(encoding="utf-8"))
     except OSError as error:
         raise UddError(f"{args.model} cannot be read: {error.strerror}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UddError(f"{args.model} is not JSON: {error}") from None
     if not isinstance(data, dict):
         raise UddError(f"{args.model} must hold a table with states, equations and parameters")

@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING, Any
 from udd.errors import IncompleteWarning, UddError
 
 from .answer import Answer
-from .chosen import add_models, model_of
+from .chosen import add_models, check_component, check_count, model_of
 from .options import new, numbers
+from .saving import checked, save_figure
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from udd.sections import Section
-
-_PICTURES = (".png", ".svg", ".pdf")
 
 
 def add(commands: Any) -> None:
@@ -60,6 +57,7 @@ def run(args: argparse.Namespace) -> Answer:
 
     _check(args)
     model = model_of(args, {})
+    check_component(model, args.component)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         found = poincare(
@@ -124,24 +122,17 @@ def _lines(found: Section) -> list[str]:
 
 def _check(args: argparse.Namespace) -> None:
     """Refuse what cannot be written, before the work."""
-    for path in filter(None, (args.out, args.picture, args.map)):
-        if not path.parent.is_dir():
-            raise UddError(f"{path}: there is no folder {path.parent}")
-    for path in filter(None, (args.picture, args.map)):
-        if path.suffix not in _PICTURES:
-            raise UddError(f"{path}: the name must end in {', '.join(_PICTURES)}")
+    if args.out is not None and not args.out.parent.is_dir():
+        raise UddError(f"{args.out}: there is no folder {args.out.parent}")
+    checked([path for path in (args.picture, args.map) if path is not None], ())
+    if args.map is not None and args.section is not None and len(args.section) > 1:
+        raise UddError("--map takes one --section: a return map is that of one surface")
+    check_count("points", args.points, 1)
 
 
 def _picture(path: Path, make: Any) -> None:
-    from io import BytesIO
-
     from matplotlib.figure import Figure
 
-    from udd.files import write_whole
-
     figure = Figure(figsize=(6.4, 4.8), layout="constrained")
-    ax: Axes = figure.add_subplot()
-    make(ax)
-    picture = BytesIO()
-    figure.savefig(picture, format=path.suffix[1:], dpi=150)
-    write_whole(path, picture.getvalue())
+    make(figure.add_subplot())
+    save_figure(path, figure)

@@ -81,6 +81,11 @@ class Curve:
         return f"{self.slot.title} as a function of {' and '.join(c.name for c in self.coordinates)}"
 
     @property
+    def sayable(self) -> bool:
+        """Whether formulas have a word for all that it is a function of."""
+        return all(c.text is not None for c in self.coordinates)
+
+    @property
     def name(self) -> tuple[str, ...]:
         """Slot, momentum and coordinates, to compare by."""
         return (self.slot.title, *(c.name for c in self.coordinates))
@@ -222,10 +227,12 @@ def score_groups(
 def refined(curve: Curve, fit: Fit) -> Curve:
     """The curve around a fit on finer knots, so that the smoothness prior alone says how much it bends.
 
-    It reaches as far as the fit's data.
+    It reaches as far as the fit's data. A surface keeps its knots.
     """
     found = responses(fit)
-    finer = tuple(replace(s, intervals=_FINER * s.intervals) for s in _splines(found, curve.coordinates))
+    finer = _splines(found, curve.coordinates)
+    if len(finer) == 1:
+        finer = (replace(finer[0], intervals=_FINER * finer[0].intervals),)
     (score,) = score_groups(found, [(curve.slot, curve.coordinates)], [finer])
     return _curve(found, curve.slot, curve.coordinates, finer, score)
 
@@ -258,7 +265,8 @@ def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:
     for a, b in itertools.combinations((c for c in single if c.name != "t"), 2):
         parts = [made_of.get(c.name, {c.name}) for c in (a, b)]
         if not parts[0] & parts[1]:
-            yield (a, b)
+            # What goes round comes last: a surface can begin anew along its second coordinate.
+            yield (b, a) if a.angle else (a, b)
 
 
 def _sensible(slot: Slot, own: tuple[Coordinate, ...]) -> bool:

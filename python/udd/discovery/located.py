@@ -15,6 +15,7 @@ from udd.fitting.parameters import Free
 from udd.fitting.solve import tighten
 
 from .absorbed import distinct
+from .coordinates import Coordinate
 from .curves import Curve, refined, rescored
 from .expressions import softened, write
 from .formulas import Formula
@@ -50,7 +51,7 @@ class CurveFit:
 
 
 def curve_effect(curve: Curve, name: str = "curve") -> Effect:
-    """A curve of one coordinate as an effect that a model can have.
+    """A curve, or a surface, as an effect that a model can have.
 
     Parameters
     ----------
@@ -61,14 +62,23 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
     Raises
     ------
     FitError
-        It is a surface, or no formula says what its coordinate is.
+        No formula says what its coordinate is.
     """
-    if len(curve.coordinates) != 1:
-        raise FitError("a surface cannot be added to a model, only a curve")
-    spline = curve.splines[0]
+    spline, last = curve.splines[0], curve.splines[-1]
+    if len(curve.coordinates) == 2:
+        return effects.surface(
+            curve.slot.name,
+            (_text(curve.coordinates[0]), _text(curve.coordinates[1])),
+            (spline.low, last.low),
+            (spline.high, last.high),
+            curve.coefficients.reshape(spline.size, last.size),
+            periodic=last.periodic,
+            momentum=curve.slot.momentum,
+            name=name,
+        )
     return effects.curve(
         curve.slot.name,
-        _text(curve),
+        _text(curve.coordinates[0]),
         spline.low,
         spline.high,
         curve.coefficients,
@@ -122,7 +132,7 @@ def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Eff
     FitError
         No formula says what the curve's coordinate is.
     """
-    variable = _text(curve)
+    variable = _text(curve.coordinates[0])
     values: dict[str, Any] = dict(formula.parameters)
     node = softened(formula.node, _SOFT * float(np.ptp(curve.places[0])))
     return effects.formula(
@@ -154,9 +164,8 @@ def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula")
     return tighten(fit.measurements, problem, point, problem.schedule[1:])
 
 
-def _text(curve: Curve) -> str:
-    """What the curve's coordinate is called in formulas."""
-    own = curve.coordinates[0]
+def _text(own: Coordinate) -> str:
+    """What a coordinate is called in formulas."""
     if own.text is None:
         raise FitError(
             f"nothing over {own.name} can be added to a model: formulas have no word for {own.name}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, ncx2
 
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, extend, frame_costs, held, loosened
@@ -97,9 +97,12 @@ class Look:
     looks: int
 
     def passing(self) -> list[Scored]:
-        """The candidates that chance does not explain, the strongest first."""
+        """The candidates that neither chance nor a film's faults explain, the strongest first."""
+        faults = self.fit.faults
         usable = [
-            s for s in self.library.scored if s.physical and not s.absorbed and s.p * self.looks < ALPHA
+            s
+            for s in self.library.scored
+            if s.physical and not s.absorbed and s.p * self.looks < ALPHA and s.chi2 > faults
         ]
         return sorted(usable, key=lambda s: -round(s.chi2, 3))
 
@@ -209,7 +212,8 @@ def _of_library(current: Fit, candidates: list[Candidate], start: list[float]) -
 def _of_curve(current: Fit, curve: Curve) -> Trial | None:
     """A curve, located in full."""
     try:
-        located = fit_curve(current, curve, _unused(current, "curve"))
+        kind = "curve" if len(curve.coordinates) == 1 else "surface"
+        located = fit_curve(current, curve, _unused(current, kind))
     except FitError:
         return None
     if not located.fit.converged:
@@ -323,7 +327,7 @@ class Search:
             rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
             best = [s.candidate for s in rippled[:1]]
             scanned = scan(current, [*library(current.model, self.given), *best])
-            curves = scan_curves(current)
+            curves = scan_curves(current, pairs=True)
             looks = len(scanned.scored) + len(rippled) + curves.looks
             found.append(Look(current, scanned, curves.curves, looks))
         return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
@@ -338,7 +342,9 @@ class Search:
         singles = self._singles(current, passing)
         if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             singles += self._rivals(current, look, max(look.nats(s) for s in passing))
-        likely = _states_first([c for c in look.curves if c.p * look.looks < ALPHA])[:_CURVES]
+        faults = look.fit.faults
+        known = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+        likely = _states_first(known)[:_CURVES]
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
@@ -350,7 +356,7 @@ class Search:
         """Formulas that may explain the data as well as what the library has."""
         trials: list[Trial] = []
         # Of curves over angles for which formulas have no word another is about as likely.
-        for curve in [c for c in look.curves if c.coordinates[0].text is not None][:1]:
+        for curve in [c for c in look.curves if c.sayable and len(c.coordinates) == 1][:1]:
             written = self._formulas(current, curve)
             trials += self._written(
                 current, curve, [f for f in written if curve.evidence + f.nats > known - NATS]
@@ -381,6 +387,7 @@ class Search:
             [s.candidate for s in group]
             for group, fall in best[:_TRIED]
             if len({s.candidate.effect.name for s in group}) == size
+            and fall > look.fit.faults
             and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
         self._trying([" with ".join(c.title for c in group) for group in likely])
@@ -441,8 +448,10 @@ class Search:
             if whole is None:
                 continue
             before, after = self._level(current.whole, whole.fit)
-            fall = (before.chi2 - after.chi2) / after.inflation(before)
-            p = min(float(chi2.sf(fall, trial.freedom)) * look.looks, 1.0)
+            inflation = after.inflation(before)
+            fall = (before.chi2 - after.chi2) / inflation
+            # What a film's faults make up is no sum of squares of chance alone.
+            p = min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * look.looks, 1.0)
             if p >= ALPHA:
                 continue
             try:

@@ -14,7 +14,7 @@ relaxation(b=5.0, momentum='constraint')
 >>> model.parameters["relaxation.b"]
 5.0
 
-An effect of no library is a :func:`formula`, or a :func:`curve`:
+An effect of no library is a :func:`formula`, a :func:`curve`, or a :func:`surface` over two coordinates:
 
 >>> effects.formula("torque", "c*sin(2*beta)", c=0.01, name="warp").equation
 'torque = c*sin(2*beta)'
@@ -25,10 +25,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 
-from .own import curve, formula
+from .own import curve, formula, surface
 from .specs import Effect, Parameter, Spec, _specs, library
 
-__all__ = ["Effect", "Parameter", "Spec", "curve", "formula", "library"]
+__all__ = ["Effect", "Parameter", "Spec", "curve", "formula", "library", "surface"]
 
 
 def _constructor(spec: Spec) -> Callable[..., Effect]:

@@ -1,4 +1,4 @@
-"""Formulas and curves as JSON, both ways."""
+"""Formulas, curves and surfaces as JSON, both ways."""
 
 from __future__ import annotations
 
@@ -9,17 +9,21 @@ import numpy as np
 
 from udd.errors import ModelError
 
-from .own import UNLIMITED, CurveSpec, FormulaSpec, curve, written
+from .own import UNLIMITED, CurveSpec, FormulaSpec, SurfaceSpec, curve, surface, written
 from .specs import Effect
 
 
 def to_dict(effect: Effect) -> dict[str, Any]:
-    """A formula or a curve as JSON knows it; :func:`from_dict` makes the same effect of it."""
+    """A formula, a curve or a surface as JSON knows it; :func:`from_dict` makes the same effect of it."""
     spec = effect.made
     common = {"slot": effect.slots[0], "name": effect.name, "momentum": effect.momentum}
     if isinstance(spec, CurveSpec):
         where = {"coordinate": spec.coordinate, "low": spec.low, "high": spec.high, "periodic": spec.periodic}
         return {"curve": {**common, **where, "coefficients": list(effect.values)}}
+    if isinstance(spec, SurfaceSpec):
+        where = {"coordinates": spec.coordinates, "low": spec.low, "high": spec.high}
+        grid = np.reshape(effect.values, spec.shape).tolist()
+        return {"surface": {**common, **where, "periodic": spec.periodic, "coefficients": grid}}
     if not isinstance(spec, FormulaSpec):
         raise ModelError(f"{effect.name} is an effect of the library")
     ranges = {p.name: [None if np.isinf(x) else x for x in p.range] for p in spec.parameters}
@@ -28,21 +32,23 @@ def to_dict(effect: Effect) -> dict[str, Any]:
 
 
 def from_dict(data: Mapping[str, Any]) -> Effect:
-    """The formula or curve that :func:`to_dict`, or a person, wrote down.
+    """The formula, curve or surface that :func:`to_dict`, or a person, wrote down.
 
     Raises
     ------
     ModelError
         Something is missing, unknown or unusable.
     """
-    if len(data) != 1 or not data.keys() <= {"formula", "curve"}:
-        raise ModelError(f"an effect of no library must be a formula or a curve, not {data!r}")
+    if len(data) != 1 or not data.keys() <= {"formula", "curve", "surface"}:
+        raise ModelError(f"an effect of no library must be a formula, a curve or a surface, not {data!r}")
     ((kind, content),) = data.items()
     try:
         given = dict(content)
         momentum = given.pop("momentum", None)
         if kind == "curve":
             return curve(**given, momentum=momentum)
+        if kind == "surface":
+            return surface(**given, momentum=momentum)
         values = dict(given.pop("parameters", {}))
         limits: dict[str, Any] = {
             name: tuple(own if x is None else x for x, own in zip(pair, UNLIMITED, strict=True))

@@ -15,7 +15,7 @@ from udd.errors import ModelError
 
 from .specs import Effect, Own, Parameter, Spec, _specs
 
-__all__ = ["curve", "formula"]
+__all__ = ["curve", "formula", "surface"]
 
 #: Where each slot enters: the left side of an equation, the slot's unit, and what it would mean.
 _SLOTS = {
@@ -128,6 +128,43 @@ class CurveSpec(FormulaSpec):
         if self.name != "curve":
             items.append(f"name={self.name!r}")
         return "curve", items
+
+
+@dataclass(frozen=True)
+class SurfaceSpec(FormulaSpec):
+    """What is said of a surface: see :func:`surface`.
+
+    Attributes
+    ----------
+    coordinates : tuple of str
+        What the surface is a function of.
+    low, high : tuple of float
+        Where it begins and ends.
+    shape : tuple of int
+        How many coefficients there are along each coordinate.
+    periodic : bool
+        Whether it begins anew where it ends along the second coordinate.
+    """
+
+    coordinates: tuple[str, str]
+    low: tuple[float, float]
+    high: tuple[float, float]
+    shape: tuple[int, int]
+    periodic: bool
+
+    def expression(self, values: Mapping[str, float], equation: str) -> str:
+        """The surface in words: its numbers are too many to read."""
+        return equation
+
+    def call(self, effect: Effect) -> tuple[str, list[str]]:
+        """The function that makes the effect, and its arguments as text."""
+        grid = np.reshape(effect.values, self.shape).tolist()
+        items = [repr(v) for v in (self.slots[0], self.coordinates, self.low, self.high, grid)]
+        if self.periodic:
+            items.append("periodic=True")
+        if self.name != "surface":
+            items.append(f"name={self.name!r}")
+        return "surface", items
 
 
 UNLIMITED = (-np.inf, np.inf)
@@ -291,6 +328,92 @@ def curve(
     common = _described(slot, name, f"{slot} over {x}", shown, text, listed)
     spec = CurveSpec(*common, listed, text, x, first, last, bool(periodic))
     return spec.make(momentum=momentum, treatment=None, **dict(zip(names, values.tolist(), strict=True)))
+
+
+def surface(
+    slot: str,
+    coordinates: tuple[Expression, Expression],
+    low: tuple[float, float],
+    high: tuple[float, float],
+    coefficients: ArrayLike,
+    *,
+    periodic: bool = False,
+    momentum: str | None = None,
+    name: str = "surface",
+) -> Effect:
+    """An effect given as a surface: a cubic spline over two coordinates.
+
+    Parameters
+    ----------
+    slot : {"torque", "friction", "lateral", "vertical"}
+        What the surface adds to; see :func:`formula`.
+    coordinates : pair of str or SymPy expression
+        What it is a function of, as for :func:`curve`.
+    low, high : pair of float
+        Where it begins and ends along each. Beyond, it fades within three knots along the first coordinate,
+        and keeps its last value along the second.
+    coefficients : array_like, shape (m, n)
+        At least four along each; they are the parameters ``c0``, ``c1``, ... row by row, all amplitudes.
+    periodic : bool
+        Whether it begins anew where it ends along the second coordinate, as over an angle.
+    momentum : {"consistent", "constraint"}, optional
+        How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
+    name : str
+        What its parameters are called after.
+
+    Returns
+    -------
+    Effect
+
+    Raises
+    ------
+    ModelError
+        A coordinate that there is not, too few coefficients, or a range that is none.
+
+    Notes
+    -----
+    The sum of ``c[i, j] B((x - low[0])/h + 1 - i) S_j(y)`` with the cardinal cubic B-spline ``B``,
+    ``h = (high[0] - low[0])/(m - 3)``, and the basis ``S_j`` of :func:`curve`.
+
+    Examples
+    --------
+    A drag that grows towards the edge.
+
+    >>> import udd
+    >>> grid = [[0.02 * i, 0.0, 0.0, -0.02 * i] for i in range(4)]
+    >>> drag = udd.effects.surface("torque", ("abs(Y)", "Omega"), (0.0, -8.0), (0.05, 8.0), grid)
+    >>> drag.expression
+    'torque = s(abs(Y), Omega), a cubic spline surface over 0 to 0.05 and -8 to 8'
+    """
+    values = array("coefficients", coefficients)
+    if values.ndim != 2 or min(values.shape) < 4:
+        raise ModelError("a surface needs a table of coefficients, at least four along each coordinate")
+    if any(isinstance(pair, str) or len(pair) != 2 for pair in (coordinates, low, high)):
+        raise ModelError("a surface needs two coordinates, and where each begins and ends")
+    first = tuple(number("low", v) for v in low)
+    last = tuple(number("high", v, above=a) for v, a in zip(high, first, strict=True))
+    _slot(slot)
+    x, y = (text_of("the coordinate", c) for c in coordinates)
+    m, n = values.shape
+    unit = _SLOTS[slot][1] if slot in _SLOTS else ""
+    names = [f"c{i}" for i in range(m * n)]
+    listed = tuple(_parameter(name, own, unit, True, UNLIMITED) for own in names)
+    per = (m - 3) / (last[0] - first[0])
+    kind = "periodic" if periodic else "spline"
+    rows = (
+        f"bspline((({x}) - {first[0]!r})*{per!r} + {1 - i}) * "
+        f"{kind}({y}, {first[1]!r}, {last[1]!r}, {', '.join(names[i * n : (i + 1) * n])})"
+        for i in range(m)
+    )
+    text = " + ".join(rows)
+    spans = " and ".join(f"{a:.3g} to {b:.3g}" for a, b in zip(first, last, strict=True))
+    shown = f"s({x}, {y}), a cubic spline surface over {spans}"
+    common = _described(slot, name, f"{slot} over {x} and {y}", shown, text, listed)
+    spec = SurfaceSpec(
+        *common, listed, text, (x, y), (first[0], first[1]), (last[0], last[1]), (m, n), bool(periodic)
+    )
+    given = dict(zip(names, values.ravel().tolist(), strict=True))
+    return spec.make(momentum=momentum, treatment=None, **given)
 
 
 def _described(

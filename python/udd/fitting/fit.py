@@ -22,6 +22,7 @@ from .record import Record, record_of
 from .solve import solve, tighten
 
 _NOISE_ROUNDS = 12
+_ROUGH = 1.0  # fall of chi2 below which the misfits no longer change what they say of the noise
 #: In a search a pendulum's angle that states no error is not taken for better than this part of what is
 #: typical: frames may scatter less, but perspective bends the angle by as much.
 _FAITHFUL = {"pendulum": 0.5}
@@ -217,7 +218,7 @@ def _estimate_noise(
 ) -> tuple[bool, Problem, Point]:
     """Fit and estimate the noise in turns; whether the misfits show it, and what was found."""
     for _ in range(_NOISE_ROUNDS):
-        result = solve(measurements, problem, point)
+        result = solve(measurements, problem, point, decrease=_ROUGH)
         point, before = result.point, problem.noise
         if result.leverage > FOLLOWS:
             return False, problem, point

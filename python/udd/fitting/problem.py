@@ -37,6 +37,9 @@ _FRAME = 0.04
 FOLLOWS = 0.7
 
 
+#: What no film is better than, however little its frames scatter: faults of the camera and of the tracking
+#: that go with the motion, as a root mean square per channel (some thousandths of a pixel).
+FAULTS: dict[str, tuple[float, ...]] = {"disk": (2e-6, 2e-6, 4e-5)}
 #: How many of these levels effects are sought at: below some 10 um a frame a film's faults look like them.
 SEARCHED = {"disk": 3}
 
@@ -209,6 +212,13 @@ class Fit:
         """How closely the fit follows each frame: its variance in units of the noise's, in the mean."""
         sd = self.noise.sd(self.record, self.states[:, 0])
         return float((self.misfit_variance / sd**2)[self.record.observed].mean())
+
+    @property
+    def faults(self) -> float:
+        """How much of chi2 a film's faults that go with the motion may make up: 0 where noise hides them."""
+        sd = self.noise.sd(self.record, self.states[:, 0])
+        fault = np.array(FAULTS.get(self.model.kind, (0.0,)))
+        return float(np.square(fault / sd, where=self.record.observed, out=np.zeros(sd.shape)).sum())
 
     def inflation(self, before: Fit) -> float:
         """By what a fall of chi2 from another fit is divided before it counts.

@@ -20,16 +20,26 @@ from .record import Record
 Array = NDArray[np.float64]
 
 _STEPS = 30  # a right model converges in three to seven, but for kinks of its law
+_DONE = 0.01  # a tenth of a standard error
 #: Nats by which the evidence may fall when the model is held more tightly.
 LESS = 3.0
 _LOOSE = 0.3  # leverage from which on misfits are not the noise
 _SAME = 0.03  # autocorrelations that differ by less need no other fit
 
 
-def solve(measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = 40) -> Fit:
-    """Minimise once, for the problem's assumed model error, from a point."""
+def solve(
+    measurements: tuple[Measurement, ...],
+    problem: Problem,
+    point: Point,
+    iterations: int = 40,
+    decrease: float = _DONE,
+) -> Fit:
+    """Minimise once, for the problem's assumed model error, from a point.
+
+    Done when a step promises to lower chi2 by less than `decrease`.
+    """
     try:
-        found = _core.solve(*problem.arguments(point), iterations)
+        found = _core.solve(*problem.arguments(point), (iterations, decrease))
     except ValueError as error:
         raise FitError(_said(error, problem)) from error
     record = problem.record

@@ -36,7 +36,7 @@ def rotation_of_disk(b: float, momentum: str = "constraint", low: float = 0.02, 
 
 def hopf(branch: Branch) -> BifurcationPoint | None:
     """Where its stability changes, if it does."""
-    return next((point for point in branch.points if point.kind == "Hopf"), None)
+    return next(iter(branch.find("Hopf")), None)
 
 
 def _branch(model: DLE | Disk, near: list[float], parameter: str, low: float, high: float) -> Branch:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from udd.errors import UddError
+from udd.files import made_folder
 from udd.fitting import Fit
 from udd.measurement import Measurement
 
@@ -34,11 +34,7 @@ class Lab:
     def measured(self, name: str) -> Measurement:
         """What was tracked in the film of a drive in cm/s, such as ``"1.4"``."""
         if name not in self._measured:
-            try:
-                self.folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise UddError(f"the folder {self.folder} cannot be made: {error.strerror}") from None
-            self._measured[name] = films.measured(name, self.folder, self.tell)
+            self._measured[name] = films.measured(name, made_folder(self.folder), self.tell)
         return self._measured[name]
 
     def smoothed(self, name: str) -> Smoothed:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from udd.errors import UddError
-from udd.files import write_whole
+from udd.files import made_folder, write_whole
 
 from . import page
 from .lab import Lab
@@ -110,11 +110,7 @@ def reproduce(
     """
     chosen_figures, chosen_claims = _chosen(only, films)
     tell = progress or (lambda _text: None)
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UddError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    folder = made_folder(out)
     lab = Lab(folder / "films", tell)
     drawn = []
     for one in chosen_figures:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.energy import angular_momentum
 from udd.measurement import Measurement
 from udd.models import Disk
 
@@ -36,10 +37,7 @@ class Smoothed:
     @property
     def J(self) -> NDArray[np.float64]:
         """Angular momentum about the contact per unit mass, ``I Omega - W Y`` [m^2/s]."""
-        omega, y, z = self.state[:, 0], self.state[:, 1], self.state[:, 2]
-        inertia = self.model.R**2 / 2 + y**2 + z**2
-        result: NDArray[np.float64] = inertia * omega - self.model.W * y
-        return result
+        return angular_momentum(self.model, self.state)
 
 
 def smoothed(measurement: Measurement, model: Disk) -> Smoothed:

@@ -9,7 +9,7 @@ import numpy as np
 
 from udd.errors import UddError
 
-from .style import AXES, FAINT, new_axes, tidy
+from .style import FAINT, axis_of, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from udd.structure import Branch
     from udd.structure.diagrams import Diagram
+
+Rows = list[list["NDArray[Any]"]]
 
 _STABLE, _UNSTABLE = "#000000", "#cc3311"
 _MARKS = {
@@ -62,7 +64,7 @@ def branches(
     Raises
     ------
     UddError
-        No branches, or a component or view that there is not.
+        No branches, a component or view that there is not, or the periods of equilibria alone.
 
     Examples
     --------
@@ -82,16 +84,21 @@ def branches(
     name = model.state_names[0] if component is None else component
     if name not in model.state_names:
         raise UddError(f"the state has no {name!r}; it has {', '.join(model.state_names)}")
+    shown = [branch for branch in given if view != "period" or branch.kind == "cycle"]
+    if not shown:
+        raise UddError("equilibria have no period")
     ax = new_axes(ax)
-    for branch in given:
-        _draw(ax, branch, name, view, section)
-    _mark(ax, given, name, view, section)
+    rows = [_curves(branch, name, view, section) for branch in shown]
+    for branch, own in zip(shown, rows, strict=True):
+        _draw(ax, branch, own)
+    for branch, own in zip(shown, rows, strict=True):
+        _mark(ax, branch, own)
     unit = model.units[parameter]
     ax.set_xlabel(f"{parameter} [{unit}]" if unit else parameter)
     if view == "period":
         ax.set_ylabel("period [1]" if model.kind == "dle" else "period [s]")
     else:
-        ax.set_ylabel(_axis(model, name)[0])
+        ax.set_ylabel(axis_of(model, name)[0])
     tidy(ax, grid=False)
     _legend(ax)
     return ax
@@ -143,18 +150,10 @@ def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = 
     return ax
 
 
-def _axis(model: Any, name: str) -> tuple[str, float]:
-    if name in AXES:
-        words, unit, factor = AXES[name]
-        return f"{words} [{unit}]", factor
-    units = dict(zip(model.state_names, model.state_units, strict=True))
-    return f"{name} [{units.get(name) or '1'}]", 1.0
-
-
-def _curves(branch: Branch, name: str, view: str, section: str | None) -> list[list[NDArray[Any]]]:
+def _curves(branch: Branch, name: str, view: str, section: str | None) -> Rows:
     """For each place on the branch the values that are drawn there, of the mirror image too."""
-    column, factor = branch.model.state_names.index(name), _axis(branch.model, name)[1]
-    if view == "period" and branch.kind == "cycle":
+    column, factor = branch.model.state_names.index(name), axis_of(branch.model, name)[1]
+    if view == "period":
         return [[np.array([period])] for period in branch.periods]
     sign = _mirrored(branch, column)
     if branch.kind == "equilibrium" or view == "extremes":
@@ -174,12 +173,9 @@ def _mirrored(branch: Branch, column: int) -> float:
     return float(flow.mirror[list(flow.kept).index(column)])
 
 
-def _draw(ax: Axes, branch: Branch, name: str, view: str, section: str | None) -> None:
+def _draw(ax: Axes, branch: Branch, rows: Rows) -> None:
     from matplotlib.collections import LineCollection
 
-    if view == "period" and branch.kind != "cycle":
-        return
-    rows = _curves(branch, name, view, section)
     every = np.concatenate([part for row in rows for part in row] or [np.zeros(1)])
     near = _NEAR * float(np.ptp(every)) if every.size else 0.0
     # Between two places; at a bifurcation itself rounding would decide.
@@ -196,6 +192,8 @@ def _draw(ax: Axes, branch: Branch, name: str, view: str, section: str | None) -
                 for a, b in zip(here, others, strict=True):
                     if abs(a - b) <= near or near == 0.0:
                         _join(lines, (branch.values[i], a), (branch.values[i + 1], b))
+        if not lines:
+            continue
         drawn = LineCollection(
             lines,
             colors=shade,
@@ -219,43 +217,23 @@ def _join(
     lines.append([first, last])
 
 
-def _mark(ax: Axes, given: Sequence[Branch], name: str, view: str, section: str | None) -> None:
-    for branch in given:
-        column, factor = branch.model.state_names.index(name), _axis(branch.model, name)[1]
-        for point in branch.points:
-            marker, shade = _MARKS.get(point.kind, ("*", FAINT))
-            if view == "period":
-                heights = [point.period] if branch.kind == "cycle" else []
-            else:
-                heights = _heights(branch, point, column, factor, view, section)
-            ax.plot(
-                [point.value] * len(heights),
-                heights,
-                linestyle="none",
-                marker=marker,
-                color=shade,
-                markersize=4.5,
-                markeredgecolor="black" if marker != "x" else shade,
-                markeredgewidth=0.6,
-                zorder=5,
-                label=point.kind,
-            )
-
-
-def _heights(
-    branch: Branch, point: Any, column: int, factor: float, view: str, section: str | None
-) -> list[float]:
-    """Where a bifurcation point is marked: on every line of the branch, at the place next to it."""
-    i = int(np.argmin(np.abs(branch.arclength - point.arclength)))
-    sign = _mirrored(branch, column)
-    if branch.kind == "equilibrium":
-        own = [factor * float(point.solution.state[column])]
-    elif view == "extremes":
-        own = [factor * float(end[i, column]) for end in branch.extremes]
-    else:
-        which, states = branch.crossings(section)
-        own = [factor * float(value) for value in states[which == i, column]]
-    return own + ([sign * value for value in own] if sign else [])
+def _mark(ax: Axes, branch: Branch, rows: Rows) -> None:
+    """Mark bifurcation points on every line of the branch, at the place next to each."""
+    for point in branch.points:
+        marker, shade = _MARKS.get(point.kind, ("*", FAINT))
+        heights = np.concatenate(rows[int(np.argmin(np.abs(branch.arclength - point.arclength)))])
+        ax.plot(
+            np.full(len(heights), point.value),
+            heights,
+            linestyle="none",
+            marker=marker,
+            color=shade,
+            markersize=4.5,
+            markeredgecolor="black" if marker != "x" else shade,
+            markeredgewidth=0.6,
+            zorder=5,
+            label=point.kind,
+        )
 
 
 def _legend(ax: Axes) -> None:

@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
-from .style import AFTER, AXES, BEFORE, FAINT, label, new_axes, scale, tidy
+from .style import AFTER, FAINT, MANY, SHADES, axis_of, label, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from udd.sections import Section
 
-_SHADES = (AFTER, BEFORE, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito's
-_MANY = 20_000  # dots that are drawn as a picture
 _TURNING = ("beta", "theta")
 _SAME = 1e-9  # a component that varies by less of its size is the same everywhere
 
@@ -49,20 +47,15 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
     'ω [1]'
     """
     _checked(result)
-    across, up = _components(result) if components is None else components
+    names = _components(result) if components is None else components
+    (across, x), (up, y) = (_axis(result, name) for name in names)
     ax = new_axes(ax)
     for k, surface in enumerate(result.section):
         chosen = (result.which == k) & np.isfinite(result.t)
         said = f"{surface} = 0" if "=" not in surface else surface
-        _dots(
-            ax,
-            _column(result, across)[chosen],
-            _column(result, up)[chosen],
-            _SHADES[k % len(_SHADES)],
-            said,
-        )
-    ax.set_xlabel(_label(result, across))
-    ax.set_ylabel(_label(result, up))
+        _dots(ax, x[chosen], y[chosen], SHADES[k % len(SHADES)], said)
+    ax.set_xlabel(across)
+    ax.set_ylabel(up)
     if len(result.section) > 1:
         legend = ax.legend(frameon=False)
         for handle in legend.legend_handles:
@@ -104,7 +97,7 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
         own = result.section[0].removesuffix("'")
         name = own if own in result.model.state_names else _components(result)[-1]
     x, following = result.return_map(name)
-    factor = scale(name) if name in AXES else 1.0
+    said, factor = axis_of(result.model, name)
     x, following = factor * x.ravel(), factor * following.ravel()
     there = np.isfinite(x) & np.isfinite(following)
     ax = new_axes(ax)
@@ -112,8 +105,8 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
         ends = [float(x[there].min()), float(x[there].max())]
         ax.plot(ends, ends, color=FAINT, linewidth=1.0, zorder=0)
     _dots(ax, x[there], following[there], AFTER, None)
-    ax.set_xlabel(_label(result, name))
-    ax.set_ylabel(f"next {_label(result, name)}")
+    ax.set_xlabel(said)
+    ax.set_ylabel(f"next {said}")
     ax.set_aspect("equal", "datalim")
     tidy(ax)
     return ax
@@ -134,7 +127,7 @@ def _dots(ax: Axes, x: NDArray[Any], y: NDArray[Any], shade: str, said: str | No
         "linestyle": "none",
         "marker": "o",
         "markeredgewidth": 0,
-        "rasterized": len(x) > _MANY,
+        "rasterized": len(x) > MANY,
     }
     ax.plot(x, y, color=shade, markersize=size, label=said, **style)
 
@@ -154,16 +147,9 @@ def _components(result: Section) -> tuple[str, str]:
     return varied[0], varied[1]
 
 
-def _column(result: Section, name: str) -> NDArray[np.float64]:
+def _axis(result: Section, name: str) -> tuple[str, NDArray[np.float64]]:
+    """The label of an axis, and the numbers along it."""
     if name == "t":
-        return result.t
-    return (scale(name) if name in AXES else 1.0) * result.component(name)
-
-
-def _label(result: Section, name: str) -> str:
-    if name == "t":
-        return label("tau" if result.model.kind == "dle" else "t")
-    if name in AXES:
-        return label(name)
-    units = dict(zip(result.model.state_names, result.model.state_units, strict=True))
-    return f"{name} [{units.get(name) or '1'}]"
+        return label("tau" if result.model.kind == "dle" else "t"), result.t
+    said, factor = axis_of(result.model, name)
+    return said, factor * result.component(name)

@@ -1,4 +1,4 @@
-"""A curve that an equation lacks, with its band, where the data are, and formulas for it."""
+"""A curve or a surface that an equation lacks, with its error, where the data are, and formulas for it."""
 
 from __future__ import annotations
 
@@ -31,17 +31,19 @@ _COORDINATES: dict[str, tuple[str, str, float]] = {
 }
 _COLOURS = (BEFORE, FLOOR, ALIKE)
 _PLACES = 300
+_ACROSS = 60  # along each coordinate of a surface
 
 
 def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -> Axes:
     """What an equation lacks as a function of a coordinate, with a band that holds it with 95 %.
 
-    The band is drawn where the record has been; how often it was where, the marks at the bottom say.
+    The band is drawn where the record has been; how often it was where, the marks at the bottom say. A
+    surface is drawn in colours, with the places of the record; within the hatched parts it may be zero.
 
     Parameters
     ----------
     curve : Curve
-        Of one coordinate.
+        Of one coordinate, or of two.
     ax : Axes, optional
     formulas : sequence of Formula
         Drawn beside it, three at most, each with as much of what the model's own parameters can do.
@@ -52,18 +54,13 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     """
     if not hasattr(curve, "coefficients") or not hasattr(curve, "slot"):
         raise UddError(f"a curve of a scan can be drawn, not {type(curve).__name__}")
-    if len(curve.coordinates) != 1:
-        raise UddError("a curve of one coordinate can be drawn, not a surface")
-    name = curve.coordinates[0].name
-    plain = (name, "", 1.0)
-    words, unit, across = _COORDINATES.get(name, plain)
-    slot, slot_unit, up = _SLOTS.get(curve.slot.name, (f"d{curve.slot.name}/dt", "", 1.0))
-    places = curve.places[0]
-    places = np.mod(places, 2 * np.pi) if curve.splines[0].periodic else places
-    low, high = np.quantile(places, (0.002, 0.998))
-    x = np.linspace(low, high, _PLACES)
-    value, error = up * curve.values(x), up * curve.errors(x)
     ax = new_axes(ax)
+    if len(curve.coordinates) == 2:
+        return _surface(curve, ax)
+    label, across = _axis(curve.coordinates[0].name)
+    said, up = _value(curve)
+    places, x = _range(curve, 0, _PLACES)
+    value, error = up * curve.values(x), up * curve.errors(x)
     ax.fill_between(
         across * x,
         value - 1.96 * error,
@@ -89,8 +86,55 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
         markersize=5,
         alpha=0.5,
     )
-    ax.set_xlabel(f"{words} [{unit}]" if unit else words)
-    ax.set_ylabel(f"{slot} [{slot_unit}]" if slot_unit else slot)
+    ax.set_xlabel(label)
+    ax.set_ylabel(said)
     ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    tidy(ax)
+    return ax
+
+
+def _axis(name: str) -> tuple[str, float]:
+    """The label of a coordinate's axis, and by what its SI value is multiplied."""
+    words, unit, across = _COORDINATES.get(name, (name, "", 1.0))
+    return f"{words} [{unit}]" if unit else words, across
+
+
+def _value(curve: Any) -> tuple[str, float]:
+    """What a curve adds to, with its unit, and by what its SI value is multiplied."""
+    slot, unit, up = _SLOTS.get(curve.slot.name, (f"d{curve.slot.name}/dt", "", 1.0))
+    return f"{slot} [{unit}]" if unit else slot, up
+
+
+def _range(curve: Any, k: int, number: int) -> tuple[Array, Array]:
+    """Where the record was along a coordinate, and evenly spaced places over that."""
+    places = np.mod(curve.places[k], 2 * np.pi) if curve.splines[k].periodic else curve.places[k]
+    low, high = np.quantile(places, (0.002, 0.998))
+    return places, np.linspace(low, high, number)
+
+
+def _surface(curve: Any, ax: Axes) -> Axes:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import MaxNLocator
+
+    (one, x), (other, y) = (_range(curve, k, _ACROSS) for k in (0, 1))
+    (first, by), (second, times) = (_axis(c.name) for c in curve.coordinates)
+    said, up = _value(curve)
+    grid = np.meshgrid(x, y, indexing="ij")
+    value, error = up * curve.values(*grid), up * curve.errors(*grid)
+    most = float(np.abs(value).max())
+    levels = MaxNLocator(20, symmetric=True).tick_values(-most, most)
+    shown = ax.contourf(by * grid[0], times * grid[1], value, levels, cmap="RdBu_r")
+    doubtful = np.abs(value) < 1.96 * error
+    ax.contourf(by * grid[0], times * grid[1], doubtful, [0.5, 1.5], colors="none", hatches=["///"])
+    ax.plot(by * one, times * other, ".", color=MEASURED, markersize=1.5, alpha=0.4)
+    ax.figure.colorbar(shown, ax=ax, label=said)
+    unsure = Patch(facecolor="none", edgecolor="black", hatch="///", label="0 lies in the 95 % band")
+    been = Line2D([], [], color=MEASURED, linestyle="", marker=".", markersize=4, label="the record")
+    ax.legend(handles=[unsure, been], frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    ax.set_xlabel(first)
+    ax.set_ylabel(second)
+    ax.set_xlim(by * x[0], by * x[-1])
+    ax.set_ylim(times * y[0], times * y[-1])
     tidy(ax)
     return ax

@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
-from .style import AFTER, AXES, BEFORE, FAINT, MEASURED, new_axes, tidy
+from .style import AXES, FAINT, MANY, MEASURED, SHADES, new_axes, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-
-_SHADES = (AFTER, BEFORE, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito's
-_MANY = 20_000  # dots that are drawn as a picture
 
 
 def bifurcation(
@@ -77,9 +74,9 @@ def bifurcation(
             markeredgewidth=0,
             color=shade,
             label=label,
-            rasterized=bool(chosen.sum() > _MANY),
+            rasterized=bool(chosen.sum() > MANY),
         )
-    ax.set_xlabel(_named(parameter, result[parameter].attrs.get("units", "1")))
+    ax.set_xlabel(f"{parameter} [{result[parameter].attrs.get('units', '1')}]")
     ax.set_ylabel(f"{words} [{unit}]")
     _legend(ax)
     tidy(ax, grid=False)
@@ -185,10 +182,6 @@ def _axis(result: xr.Dataset, name: str) -> tuple[str, str, float]:
     return AXES.get(name, (name, result[name].attrs.get("units", "1"), 1.0))
 
 
-def _named(parameter: str, unit: str) -> str:
-    return f"{parameter} [{unit}]"
-
-
 def _half_step(values: NDArray[np.float64], first: float, last: float) -> tuple[float, float]:
     """Half the way to the neighbours, so that a stretch of one value has a width."""
     i, j = int(np.searchsorted(values, first)), int(np.searchsorted(values, last))
@@ -207,13 +200,13 @@ def _layers(
         colour = "path" if len(paths) > 1 else ""
     if colour == "path":
         masks = [seen & (np.arange(len(paths)) == k)[:, None, None, None] for k in range(len(paths))]
-        return [(_SHADES[k], name, masks[k]) for k, name in enumerate(paths)]
+        return [(SHADES[k], name, masks[k]) for k, name in enumerate(paths)]
     if colour == "attractor":
         labels = result["attractor"].transpose(*result[shown_component(result, None)].dims[:3]).to_numpy()
         numbers = np.unique(labels)
         return [
             (
-                FAINT if number == 0 else _SHADES[(number - 1) % len(_SHADES)],
+                FAINT if number == 0 else SHADES[(number - 1) % len(SHADES)],
                 None,
                 seen & (labels == number)[..., None],
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,6 +14,11 @@ AFTER = "#0072b2"
 ALIKE = "#e69f00"
 FLOOR = "#000000"
 FAINT = "#c4c4c4"
+#: What is told apart by colours alone.
+SHADES = (AFTER, BEFORE, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+
+MANY = 20_000
+"""Dots that are drawn as a picture."""
 
 #: What a coordinate is called on an axis, its unit, and by what its SI value is multiplied.
 AXES: dict[str, tuple[str, str, float]] = {
@@ -59,6 +64,14 @@ def label(name: str) -> str:
 def scale(name: str) -> float:
     """By what a coordinate's SI value is multiplied on its axis."""
     return AXES[name][2]
+
+
+def axis_of(model: Any, name: str) -> tuple[str, float]:
+    """The label of a component of a model's state, and by what it is multiplied."""
+    if name in AXES:
+        return label(name), scale(name)
+    units = dict(zip(model.state_names, model.state_units, strict=True))
+    return f"{name} [{units.get(name) or '1'}]", 1.0
 
 
 def new_axes(ax: Axes | None = None, projection: str | None = None) -> Axes:

@@ -158,7 +158,7 @@ def values_of(found: Any, units: dict[str, str]) -> Markup:
 
 def is_curve(effect: Any) -> bool:
     """Whether an effect is a curve, whose many numbers say nothing to a reader."""
-    return hasattr(effect.spec, "coordinate")
+    return hasattr(effect.spec, "coordinate") or hasattr(effect.spec, "coordinates")
 
 
 def effect_sentence(effect: Any) -> str:

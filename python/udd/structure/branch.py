@@ -17,7 +17,7 @@ from .path import Place
 from .rest_curve import RestCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["BifurcationPoint", "Branch"]
+__all__ = ["AnyCurve", "BifurcationPoint", "Branch"]
 
 Complex = NDArray[np.complex128]
 AnyCurve = RestCurve | CycleCurve
@@ -123,7 +123,6 @@ class Branch:
     arclength: Floats
     points: tuple[BifurcationPoint, ...]
     ends: tuple[str, str]
-    _curve: AnyCurve | None = field(default=None, repr=False)
     _places: tuple[tuple[AnyCurve, Place], ...] = field(default=(), repr=False)
 
     def __len__(self) -> int:

@@ -9,15 +9,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from udd._validate import number
+from udd._validate import number, whole
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, beyond_the_edge
 
-from .branch import BifurcationPoint, Branch
+from .branch import AnyCurve, BifurcationPoint, Branch
 from .cycle_curve import CycleCurve
-from .flow import Floats, Flow, flow_of
-from .following import AnyCurve, Limits, Way, follow
-from .path import Lost, Place, correct, tangent_at
+from .flow import Flow, flow_of
+from .following import Limits, Way, follow
+from .path import Lost, Place, along_parameter, correct, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs
 from .solutions import Equilibrium, PeriodicOrbit
@@ -125,17 +125,15 @@ def continuation(
     limit = max(40.0 * curve.flow.clock, 8.0 * own)
     limit = limit if period is None else number("period", period, above=0.0)
     wanted = _wanted(until)
-    limits = Limits(low, high, step, longest, int(most), limit, until=wanted)
+    limits = Limits(low, high, step, longest, whole("most", most, 1), limit, wanted)
     if isinstance(start, BifurcationPoint):
-        return branch_from(
-            [follow(curve, place, parameter, limits)], model, parameter, f"born at a {start.kind}"
-        )
+        return branch_from([follow(curve, place, limits)], model, parameter, f"born at a {start.kind}")
     up = place if place.tangent[-1] >= 0 else Place(place.u, -place.tangent)
     ways = []
     if direction in ("both", "down"):
-        ways.append(follow(curve, Place(up.u, -up.tangent), parameter, limits))
+        ways.append(follow(curve, Place(up.u, -up.tangent), limits))
     if direction in ("both", "up"):
-        ways.append(follow(curve, up, parameter, limits))
+        ways.append(follow(curve, up, limits))
     return branch_from(ways, model, parameter, "the start")
 
 
@@ -158,14 +156,9 @@ def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[
     return until
 
 
-def _free(model: Model) -> Model:
-    """The model whose runs do not end on the edge."""
-    return model.replace(edge="ignore") if hasattr(model, "edge") else model
-
-
 def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, Place]:
     """The curve through a solution, and the place there."""
-    flow: Flow = flow_of(_free(start.model), np.atleast_2d(start.state))
+    flow: Flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state))
     index = flow.index(parameter)
     value = float(flow.values[index])
     curve: AnyCurve
@@ -187,8 +180,7 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, P
         )
         u = curve.pack(old.nodes(start._unknowns), old.span(start._unknowns), value)
         curve.fix_phase(u)
-    row: Floats = np.zeros(len(u))
-    row[-1] = 1.0
+    row = along_parameter(u)
     try:
         u = correct(curve, u, row)
         if isinstance(curve, CycleCurve):
@@ -212,16 +204,15 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
     else:
         entries, points, ends = ways[0].places, ways[0].points, (begin, ways[0].end)
     values = np.array([curve.value(place.u) for curve, place, _, _ in entries])
-    first = entries[0][0]
     symmetric = False
     multipliers, states, periods = [], [], []
     for curve, place, signs, _ in entries:
         own = signs.values
         if isinstance(curve, CycleCurve):
-            symmetric = bool((curve.mirror < 0).any())
+            symmetric = curve.symmetric
             own = own**2 if symmetric else own
             state = curve.flow.full(curve.nodes(place.u)[0])
-            periods.append(curve.span(place.u) * (2.0 if symmetric else 1.0))
+            periods.append(curve.period(place.u))
         else:
             state = curve.flow.full(curve.state(place.u))
             mirror = curve.flow.mirror
@@ -232,7 +223,7 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
         key = -np.abs(own) if isinstance(curve, CycleCurve) else -own.real
         multipliers.append(own[np.argsort(key, kind="stable")])
     table = np.array(multipliers)
-    cycle = isinstance(first, CycleCurve)
+    cycle = isinstance(entries[0][0], CycleCurve)
     inside = np.abs(table) < 1 if cycle else table.real < 0
     stable: NDArray[np.bool_] = np.all(inside, axis=1)
     return Branch(
@@ -248,6 +239,5 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
         np.array([a for _, _, _, a in entries]),
         tuple(points),
         ends,
-        first,
         tuple((curve, place) for curve, place, _, _ in entries),
     )

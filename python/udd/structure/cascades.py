@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from udd._validate import whole
 from udd.errors import ModelError
 
 from .branch import BifurcationPoint, Branch
@@ -115,8 +116,7 @@ def cascade(
     >>> found.values.round(6).tolist()
     [5.394713, 5.086062, 5.02182]
     """
-    if n < 1:
-        raise ModelError(f"at least one doubling must be wanted, not {n}")
+    n = whole("n", n, 1)
     points: list[BifurcationPoint] = []
     branches: list[Branch] = []
     if isinstance(start, BifurcationPoint) and start.kind == _KIND:

@@ -170,6 +170,7 @@ class _Problem:
     span: float
     value: float
     _planes: tuple[Floats, Floats] = field(init=False)
+    _rests: dict[float, Floats] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(cls, curve: CycleCurve, u: Floats) -> _Problem:
@@ -203,11 +204,13 @@ class _Problem:
         return values
 
     def rest(self, value: float) -> Floats:
-        """The equilibrium."""
-        found = refined(self.flow, self.values_at(value), self.guess)
-        if found is None:
-            raise ModelError(f"the equilibrium is lost at {value:.10g}")
-        return found
+        """The equilibrium; searched for once at each value."""
+        if value not in self._rests:
+            found = refined(self.flow, self.values_at(value), self.guess)
+            if found is None:
+                raise ModelError(f"the equilibrium is lost at {value:.10g}")
+            self._rests[value] = found
+        return self._rests[value]
 
     def matrix(self, value: float) -> Floats:
         """The rates' scaled derivative at the equilibrium."""

@@ -83,6 +83,20 @@ class CycleCurve:
         """The time until the orbit closes."""
         return float(u[-2] * self.clock)
 
+    @property
+    def symmetric(self) -> bool:
+        """Whether the orbit closes in the mirror, after half its period."""
+        return bool((self.mirror < 0).any())
+
+    def period(self, u: Floats) -> float:
+        """The time until the orbit is back at its start."""
+        return self.span(u) * (2.0 if self.symmetric else 1.0)
+
+    @property
+    def name(self) -> str:
+        """The parameter's name."""
+        return self.flow.names[self.parameter]
+
     def value(self, u: Floats) -> float:
         """The parameter's value."""
         return float(u[-1] * self.scale)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -136,30 +136,47 @@ def diagram(
     branches: list[Branch] = []
     for value in (axis[0], axis[len(axis) // 2], axis[-1]):
         for rest in equilibria(model.with_parameters({parameter: float(value)})):
-            if not any(_has_rest(branch, rest, float(value)) for branch in branches):
+            if not any(_has(branch, rest, float(value)) for branch in branches):
                 branches.append(continuation(rest, parameter, bounds, most=most, longest=_steps(axis)))
     cycles: list[Branch] = []
     for orbit, value in _seeds(model, parameter, scan):
-        if not any(_has_cycle(branch, orbit, value) for branch in cycles):
+        if not any(_has(branch, orbit, value) for branch in cycles):
             cycles.append(continuation(orbit, parameter, longest=_steps(axis), **limits))
-    waiting = [(point, 1) for branch in (*branches, *cycles) for point in branch.points]
+    grown = descendants([*branches, *cycles], generations, longest=_steps(axis), **limits)
+    rests = [branch for branch in grown if branch.kind == "equilibrium"]
+    return Diagram(model, parameter, scan, (*rests, *(branch for branch in grown if branch.kind == "cycle")))
+
+
+def descendants(
+    branches: Sequence[Branch],
+    generations: int,
+    *,
+    begun: Callable[[BifurcationPoint], None] = lambda point: None,
+    missed: Callable[[BifurcationPoint, ModelError], None] = lambda point, error: None,
+    **options: Any,
+) -> list[Branch]:
+    """These branches, and those born at their points and at the points of those; of mirror images one.
+
+    `begun` is told whose branch is followed next, `missed` whose is not found, which leaves the others.
+    `options` are those of :func:`udd.continuation`.
+    """
+    found = list(branches)
+    waiting = [(point, 1) for branch in found for point in branch.points]
     while waiting:
         point, generation = waiting.pop(0)
         if point.kind not in _BORN or generation > generations:
             continue
+        begun(point)
         try:
-            born = continuation(point, longest=_steps(axis), **limits)
-        except ModelError:
-            continue  # a branch that is not found leaves the others
+            born = continuation(point, **options)
+        except ModelError as error:
+            missed(point, error)
+            continue
         middle, value = born.solution(len(born) // 2), float(born.values[len(born) // 2])
-        if isinstance(middle, Equilibrium):
-            if not any(_has_rest(branch, middle, value) for branch in branches):
-                branches.append(born)
-                waiting += [(p, generation + 1) for p in born.points]
-        elif not any(_has_cycle(branch, middle, value) for branch in cycles):
-            cycles.append(born)
+        if not any(_has(branch, middle, value) for branch in found):
+            found.append(born)
             waiting += [(p, generation + 1) for p in born.points]
-    return Diagram(model, parameter, scan, (*branches, *cycles))
+    return found
 
 
 def _steps(axis: Floats) -> float:
@@ -190,27 +207,18 @@ def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[Periodi
     return found
 
 
-def _has_rest(branch: Branch, rest: Equilibrium, value: float) -> bool:
-    """Whether a branch has this equilibrium or its mirror image."""
-    if branch.kind != "equilibrium":
-        return False
-    return any(_alike(own.eigenvalues, rest.eigenvalues) for own in _rests(branch.at(value)))
+def _has(branch: Branch, solution: Equilibrium | PeriodicOrbit, value: float) -> bool:
+    """Whether a branch has this equilibrium or cycle, or its mirror image."""
+    kind = "equilibrium" if isinstance(solution, Equilibrium) else "cycle"
+    return branch.kind == kind and any(_same(own, solution) for own in branch.at(value))
 
 
-def _rests(solutions: Sequence[Equilibrium | PeriodicOrbit]) -> list[Equilibrium]:
-    return [one for one in solutions if isinstance(one, Equilibrium)]
-
-
-def _has_cycle(branch: Branch, orbit: Equilibrium | PeriodicOrbit, value: float) -> bool:
-    """Whether a branch has this cycle or its mirror image."""
-    if not isinstance(orbit, PeriodicOrbit):
-        return False
-    for own in branch.at(value):
-        if not isinstance(own, PeriodicOrbit) or own.symmetric != orbit.symmetric:
-            continue
-        same = abs(own.period - orbit.period) < _ALIKE * orbit.period
-        if same and _alike(own.multipliers[:1], orbit.multipliers[:1]):
-            return True
+def _same(a: Equilibrium | PeriodicOrbit, b: Equilibrium | PeriodicOrbit) -> bool:
+    if isinstance(a, Equilibrium) and isinstance(b, Equilibrium):
+        return _alike(a.eigenvalues, b.eigenvalues)
+    if isinstance(a, PeriodicOrbit) and isinstance(b, PeriodicOrbit):
+        near = a.symmetric == b.symmetric and abs(a.period - b.period) < _ALIKE * b.period
+        return near and _alike(a.multipliers[:1], b.multipliers[:1])
     return False
 
 

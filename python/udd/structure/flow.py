@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,11 +12,13 @@ from numpy.typing import NDArray
 from udd import _core
 from udd.branching.coordinates import coordinates_of
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 
 __all__ = ["Flight", "Floats", "Flow", "flow_of"]
 
 Floats = NDArray[np.float64]
+
+_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,14 @@ class Flow:
         """The number of components kept."""
         return len(self.kept)
 
+    @cached_property
+    def _angle(self) -> NDArray[np.bool_]:
+        return np.array([self.model.state_names[k] in self.model.angles for k in self.kept])
+
+    def turns(self, gap: Floats) -> Floats:
+        """Whole turns of angles that undo gaps (..., r); zero for what is no angle."""
+        return np.where(self._angle, -_TURN * np.round(gap / _TURN), 0.0)
+
     def index(self, parameter: str) -> int:
         """The place of a parameter."""
         if parameter not in self.names:
@@ -131,8 +142,7 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13) -> Flow:
     ModelError
         The rates depend on time, or the model has too few states.
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     # A component that happens to be small is no smaller than a tenth of the largest.
     seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
     found = coordinates_of(model, seen)

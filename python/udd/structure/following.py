@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from udd.errors import IntegrationError
 
-from .branch import BifurcationPoint, Branch
+from .branch import AnyCurve, BifurcationPoint, Branch
 from .cycle_curve import CycleCurve
 from .flow import Floats
 from .kinks import corner_ahead
-from .locating import error_of, found_between, point_at
+from .locating import error_of, found_between, point_at, rounding_of
 from .orbits import closes_earlier, cycle_at, pieces_for
-from .path import Lost, Place, advance, correct, tangent_at
+from .path import Lost, Place, advance, along_parameter, correct, tangent_at
 from .rest_curve import RestCurve
 from .rests import rest_at
-from .signs import Signs, signs_at
+from .signs import FUNCTIONS, Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["Limits", "Way", "follow", "solution_at", "solutions_at"]
 
-AnyCurve = RestCurve | CycleCurve
-
-_NAMES = {
-    "fold": "fold",
-    "branch point": "plus",
-    "symmetry breaking": "minus",
-    "period doubling": "minus",
-    "Hopf": "torus",
-    "Neimark-Sacker": "torus",
-}
 _WATCHED = 6  # points in which a branch shows that it comes to a connection,
 _CONVERGED = 1e-11  # by this relative change of its parameter
 _ASIDE = 1e-9  # from a corner, in scaled unknowns
@@ -54,8 +44,7 @@ class Limits:
     longest: float
     most: int
     period: float
-    detect: bool = True
-    until: Callable[[BifurcationPoint], bool] = field(default=lambda point: False)
+    until: Callable[[BifurcationPoint], bool]
 
 
 @dataclass
@@ -82,8 +71,6 @@ def solutions_at(branch: Branch, value: float) -> list[Equilibrium | PeriodicOrb
         if not min(a, b) <= value <= max(a, b) or (value == b and i + 2 < len(branch)):
             continue
         curve, place = branch._places[i if abs(value - a) <= abs(value - b) else i + 1]
-        row = np.zeros(len(place.u))
-        row[-1] = 1.0
         guess = place.u.copy()
         if abs(place.tangent[-1]) > 1e-3:
             guess = guess + place.tangent * ((value / curve.scale - guess[-1]) / place.tangent[-1])
@@ -91,13 +78,13 @@ def solutions_at(branch: Branch, value: float) -> list[Equilibrium | PeriodicOrb
         if isinstance(curve, CycleCurve):
             curve.fix_phase(place.u)
         try:
-            found.append(solution_at(curve, correct(curve, guess, row, patience=20)))
+            found.append(solution_at(curve, correct(curve, guess, along_parameter(guess), patience=20)))
         except (Lost, IntegrationError):
             continue
     return found
 
 
-def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin: str = "") -> Way:
+def follow(curve: AnyCurve, start: Place, limits: Limits) -> Way:
     """Follow a branch from `start` in the direction of its tangent."""
     here, step, arclength = start, limits.step, 0.0
     signs = signs_at(curve, here)
@@ -109,7 +96,7 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
         if isinstance(curve, RestCurve):
             corner = corner_ahead(curve, here, step)
             if corner is not None:
-                here, signs, arclength = _round(curve, corner, way, parameter, limits, arclength, here)
+                here, signs, arclength = _round(curve, corner, way, limits, arclength, here)
                 step = min(step, limits.step)
                 if way.end:
                     return way
@@ -120,28 +107,16 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
         except (Lost, IntegrationError) as error:
             way.end = f"lost: {error}"
             return way
-        if limits.detect:
-            for kind, sigma, place in found_between(curve, here, gone, signs, after):
-                if kind == "end":
-                    # The parameter turns where no multiplier passes 1: the branch meets itself there.
-                    way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
-                    way.end = _birth(curve, place, here)
-                    return way
-                bound = _error(curve, here, sigma, place, gone, kind)
-                solution = solution_at(curve, place.u)
-                point = point_at(curve, parameter, kind, place, solution, arclength + sigma, bound)
-                way.points.append(point)
-                way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
-                if limits.until(point):
-                    way.end = "the point that was wanted"
-                    return way
+        _pass(curve, here, gone, signs, after, way, limits, arclength)
+        if way.end:
+            return way
         value = curve.value(there.u)
         if not limits.low <= value <= limits.high:
-            way.end = f"{parameter} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
+            way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
             return way
         arclength += gone
         if isinstance(curve, CycleCurve):
-            if curve.span(there.u) * (2.0 if (curve.mirror < 0).any() else 1.0) > limits.period:
+            if curve.period(there.u) > limits.period:
                 way.places.append((curve, there, after, arclength))
                 way.end = f"the period exceeds {limits.period:.6g}"
                 return way
@@ -158,9 +133,50 @@ def follow(curve: AnyCurve, start: Place, parameter: str, limits: Limits, begin:
             return way
 
 
+def _pass(
+    curve: AnyCurve,
+    here: Place,
+    gone: float,
+    before: Signs,
+    after: Signs,
+    way: Way,
+    limits: Limits,
+    arclength: float,
+) -> None:
+    """Note the bifurcations on a step."""
+    for kind, sigma, place, signs in found_between(curve, here, gone, before, after):
+        if kind == "end":
+            # The parameter turns where no multiplier passes 1: the branch meets itself there.
+            way.places.append((curve, place, signs, arclength + sigma))
+            way.end = _birth(curve, place, here)
+        else:
+            error = _error(curve, here, sigma, place, gone, kind)
+            _note(curve, place, signs, kind, error, way, limits, arclength + sigma)
+        if way.end:
+            return
+
+
+def _note(
+    curve: AnyCurve,
+    place: Place,
+    signs: Signs,
+    kind: str,
+    error: float,
+    way: Way,
+    limits: Limits,
+    arclength: float,
+) -> None:
+    """Note a bifurcation point; the way ends with the last one that is wanted."""
+    point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, error)
+    way.points.append(point)
+    way.places.append((curve, place, signs, arclength))
+    if limits.until(point):
+        way.end = "the point that was wanted"
+
+
 def _error(curve: AnyCurve, here: Place, sigma: float, place: Place, gone: float, kind: str) -> float:
     try:
-        return error_of(curve, here, sigma, place, gone, _NAMES[kind])
+        return error_of(curve, here, sigma, place, gone, FUNCTIONS[kind])
     except (Lost, IntegrationError):
         return float("nan")
 
@@ -181,13 +197,12 @@ def _cut(curve: AnyCurve, here: Place, gone: float, way: Way, arclength: float, 
     """Add the point where the branch meets the bound."""
     beyond = curve.value(here.u + gone * here.tangent)
     bound = limits.high if beyond > limits.high else limits.low
-    row, guess = np.zeros(len(here.u)), here.u.copy()
-    row[-1] = 1.0
+    guess = here.u.copy()
     if here.tangent[-1] != 0.0:
         guess = guess + here.tangent * ((bound / curve.scale - guess[-1]) / here.tangent[-1])
     guess[-1] = bound / curve.scale
     try:
-        u = correct(curve, guess, row)
+        u = correct(curve, guess, along_parameter(guess))
         place = Place(u, tangent_at(curve, u, here.tangent))
         way.places.append(
             (curve, place, signs_at(curve, place), arclength + float(np.linalg.norm(u - here.u)))
@@ -245,38 +260,28 @@ def _back(first: tuple[AnyCurve, Place, Signs, float], here: Place, curve: AnyCu
 
 def _round(
     curve: RestCurve,
-    corner: tuple[Place, Place, int],
+    corner: tuple[Place, Place],
     way: Way,
-    parameter: str,
     limits: Limits,
     arclength: float,
     here: Place,
 ) -> tuple[Place, Signs, float]:
     """Go round a corner, where an equilibrium lies on a surface of the law."""
-    arriving, leaving, _ = corner
+    arriving, leaving = corner
     gone = float(np.linalg.norm(arriving.u - here.u))
     before = signs_at(curve, here)
     # On the corner itself rounding would choose the side of the law.
     at = signs_at(curve, Place(arriving.u - _ASIDE * arriving.tangent, arriving.tangent))
     after = signs_at(curve, Place(leaving.u + _ASIDE * leaving.tangent, leaving.tangent))
-    if limits.detect:
-        short = gone - _ASIDE
-        for kind, sigma, place in found_between(curve, here, short, before, at) if short > 0 else []:
-            solution = solution_at(curve, place.u)
-            error = _error(curve, here, sigma, place, gone, kind)
-            way.points.append(point_at(curve, parameter, kind, place, solution, arclength + sigma, error))
-            way.places.append((curve, place, signs_at(curve, place), arclength + sigma))
+    if gone > _ASIDE:
+        _pass(curve, here, gone - _ASIDE, before, at, way, limits, arclength)
+        if way.end:
+            return here, before, arclength
     arclength += gone
     value = curve.value(arriving.u)
     if not limits.low <= value <= limits.high:
-        way.end = f"{parameter} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
+        way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
         return here, before, arclength
     kind = "fold at a kink" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "kink"
-    solution = solution_at(curve, arriving.u)
-    error = 8.0 * float(np.finfo(float).eps) * abs(value)
-    point = point_at(curve, parameter, kind, arriving, solution, arclength, error)
-    way.points.append(point)
-    way.places.append((curve, arriving, at, arclength))
-    if limits.until(point):
-        way.end = "the point that was wanted"
+    _note(curve, arriving, at, kind, rounding_of(value), way, limits, arclength)
     return leaving, after, arclength

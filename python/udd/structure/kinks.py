@@ -14,10 +14,10 @@ _ON = 1e-13  # of the surface's function, relative to its change over the step
 _BEYOND = 1e-7  # so far beyond the corner the law of the other side is asked, in scaled unknowns
 
 
-def corner_ahead(curve: RestCurve, here: Place, step: float) -> tuple[Place, Place, int] | None:
+def corner_ahead(curve: RestCurve, here: Place, step: float) -> tuple[Place, Place] | None:
     """The corner within the next step, if there is one.
 
-    The place with the tangent that arrives there, with the tangent that leaves it, and which surface it is.
+    The place with the tangent that arrives there, and with the tangent that leaves it.
     """
     values = curve.at(here.u).surfaces
     if not len(values):
@@ -49,7 +49,7 @@ def corner_ahead(curve: RestCurve, here: Place, step: float) -> tuple[Place, Pla
     else:
         return None
     leaving = _other_tangent(curve, place, j, float(np.sign(values[j])))
-    return place, Place(place.u, leaving), j
+    return place, Place(place.u, leaving)
 
 
 def _other_tangent(curve: RestCurve, place: Place, j: int, side: float) -> Floats:

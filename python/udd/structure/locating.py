@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy import optimize
 
-from .branch import BifurcationPoint
+from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
+from .flow import Floats
 from .path import Lost, Place, correct, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["error_of", "found_between", "locate", "point_at"]
+__all__ = ["error_of", "found_between", "frequency_of", "locate", "point_at", "rounding_of"]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
@@ -30,9 +31,9 @@ def changes(before: Signs, after: Signs) -> list[str]:
 
 
 def found_between(
-    curve: RestCurve | CycleCurve, a: Place, step: float, before: Signs, after: Signs
-) -> list[tuple[str, float, Place]]:
-    """Kinds of bifurcation, distances from `a`, and points, in order.
+    curve: AnyCurve, a: Place, step: float, before: Signs, after: Signs
+) -> list[tuple[str, float, Place, Signs]]:
+    """Kinds of bifurcation, distances from `a`, points and the functions there, in order.
 
     `a` is followed by a point at the distance `step`, where the functions are `after`.
     """
@@ -46,7 +47,8 @@ def found_between(
             continue
         try:
             if name == "fold" and "plus" not in changed:
-                found.append(("end", *turning(curve, a, step, before, after)))
+                sigma, place = turning(curve, a, step, before, after)
+                found.append(("end", sigma, place, signs_at(curve, place)))
                 continue
             sigma, place = locate(curve, a, step, name)
         except (Lost, ValueError):
@@ -58,7 +60,7 @@ def found_between(
             # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
             kind = "branch point" if abs(here.fold) > _STILL else "fold"
         elif name == "minus":
-            symmetric = isinstance(curve, CycleCurve) and bool((curve.mirror < 0).any())
+            symmetric = isinstance(curve, CycleCurve) and curve.symmetric
             kind = "symmetry breaking" if symmetric else "period doubling"
         else:
             pair = here.pair
@@ -68,13 +70,11 @@ def found_between(
                 kind = "Neimark-Sacker"
             else:
                 continue  # two real ones: a neutral saddle
-        found.append((kind, sigma, place))
+        found.append((kind, sigma, place, here))
     return sorted(found, key=lambda one: one[1])
 
 
-def turning(
-    curve: RestCurve | CycleCurve, a: Place, step: float, before: Signs, after: Signs
-) -> tuple[float, Place]:
+def turning(curve: AnyCurve, a: Place, step: float, before: Signs, after: Signs) -> tuple[float, Place]:
     """About where the parameter turns at a branch point, near which the equations are nearly singular."""
     low, high = (0.0, before.fold), (step, after.fold)
     sigma, place = 0.0, a
@@ -97,7 +97,7 @@ def _on_axis(pair: complex) -> bool:
     return abs(pair.real) < 1e-6 * abs(pair.imag)
 
 
-def locate(curve: RestCurve | CycleCurve, a: Place, step: float, name: str) -> tuple[float, Place]:
+def locate(curve: AnyCurve, a: Place, step: float, name: str) -> tuple[float, Place]:
     """The zero of one of the functions between `a` and the point at the distance `step` after it.
 
     Raises
@@ -118,12 +118,10 @@ def locate(curve: RestCurve | CycleCurve, a: Place, step: float, name: str) -> t
     return sigma, cache[sigma]
 
 
-def error_of(
-    curve: RestCurve | CycleCurve, a: Place, sigma: float, place: Place, step: float, name: str
-) -> float:
+def error_of(curve: AnyCurve, a: Place, sigma: float, place: Place, step: float, name: str) -> float:
     """How far the value moves when runs are less accurate."""
     value = curve.value(place.u)
-    rounding = 8.0 * np.finfo(float).eps * abs(value)
+    rounding = rounding_of(value)
     if isinstance(curve, RestCurve):
         return rounding
 
@@ -144,23 +142,34 @@ def error_of(
     return rounding + abs(there - value) + abs(shift)
 
 
+def rounding_of(value: float) -> float:
+    """How far rounding may move a value."""
+    return 8.0 * float(np.finfo(float).eps) * abs(value)
+
+
+def frequency_of(curve: AnyCurve, u: Floats, signs: Signs) -> float:
+    """Of the pair that bifurcates there, per unit of time."""
+    if isinstance(curve, CycleCurve):
+        return float(np.angle(signs.pair)) / curve.span(u)
+    return signs.pair.imag
+
+
 def point_at(
-    curve: RestCurve | CycleCurve,
-    parameter: str,
+    curve: AnyCurve,
     kind: str,
     place: Place,
+    signs: Signs,
     solution: Equilibrium | PeriodicOrbit,
     arclength: float,
     error: float,
 ) -> BifurcationPoint:
     """The point with what belongs to its kind."""
     frequency = coefficient = float("nan")
-    pair = signs_at(curve, place).pair
+    if kind in ("Hopf", "Neimark-Sacker"):
+        frequency = frequency_of(curve, place.u, signs)
     if kind == "Hopf" and isinstance(solution, Equilibrium):
-        frequency, coefficient = pair.imag, solution.lyapunov_coefficient
-    if kind == "Neimark-Sacker" and isinstance(curve, CycleCurve):
-        frequency = float(np.angle(pair)) / curve.span(place.u)
+        coefficient = solution.lyapunov_coefficient
     value = curve.value(place.u)
     return BifurcationPoint(
-        kind, parameter, value, error, solution, arclength, frequency, coefficient, curve, place
+        kind, curve.name, value, error, solution, arclength, frequency, coefficient, curve, place
     )

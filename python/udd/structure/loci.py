@@ -8,27 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from udd._validate import number
+from udd._validate import number, whole
 from udd.errors import IntegrationError, ModelError
 
-from .branch import BifurcationPoint
+from .branch import AnyCurve, BifurcationPoint
 from .branches import bounds_of
 from .cycle_curve import CycleCurve
 from .flow import Floats
-from .following import AnyCurve, solution_at
-from .path import Lost, Place, correct, tangent_at
-from .signs import signs_at
+from .following import solution_at
+from .locating import frequency_of
+from .path import Lost, Place, along_parameter, correct, tangent_at
+from .signs import FUNCTIONS, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["Locus", "locus"]
 
-_FUNCTION = {
-    "fold": "fold",
-    "Hopf": "torus",
-    "Neimark-Sacker": "torus",
-    "symmetry breaking": "minus",
-    "period doubling": "minus",
-}
 _EXACT = 1e-13  # of the parameters, relative to their units
 _TURN = 0.9  # least cosine between one direction in the plane and the next
 _SHORTEST = 1e-5  # step
@@ -130,7 +124,7 @@ def locus(
     """
     if not isinstance(point, BifurcationPoint) or point._curve is None or point._place is None:
         raise ModelError("a bifurcation point of udd.continuation is needed")
-    if point.kind not in _FUNCTION:
+    if point.kind not in FUNCTIONS or point.kind == "branch point":
         raise ModelError(f"a curve of points of the kind {point.kind} is not followed")
     second = point._curve.flow.index(parameter)
     if second == point._curve.parameter:
@@ -141,10 +135,11 @@ def locus(
         raise ModelError(f"the point itself, at {start[0]:g} and {start[1]:g}, lies outside the bounds")
     step = number("step", step, above=0.0)
     longest = max(step, number("longest", longest, above=0.0))
+    most = whole("most", most, 1)
+    along = _Fold if point.kind == "fold" else _Plane
     ways = []
     for sense in (-1.0, 1.0):
-        along = _Fold if point.kind == "fold" else _Plane
-        ways.append(along(point, second, box).follow(sense, step, longest, int(most)))
+        ways.append(along(point, second, box).follow(sense, step, longest, most))
     (back, first), (on, last) = ways
     found = [*back[:0:-1], *on]
     values = np.array([value for value, _, _ in found])
@@ -171,7 +166,7 @@ class _Plane:
     def __init__(self, point: BifurcationPoint, second: int, box: Floats) -> None:
         curve, place = point._curve, point._place
         assert curve is not None and place is not None  # checked by the caller
-        self.name, self.second = _FUNCTION[point.kind], second
+        self.name, self.second = FUNCTIONS[point.kind], second
         values = curve.values_at(place.u)
         self.curve: AnyCurve = replace(curve, values=values)
         self.place = place
@@ -187,8 +182,7 @@ class _Plane:
             self.curve.seen = None
         guess = self.place.u.copy()
         guess[-1] = first / self.curve.scale
-        row = np.zeros(len(guess))
-        row[-1] = 1.0
+        row = along_parameter(guess)
         return Place(correct(self.curve, guess, row), row)
 
     def value(self, p: Floats) -> float:
@@ -209,17 +203,17 @@ class _Plane:
             along = np.array([-normal[1], normal[0]])
             along *= np.sign(along @ direction) or 1.0
             while True:
+                reason = "the curve turns too sharply"
                 try:
                     there = self._across(p + step * along, normal, step)
                     way = (there - p) / np.linalg.norm(there - p)
+                    if way @ along > _TURN:
+                        break
                 except (Lost, IntegrationError, RuntimeError, ValueError) as error:
-                    step *= 0.5
-                    if step < _SHORTEST:
-                        return found, f"lost: {error}"
-                    continue
-                if way @ along > _TURN:
-                    break
+                    reason = str(error)
                 step *= 0.5
+                if step < _SHORTEST:
+                    return found, f"lost: {reason}"
             outside = (there * self.unit < self.box[:, 0]) | (there * self.unit > self.box[:, 1])
             if outside.any():
                 k = int(np.flatnonzero(outside)[0])
@@ -254,15 +248,9 @@ class _Plane:
         self.place = self.solve(p)
         if isinstance(self.curve, CycleCurve):
             self.curve.fix_phase(self.place.u)
-        pair = signs_at(self.curve, self.place).pair
         frequency = float("nan")
         if self.name == "torus":
-            cycle = isinstance(self.curve, CycleCurve)
-            frequency = (
-                float(np.angle(pair)) / self.curve.span(self.place.u)
-                if cycle and isinstance(self.curve, CycleCurve)
-                else pair.imag
-            )
+            frequency = frequency_of(self.curve, self.place.u, signs_at(self.curve, self.place))
         return p * self.unit, solution_at(self.curve, self.place.u), frequency
 
 

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from udd._validate import array, number
 from udd.errors import IntegrationError, ModelError
-from udd.models import Model
+from udd.models import Model, beyond_the_edge, require_model
 from udd.orbits import default_start
 from udd.trajectory import simulate
 
 from .cycle_curve import CycleCurve
 from .flow import Floats, Flow, flow_of
-from .path import Lost, correct
+from .path import Lost, along_parameter, correct
 from .solutions import PeriodicOrbit
 
 __all__ = ["closed", "closes_earlier", "cycle_at", "flown", "periodic_orbit", "pieces_for"]
@@ -26,7 +26,6 @@ _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a
 _SAME = 1e-7  # two states within this part of the sizes are one
 _HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
 _RESIDUAL = 1e-9  # gaps that are as good as none
-_TURN = 2.0 * math.pi
 
 
 def periodic_orbit(
@@ -82,13 +81,12 @@ def periodic_orbit(
     >>> print(round(orbit.period, 10), orbit.symmetric, orbit.stable)
     3.3583222491 True True
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     dim = len(model.state_names)
     given = array("guess", default_start(model) if guess is None else guess)
     if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
         raise ModelError(f"the guess must be states of {dim} components, not of shape {given.shape}")
-    free = model.replace(edge="ignore") if hasattr(model, "edge") else model
+    free = beyond_the_edge(model)
     flow = flow_of(free, np.atleast_2d(given))
     if given.ndim == 2 and len(given) > 1:
         if period is None:
@@ -110,7 +108,7 @@ def periodic_orbit(
     run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
     ends = flow.reduced(run.state)
     mirror = flow.mirror if mirrored and flow.mirror is not None else np.ones(flow.dim)
-    return _polished(model, flow, ends[:-1], span, mirror, _turns(flow, mirror * ends[-1] - ends[0]))
+    return _polished(model, flow, ends[:-1], span, mirror, flow.turns(mirror * ends[-1] - ends[0]))
 
 
 def pieces_for(flow: Flow, span: float) -> int:
@@ -122,16 +120,14 @@ def cycle_at(curve: CycleCurve, u: Floats) -> PeriodicOrbit:
     """The cycle that solves a curve's equations."""
     flow, values = curve.flow, curve.values_at(u)
     multipliers = np.linalg.eigvals(curve.across_flow(u)).astype(complex)
-    symmetric = bool((curve.mirror < 0).any())
-    if symmetric:
+    if curve.symmetric:
         multipliers = multipliers**2
     multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
     residual, _ = curve.equations(u)
     nodes = flow.full(curve.nodes(u))
-    period = curve.span(u) * (2.0 if symmetric else 1.0)
     model = flow.with_values(values)
     gap = float(np.abs(residual).max())
-    return PeriodicOrbit(model, nodes[0], period, multipliers, symmetric, nodes, gap, curve, u)
+    return PeriodicOrbit(model, nodes[0], curve.period(u), multipliers, curve.symmetric, nodes, gap, curve, u)
 
 
 def _polished(
@@ -157,13 +153,12 @@ def closed(
     )
     guess = curve.pack(nodes, span, float(flow.values[held]))
     curve.fix_phase(guess)
-    row = np.zeros(len(guess))
-    row[-1] = 1.0
     try:
-        u = correct(curve, guess, row, patience=30)
+        u = correct(curve, guess, along_parameter(guess), patience=30)
     except (Lost, IntegrationError) as error:
-        about = span * (2 if (mirror < 0).any() else 1)
-        raise ModelError(f"no cycle of period {about:.6g} is found near the guess: {error}") from None
+        raise ModelError(
+            f"no cycle of period {curve.period(guess):.6g} is found near the guess: {error}"
+        ) from None
     residual, _ = curve.equations(u)
     ends = curve.nodes(u)
     rest = np.abs(curve.rate_at(flow.values, ends[0]) * flow.clock / flow.size).max()
@@ -174,7 +169,7 @@ def closed(
 
 def closes_earlier(curve: CycleCurve, u: Floats) -> str:
     """Of which bifurcation an orbit is that closes after half its time already, if it does."""
-    if (curve.mirror < 0).any():
+    if curve.symmetric:
         return ""
     flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
     end = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))[-1]
@@ -183,7 +178,7 @@ def closes_earlier(curve: CycleCurve, u: Floats) -> str:
         ways.append((flow.mirror, "a symmetry breaking"))
     for mirror, kind in ways:
         gap = mirror * end - start
-        if np.abs((gap + _turns(flow, gap)) / flow.size).max() < _HALF:
+        if np.abs((gap + flow.turns(gap)) / flow.size).max() < _HALF:
             return kind
     return ""
 
@@ -196,7 +191,7 @@ def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
     ways = [(k, plain) for k in (2, 3, 5, 7)]
     if flow.mirror is not None:
         ways = [*ways, (2, flow.mirror), (3, flow.mirror)]
-    if (curve.mirror < 0).any():
+    if curve.symmetric:
         # A third of a half, seen in the mirror: what is symmetric closes after odd parts only.
         ways = [(k, curve.mirror) for k in (3, 5, 7)]
     for parts, mirror in ways:
@@ -204,7 +199,7 @@ def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
         pieces = pieces_for(flow, share)
         nodes = flown(flow, values, start, share, pieces)
         gap = mirror * nodes[-1] - start
-        shift = _turns(flow, gap)
+        shift = flow.turns(gap)
         if np.abs((gap + shift) / flow.size).max() < _SAME:
             found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
             return _simplest(*found)
@@ -224,17 +219,10 @@ def flown(flow: Flow, values: Floats, start: Floats, span: float, pieces: int) -
     return np.array(states)
 
 
-def _turns(flow: Flow, gap: Floats) -> Floats:
-    """Whole turns of angles that undo a gap; zero for what is no angle."""
-    names = [flow.model.state_names[k] for k in flow.kept]
-    angle = np.array([name in flow.model.angles for name in names])
-    return np.where(angle, -_TURN * np.round(gap / _TURN), 0.0)
-
-
 def _shift_of(flow: Flow, nodes: Floats, span: float) -> Floats:
     share = np.array([span / len(nodes)])
     end = flow.fly(flow.values, nodes[-1:], share).x[0]
-    return _turns(flow, end - nodes[0])
+    return flow.turns(end - nodes[0])
 
 
 def _return_time(flow: Flow, model: Model, start: Floats, longest: float) -> tuple[float, bool]:
@@ -246,11 +234,12 @@ def _return_time(flow: Flow, model: Model, start: Floats, longest: float) -> tup
     returns = []
     for mirror, mirrored in images:
         gap = mirror * states - states[0]
-        gap = gap + np.array([_turns(flow, one) for one in gap])
+        gap = gap + flow.turns(gap)
         away = np.linalg.norm(gap / flow.size, axis=1)
+        left = np.maximum.accumulate(away) > 4 * _CLOSE
         # A minimum lies between samples; the distance there, of a straight line between neighbours.
         for i in range(1, count):
-            if not (away[i] <= away[i - 1] and away[i] < away[i + 1] and away[: i + 1].max() > 4 * _CLOSE):
+            if not (away[i] <= away[i - 1] and away[i] < away[i + 1] and left[i]):
                 continue
             before, after = gap[i - 1] / flow.size, gap[i + 1] / flow.size
             line = after - before

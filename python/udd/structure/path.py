@@ -13,7 +13,7 @@ from udd.errors import IntegrationError
 
 from .flow import Floats
 
-__all__ = ["Curve", "Lost", "Place", "advance", "correct", "tangent_at"]
+__all__ = ["Curve", "Lost", "Place", "advance", "along_parameter", "correct", "tangent_at"]
 
 _ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
 _NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
@@ -60,6 +60,13 @@ def solve(matrix: Floats | sparse.csr_array, row: Floats, right: Floats) -> Floa
     except RuntimeError:
         raise Lost("the equations are singular") from None
     return result
+
+
+def along_parameter(u: Floats) -> Floats:
+    """The direction in which the parameter, the last of the unknowns, alone rises: the row that holds it."""
+    row = np.zeros(len(u))
+    row[-1] = 1.0
+    return row
 
 
 def correct(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> Floats:

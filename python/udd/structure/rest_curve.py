@@ -64,6 +64,11 @@ class RestCurve:
         """The reduced state."""
         return u[:-1] * self.flow.size
 
+    @property
+    def name(self) -> str:
+        """The parameter's name."""
+        return self.flow.names[self.parameter]
+
     def value(self, u: Floats) -> float:
         """The parameter's value."""
         return float(u[-1] * self.scale)

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from scipy import optimize
 from scipy.stats import qmc
 
-from udd._validate import array
+from udd._validate import array, whole
 from udd.errors import ModelError
-from udd.models import Model
+from udd.models import Model, require_model
 
 from .flow import Floats, Flow, flow_of
 from .normal_forms import first_lyapunov_coefficient
@@ -38,7 +38,8 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     Returns
     -------
     list of Equilibrium
-        The most stable first. Those of a model with a symmetry come in mirror images, or are their own.
+        The most stable first. Those of a model with a symmetry come in mirror images, or are their own;
+        those that differ by whole turns of an angle come once, within half a turn of 0.
 
     Raises
     ------
@@ -62,15 +63,14 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     [1.732051 1.732051 0.      ] saddle-focus
     [0. 0. 5.] saddle
     """
-    if not isinstance(model, Model):
-        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {model!r}")
+    require_model(model)
     dim = len(model.state_names)
     given = np.zeros((0, dim)) if near is None else np.atleast_2d(array("near", near))
     if given.ndim != 2 or given.shape[1] != dim:
         raise ModelError(f"near must be states of {dim} components, not of shape {given.shape}")
     flow = flow_of(model, given if len(given) else np.ones((1, dim)))
     guesses = [*flow.reduced(given)]
-    box = qmc.Sobol(flow.dim, seed=3).random(max(int(starts), len(_REACHES)))
+    box = qmc.Sobol(flow.dim, seed=3).random(max(whole("starts", starts, 1), len(_REACHES)))
     for k, reach in enumerate(_REACHES):
         guesses += [*((2.0 * box[k :: len(_REACHES)] - 1.0) * reach * flow.size)]
     found: list[Floats] = []
@@ -79,10 +79,17 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
         if x is None:
             continue
         for image in (x,) if flow.mirror is None else (x, flow.mirror * x):
-            if all(np.abs((image - known) / flow.size).max() > _SAME for known in found):
+            image = image + flow.turns(image)
+            if all(_apart(flow, image, known) for known in found):
                 found.append(image + 0.0)
     rests = [rest_at(flow, flow.values, x) for x in found]
     return sorted(rests, key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
+
+
+def _apart(flow: Flow, a: Floats, b: Floats) -> bool:
+    """Whether two states differ, by more than whole turns of angles."""
+    gap = a - b
+    return bool(np.abs((gap + flow.turns(gap)) / flow.size).max() > _SAME)
 
 
 def rest_at(flow: Flow, values: Floats, x: Floats) -> Equilibrium:

@@ -33,7 +33,7 @@ def orbit_states(curve: CycleCurve, u: Floats) -> Floats:
     method = "taylor" if _core.has_series(model) else "dop853"
     found = _core.ensemble(model, rows, starts, times, 1e-10, 1e-13, method, 1)
     states: Floats = found["states"][:, :-1].reshape(m * _BETWEEN, -1)
-    if (curve.mirror < 0).any():
+    if curve.symmetric:
         image = flow.full(curve.mirror * flow.reduced(states))
         states = np.vstack([states, image])
     return states
@@ -73,7 +73,7 @@ def crossings_of(
             raise ModelError("equilibria do not cross a section")
         flow, u = curve.flow, place.u
         nodes, span = curve.nodes(u), curve.span(u)
-        if (curve.mirror < 0).any():
+        if curve.symmetric:
             nodes = np.vstack([nodes, curve.mirror * nodes])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing

@@ -12,7 +12,17 @@ from .flow import Floats
 from .path import Place
 from .rest_curve import RestCurve
 
-__all__ = ["Signs", "signs_at"]
+__all__ = ["FUNCTIONS", "Signs", "signs_at"]
+
+#: Which of the functions below is zero, by the kind of bifurcation.
+FUNCTIONS = {
+    "fold": "fold",
+    "branch point": "plus",
+    "symmetry breaking": "minus",
+    "period doubling": "minus",
+    "Hopf": "torus",
+    "Neimark-Sacker": "torus",
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.models import Model
+from udd.models import Model, beyond_the_edge
 
 from .flow import Floats
 
@@ -25,6 +25,8 @@ Complex = NDArray[np.complex128]
 def kind_of_rest(eigenvalues: Complex) -> str:
     """What the flow near an equilibrium with these eigenvalues looks like."""
     growing, turning = eigenvalues.real > 0, np.abs(eigenvalues.imag) > 0
+    if (eigenvalues.real == 0.0).all() and turning.all():
+        return "centre"
     if growing.all() or not growing.any():
         word = "unstable" if growing.all() else "stable"
         return f"{word} focus" if turning.any() else f"{word} node"
@@ -43,7 +45,8 @@ class Equilibrium:
     eigenvalues : ndarray of complex, shape (r,)
         Of the rates' derivative by the components that the rates depend on; largest real part first.
     kind : str
-        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node" or "unstable focus".
+        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node", "unstable focus"; "centre"
+        where small swings neither grow nor decay.
     residual : float
         What is left of the rates, in typical sizes per typical time.
     lyapunov_coefficient : float
@@ -111,10 +114,9 @@ class PeriodicOrbit:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
         from udd.trajectory import simulate
 
-        model = self.model.replace(edge="ignore") if hasattr(self.model, "edge") else self.model
         times = np.linspace(0.0, self.period, n + 1)
         tight: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"} | options
-        return simulate(model, times, self.state, **tight)
+        return simulate(beyond_the_edge(self.model), times, self.state, **tight)
 
     def __repr__(self) -> str:
         stable = "stable" if self.stable else "unstable"

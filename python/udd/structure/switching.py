@@ -8,7 +8,7 @@ import numpy as np
 
 from udd.errors import IntegrationError, ModelError
 
-from .branch import BifurcationPoint
+from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
 from .flow import Floats
 from .orbits import pieces_for
@@ -18,7 +18,7 @@ from .rest_curve import RestCurve, expansion
 __all__ = ["born_at"]
 
 
-def born_at(point: BifurcationPoint, amplitude: float) -> tuple[RestCurve | CycleCurve, Place]:
+def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place]:
     """The curve of the solutions that bifurcate at a point, and a place on it with the way that leads off.
 
     Raises
@@ -30,7 +30,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[RestCurve | Cycl
     if curve is None or place is None:
         raise ModelError("this bifurcation point was not made by udd.continuation")
     # Nearer and nearer to the point: the branch may bend away from its first direction.
-    made: tuple[RestCurve | CycleCurve, Floats, Floats]
+    made: tuple[AnyCurve, Floats, Floats]
     for size in amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03]):
         if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, CycleCurve):
             made = _doubled(curve, place)
@@ -105,7 +105,7 @@ def _through(curve: CycleCurve, x: Floats, away: Floats) -> CycleCurve:
     return curve
 
 
-def _crossing(curve: RestCurve | CycleCurve, place: Place) -> tuple[RestCurve | CycleCurve, Floats, Floats]:
+def _crossing(curve: AnyCurve, place: Place) -> tuple[AnyCurve, Floats, Floats]:
     """The other of two directions that the equations leave free."""
     _, matrix = curve.equations(place.u)
     dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()

@@ -60,7 +60,7 @@ def model_from_dict(data: object) -> Model:
         except (TypeError, ValueError):
             has = "states, equations, parameters, angles and effects"
             raise ModelError(f"a model of your own has {has}, not {', '.join(given)}") from None
-    if kind not in _KINDS:
+    if not isinstance(kind, str) or kind not in _KINDS:
         raise ModelError(
             f"the model's kind must be one of {', '.join((*_KINDS, OwnModel.kind))}, not {kind!r}"
         )
@@ -89,12 +89,12 @@ def _effect_to_dict(effect: Effect) -> dict[str, Any]:
 
 def _effect_from_dict(data: object) -> Effect:
     given = _mapping("an effect", data)
-    if given.keys() & {"formula", "curve"}:
+    if given.keys() & {"formula", "curve", "surface"}:
         return as_json.from_dict(given)
     name = given.pop("name", None)
     choices = given.pop("momentum", None), given.pop("treatment", None)
     specs = {spec.name: spec for spec in library()}
-    if name not in specs:
+    if not isinstance(name, str) or name not in specs:
         raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
     # `Effect` rather than its constructor: fitted amplitudes may lie outside their physical ranges.
     values = tuple(given.pop(p.name, p.default) for p in specs[name].parameters)

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from udd._validate import array, number
+from udd._validate import array, number, whole
 from udd.errors import ModelError, UddError
-from udd.models import Model
+from udd.models import Model, require_model
 from udd.orbits import default_start
 from udd.trajectory import initial_state
 
@@ -78,8 +78,7 @@ class SweepSpec:
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
             raise ModelError(f"quantity must be one of {', '.join(QUANTITIES)}, not {self.quantity!r}")
-        if not isinstance(self.model, Model):
-            raise ModelError(f"a model is needed (udd.DLE, udd.Disk or udd.Pendulum), not {self.model!r}")
+        require_model(self.model)
         model_to_dict(self.model)
         if not isinstance(self.over, Mapping) or not 1 <= len(self.over) <= 3:
             raise ModelError("over must name one to three axes with their values")
@@ -88,9 +87,7 @@ class SweepSpec:
         if not isinstance(self.options, Mapping):
             raise ModelError(f"options must be a table of names and values, not {self.options!r}")
         options = QUANTITIES[self.quantity].options(self.model, self.options)
-        if isinstance(self.chunk, bool) or not isinstance(self.chunk, int | np.integer) or self.chunk < 1:
-            raise ModelError(f"chunk must be a whole number of at least 1, not {self.chunk!r}")
-        checked = {"over": over, "state0": state, "options": options, "chunk": int(self.chunk)}
+        checked = {"over": over, "state0": state, "options": options, "chunk": whole("chunk", self.chunk, 1)}
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 

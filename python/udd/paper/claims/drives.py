@@ -135,7 +135,7 @@ def dle_71(_lab: Lab) -> Verdict:
     """The symmetric figure-eight, and how near its symmetry breaks."""
     orbit = periodic_orbit(DLE(7.1))
     branch = continuation(periodic_orbit(DLE(10.0)), "w", (6.5, 12.0))
-    breaking = next(point.value for point in branch.points if point.kind == "symmetry breaking")
+    breaking = branch.find("symmetry breaking")[0].value
     slowest = float(np.abs(orbit.multipliers).max())
     words = f"{'symmetric' if orbit.symmetric else 'asymmetric'} and {'' if orbit.stable else 'un'}stable"
     evidence = (
