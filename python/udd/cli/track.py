@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import tempfile
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from udd.errors import UddError
 
 from .answer import Answer, watched
-from .inputs import add_partial, is_film, tracked
+from .inputs import add_partial, is_film, whole
 from .options import new, numbers
 
 if TYPE_CHECKING:
@@ -83,6 +84,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--overlay", type=Path, metavar="MP4", help="film to write, what was found drawn upon it"
     )
+    parser.add_argument(
+        "--page", type=Path, metavar="HTML", help="page to write: what was found, and how well"
+    )
     add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
 
@@ -103,7 +107,8 @@ def run(args: argparse.Namespace) -> Answer:
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
     said, recording = ("", {}) if args.camera is None else _record(args)
-    m = _tracked(args, options).with_meta(**more)
+    detail: list[Any] = []
+    m = _tracked(args, options, detail).with_meta(**more)
     text, data = _summary(m)
     text, data = said + text, {**recording, **data}
     if args.overlay is not None:
@@ -112,6 +117,12 @@ def run(args: argparse.Namespace) -> Answer:
         overlay(args.file, m, args.overlay)
         text += f"\nwritten: {args.overlay}"
         data["overlay"] = args.overlay
+    if args.page is not None:
+        from udd.tracking import page
+
+        page(args.file, detail[0] if detail and not args.smooth else m, args.page, command=_command(args))
+        text += f"\nwritten: {args.page}"
+        data["page"] = args.page
     if args.out is not None:
         m.to_csv(args.out)
         return Answer(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
@@ -148,8 +159,39 @@ def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
     return f"{made}\nwritten: {made.path}\n", {"recording": {**told, "film": made.path}}
 
 
-def _tracked(args: argparse.Namespace, options: dict[str, Any]) -> Measurement:
-    m = tracked(args, args.disk_radius, **options)
+_SAID = (
+    *("disk_radius", "mark_distance", "fps", "pivot", "scale", "region", "calibrate", "bob", "length"),
+    "config",
+)
+
+
+def _command(args: argparse.Namespace) -> str:
+    """The command that makes the page again."""
+    words = ["udd", "track", args.file.name]
+    for name in _SAID:
+        value = getattr(args, name)
+        if value is not None:
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    words += ["--fast"] if args.fast else []
+    return shlex.join([*words, "--page", args.page.name])
+
+
+def _tracked(
+    args: argparse.Namespace, options: dict[str, Any], detail: list[Any] | None = None
+) -> Measurement:
+    """Track the film; what was found on the way comes into `detail`."""
+
+    def measure() -> Measurement:
+        from udd.tracking.run import Tracking, track_whole
+
+        found = track_whole(args.file, progress=watched(), disk_radius=args.disk_radius, **options)
+        if not isinstance(found, Tracking):
+            return found
+        if detail is not None:
+            detail.append(found)
+        return found.measurement
+
+    m = whole(args, measure)
     if not args.smooth:
         return m
     from udd.smoothing import smooth
@@ -214,6 +256,8 @@ def _folder(args: argparse.Namespace) -> Answer:
         raise UddError(f"{args.file}: there is no film in this folder")
     if args.overlay is not None:
         raise UddError("--overlay is for one film, not for a folder")
+    if args.page is not None:
+        raise UddError("--page is for one film, not for a folder")
     if args.out is None or (args.out.exists() and not args.out.is_dir()):
         raise UddError("say with --out in which folder the tables of the films are to be written")
     options = _options(args)

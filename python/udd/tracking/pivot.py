@@ -43,7 +43,7 @@ def pivot(
     """
     rows: list[NDArray[np.complex128]] = []
     values: list[NDArray[np.complex128]] = []
-    for a, b in _windows(t, good):
+    for a, b in windows(t, good):
         time, beta = t[a:b], angle[a:b]
         turn = np.exp(-1j * beta)
         dt = time - time[0]
@@ -130,7 +130,7 @@ def rough_contact(
     return Contact(complex(x[0]), complex(x[1]))
 
 
-def _windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Index ranges of unbroken good frames, cut to at most `WINDOW` seconds."""
     if len(t) < 2:
         return []

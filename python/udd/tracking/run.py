@@ -158,12 +158,20 @@ def track(
         "region": region,
         "calibrate": calibrate,
     }
-    known = settings({} if config is None else config, **given, bob=bob, length=length)
+    found = track_whole(video, config=config, progress=progress, **given, bob=bob, length=length)
+    return found.measurement if isinstance(found, Tracking) else found
+
+
+def track_whole(
+    video: str | os.PathLike[str], *, config: Config | None = None, progress: bool = False, **given: Any
+) -> Tracking | Measurement:
+    """As `track`, with what was found on the way where the film is a disk's."""
+    known = settings({} if config is None else config, **given)
     if known.get("bob") is not None:
         return _pendulum(video, progress=progress, **known)
     if known.pop("length", None) is not None:
         raise TrackError("length is a pendulum's: say its bob's colour too")
-    return track_in_detail(video, **known, progress=progress).measurement
+    return track_in_detail(video, **known, progress=progress)
 
 
 def _pendulum(
