@@ -83,6 +83,14 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.ratio == (1.0, 1.0, 1.0)
 
 
+def test_a_shape_between_those_tried_is_found():
+    found = discovered(E.stribeck(c=0.01, fade=1.7), seed=1, duration=60.0)
+    (effect,) = found.effects
+    assert effect.title == "Stribeck friction"
+    for name, value in (("c", 0.01), ("fade", 1.7)):
+        assert abs(effect.parameters[name] - value) < 4 * effect.errors[name] + 0.004 * value
+
+
 def test_what_a_film_gets_wrong_is_no_effect():
     # Marks that are read a little differently in every orientation: a fifth of a milliradian, more than the
     # noise of a precise film, four times a turn. It looks like the torque of an uneven disk.

@@ -303,7 +303,7 @@ def test_a_half_hidden_mark_is_not_taken_for_a_whole_one(hide: float | None) -> 
     found, complete = 0j, 0.0
     for _ in range(6):
         pose = Pose(40 + 40j + found, 0.0)
-        s = locate(np.round(picture).astype(np.uint8), view, a_look(mark), pose, Blur())[0]
+        s = locate(np.round(picture).astype(np.uint8), view, a_look(mark), pose, Blur())[1][0]
         assert s is not None
         found, complete = found + complex(s.offset[0], s.offset[1]), s.complete
     # rounding to whole codes is 0.3 of 120: a thousandth of a pixel on some forty edge pixels; a centroid
@@ -320,7 +320,7 @@ def test_one_visible_edge_informs_across_itself_only() -> None:
     picture = 180.0 + mark.level * coverage(mark, 40 + 40j, 0.0, Blur(), 0.7, (0, 80, 0, 80))
     view = np.zeros((80, 80), dtype=bool)
     view[34:47, 45:] = True  # a stretch of the right edge
-    s = locate(np.round(picture).astype(np.uint8), view, a_look(mark), Pose(40 + 40j, 0.0), Blur())[0]
+    s = locate(np.round(picture).astype(np.uint8), view, a_look(mark), Pose(40 + 40j, 0.0), Blur())[1][0]
     assert s is not None
     assert s.information[0, 0] > 1e4 * abs(s.information[1, 1])
 
@@ -339,7 +339,7 @@ def test_rigid_step_from_two_marks_is_exact() -> None:
     marks = [Mark(complex(p), (8.0, 8.0), 0.0, -100.0) for p in (-60j, 60, 60j, -60)]
     change, angle = np.array([0.3, -0.2, 0.004]), 0.7
     picture, view, mark = a_mark(0j, None)
-    seen = locate(picture.astype(np.uint8), view, a_look(mark), Pose(40 + 40j, 0.0), Blur())[0]
+    seen = locate(picture.astype(np.uint8), view, a_look(mark), Pose(40 + 40j, 0.0), Blur())[1][0]
     assert seen is not None
     sightings: list[Sighting | None] = []
     for m in marks[:2]:

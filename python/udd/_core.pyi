@@ -1,6 +1,6 @@
 """The compiled core. Internal: use the functions of `udd`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias, TypedDict, final
 
 import numpy as np
@@ -118,25 +118,33 @@ def mark_coverage(
     window: tuple[int, int, int, int],
     local: _Floats,
 ) -> _Floats: ...
-def locate_marks(
+def align_marks(
     codes: NDArray[np.uint8],
     view: NDArray[np.bool_],
     light: _Floats,
-    look: _Floats,
+    look: Sequence[float],
     marks: _Floats,
-    poses: _Floats,
-    motion: _Floats,
-    locals: _Floats,
+    lens: Sequence[float],
+    pose: Sequence[float],
+    motion: Sequence[float],
+    rounds: Sequence[float],
+    without: int | None = None,
     keep: bool = False,
-) -> list[
-    tuple[
-        tuple[float, float],
-        tuple[float, float, float, float],
-        tuple[float, float, float, float],
-        tuple[int, int, int, int],
-        tuple[_Floats, _Floats] | None,
-    ]
-    | None
+) -> tuple[
+    tuple[float, float, float],
+    list[
+        tuple[
+            tuple[float, float],
+            tuple[float, float, float, float],
+            tuple[float, float, float, float],
+            tuple[int, int, int, int],
+            tuple[_Floats, _Floats] | None,
+        ]
+        | None
+    ],
+    list[bool],
+    tuple[list[float], list[list[float]], list[list[float]], list[float]] | None,
+    float,
 ]: ...
 def formula_bodies(name: str, spec: tuple[str, str, list[str], list[str]]) -> list[str]: ...
 def has_series(model: Model) -> bool: ...

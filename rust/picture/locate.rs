@@ -46,16 +46,15 @@ pub struct Sighting {
     /// Contrast against that expected.
     pub gain: f64,
     pub window: Window,
-    /// Of each pixel of the window.
-    pub weight: Vec<f64>,
-    pub residual: Vec<f64>,
+    /// Weights and residuals of the window's pixels, by rows, where asked for.
+    pub pixels: Option<(Vec<f64>, Vec<f64>)>,
 }
 
 const MARGIN: f64 = 5.0;
 const SMALLEST: usize = 6; // pixels along a side of a window
 const FEWEST: usize = 25; // pixels that tell anything
 const ROUNDS: usize = 3;
-const EXPLAINED: f64 = 6.0; // standard deviations beyond which a pixel shows something else
+const EXPLAINED: f32 = 1.0 / (6.0 * 6.0); // beyond six standard deviations a pixel shows something else
 
 /// Finds the offset of a mark by least squares on the visible pixels.
 ///
@@ -68,12 +67,13 @@ pub fn locate(
     pose: &Pose,
     motion: &Motion,
     local: &Local,
+    keep: bool,
 ) -> Option<Sighting> {
     let window = window(mark, pose, motion, local, (plane.height, plane.width), MARGIN);
     if window.height() < SMALLEST || window.width() < SMALLEST {
         return None;
     }
-    Isa::best().run(Locate { plane, look, mark, pose, motion, local, window })
+    Isa::best().run(Locate { plane, look, mark, pose, motion, local, window, keep })
 }
 
 struct Locate<'a> {
@@ -84,6 +84,7 @@ struct Locate<'a> {
     motion: &'a Motion,
     local: &'a Local,
     window: Window,
+    keep: bool,
 }
 
 impl Work for Locate<'_> {
@@ -91,168 +92,210 @@ impl Work for Locate<'_> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Option<Sighting> {
-        let Self { plane, look, mark, pose, motion, local, window } = self;
+        let Self { plane, look, mark, pose, motion, local, window, keep } = self;
         let (height, width) = (window.height(), window.width());
         let size = height * width;
-        let mut cover = vec![0.0_f32; size];
-        Expose { mark, pose, motion, psf: look.psf, window, local, total: &mut cover }.run::<V>();
-        let mut slope_u = vec![0.0; size];
-        let mut slope_v = vec![0.0; size];
+        let mut cover = vec![0.0_f32; padded(size)];
+        let total = &mut cover[..size];
+        Expose { mark, pose, motion, psf: look.psf, window, local, total }.run::<V>();
+        let mut slope_u = vec![0.0_f32; cover.len()];
+        let mut slope_v = vec![0.0_f32; cover.len()];
         slopes(&cover, height, width, &mut slope_u, &mut slope_v);
-        // what each pixel is trusted before its own value is looked at
+        // what each pixel is trusted before its own value is looked at; nothing beyond the window's last
+        let mut precise = vec![0.0_f32; cover.len()];
+        let mut patch = vec![0.0_f32; cover.len()];
         let middle = local.back(pose.centre);
         let rim = look.rim - 0.5 * motion.shift[0].hypot(motion.shift[1]);
-        let mut precise = vec![0.0; size];
-        let mut patch = vec![0.0; size];
-        let (mut total, mut visible, mut seen) = (0.0, 0.0, 0_usize);
-        let edge = (look.misfit * mark.level) * (look.misfit * mark.level);
-        let noise = look.noise * look.noise;
+        let light = look.light.map(|x| x as f32);
+        let mut seen = 0_usize;
         for i in 0..height {
             let row = window.rows.0 + i;
             let begin = row * plane.width + window.columns.0;
-            let codes = &plane.codes[begin..begin + width];
-            let view = &plane.view[begin..begin + width];
             let away_v = row as f64 - middle[1];
-            let chord = rim * rim - away_v * away_v;
-            for j in 0..width {
-                let k = i * width + j;
-                let e2 = slope_u[k] * slope_u[k] + slope_v[k] * slope_v[k];
-                let away_u = (window.columns.0 + j) as f64 - middle[0];
-                let open = view[j] && away_u * away_u < chord;
-                total += e2;
-                visible += if open { e2 } else { 0.0 };
-                seen += usize::from(open);
-                precise[k] = if open { 1.0 / (noise + edge * e2) } else { 0.0 };
-                patch[k] = look.light[usize::from(codes[j])];
+            // the disk's columns in this row
+            let chord = (rim * rim - away_v * away_v).max(0.0).sqrt();
+            let left = (middle[0] - chord).ceil() - window.columns.0 as f64;
+            let right = (middle[0] + chord).floor() - window.columns.0 as f64;
+            let (left, right) = (left.max(0.0) as usize, ((right + 1.0).max(0.0) as usize).min(width));
+            let codes = &plane.codes[begin..begin + width];
+            for (p, &code) in patch[i * width..].iter_mut().zip(codes) {
+                *p = light[usize::from(code)];
+            }
+            if left < right {
+                let view = &plane.view[begin + left..begin + right];
+                seen += view.iter().filter(|&&open| open).count();
+                for (p, &open) in precise[i * width + left..].iter_mut().zip(view) {
+                    *p = f32::from(u8::from(open));
+                }
             }
         }
+        let (cover, slope_u, slope_v) = (lanes(&cover), lanes(&slope_u), lanes(&slope_v));
+        let patch = lanes(&patch);
+        let total = dot(slope_u, slope_u) + dot(slope_v, slope_v);
+        let visible = {
+            let open = lanes(&precise);
+            dot(&product(open, slope_u), slope_u) + dot(&product(open, slope_v), slope_v)
+        };
         if total <= 0.0 || seen < FEWEST {
             return None;
         }
-        let mut weight = precise.clone();
-        let mut residual = vec![0.0; size];
+        let edge = ((look.misfit * mark.level) * (look.misfit * mark.level)) as f32;
+        let noise = (look.noise * look.noise) as f32;
+        for (p, (u, v)) in precise.as_chunks_mut::<LANES>().0.iter_mut().zip(slope_u.iter().zip(slope_v)) {
+            for l in 0..LANES {
+                p[l] /= noise + edge * (u[l] * u[l] + v[l] * v[l]);
+            }
+        }
+        let precise = lanes(&precise);
+        let mut weight = precise.to_vec();
+        let mut residual = vec![[0.0_f32; LANES]; weight.len()];
         let slack = look.gain_slack.powi(-2);
         let prior = Matrix4::from_diagonal(&Vector4::new(1e-12, slack, 1e-12, 1e-12));
         let (mut normal, mut x) = (prior, Vector4::zeros());
         for _ in 0..ROUNDS {
-            let sums = normal_equations(&weight, &cover, &slope_u, &slope_v, &patch, mark.level);
+            let sums = normal_equations(&weight, cover, slope_u, slope_v, patch, mark.level);
             normal = sums.0 + prior;
             x = normal.lu().solve(&(sums.1 + prior.column(1)))?;
-            let mut used = 0_usize;
-            for k in 0..size {
-                let fit =
-                    x[0] + mark.level * (x[1] * f64::from(cover[k]) - x[2] * slope_u[k] - x[3] * slope_v[k]);
-                let rest = patch[k] - fit;
-                let inside = (1.0 - rest * rest * precise[k] / (EXPLAINED * EXPLAINED)).max(0.0);
-                residual[k] = rest;
-                weight[k] = precise[k] * inside * inside;
-                used += usize::from(weight[k] != 0.0);
+            let level = mark.level;
+            let share = [x[0], level * x[1], level * x[2], level * x[3]].map(|x| x as f32);
+            let columns = cover.iter().zip(slope_u.iter().zip(slope_v));
+            let given = patch.iter().zip(precise);
+            let mut used = [0.0_f32; LANES];
+            for ((r, w), ((c, (u, v)), (y, p))) in
+                residual.iter_mut().zip(&mut weight).zip(columns.zip(given))
+            {
+                for l in 0..LANES {
+                    let rest = y[l] - (share[0] + share[1] * c[l] - share[2] * u[l] - share[3] * v[l]);
+                    let inside = (1.0 - rest * rest * p[l] * EXPLAINED).max(0.0);
+                    r[l] = rest;
+                    w[l] = p[l] * inside * inside;
+                    used[l] += if w[l] > 0.0 { 1.0 } else { 0.0 };
+                }
             }
-            if used < FEWEST {
+            if used.iter().sum::<f32>() < FEWEST as f32 {
                 return None;
             }
         }
-        let (mut complete, mut squares, mut weights) = (0.0, 0.0, 0.0);
-        for k in 0..size {
-            let e2 = slope_u[k] * slope_u[k] + slope_v[k] * slope_v[k];
-            complete += if weight[k] > 0.1 * precise[k] { e2 } else { 0.0 };
-            squares += weight[k] * residual[k] * residual[k];
-            weights += weight[k];
+        let mut whole = [0.0_f32; LANES];
+        for ((w, p), (u, v)) in weight.iter().zip(precise).zip(slope_u.iter().zip(slope_v)) {
+            for l in 0..LANES {
+                let e2 = u[l] * u[l] + v[l] * v[l];
+                whole[l] += if w[l] > 0.1 * p[l] { e2 } else { 0.0 };
+            }
         }
+        let complete = whole.iter().map(|&x| f64::from(x)).sum::<f64>();
+        let squares = dot(&product(&weight, &residual), &residual);
         let covariance = normal.try_inverse()?.fixed_view::<2, 2>(2, 2).into_owned();
         let [a, b, c, d] = local.slope;
         let map = Matrix2::new(a, b, c, d);
         let information = (map * covariance * map.transpose()).try_inverse()?;
         let offset = map * x.fixed_rows::<2>(2);
+        let flat = |x: &[[f32; LANES]]| x.as_flattened()[..size].iter().map(|&x| f64::from(x)).collect();
         Some(Sighting {
             offset: [offset[0], offset[1]],
             information: [information[(0, 0)], information[(0, 1)], information[(1, 0)], information[(1, 1)]],
             complete: complete / total,
             in_view: visible / total,
-            rms: (squares / weights).sqrt(),
+            rms: (squares / sum(&weight)).sqrt(),
             gain: x[1],
             window,
-            weight,
-            residual,
+            pixels: keep.then(|| (flat(&weight), flat(&residual))),
         })
     }
 }
 
+/// Pixels that go together. Sums are kept apart in as many, so that any instruction set adds in one order.
+const LANES: usize = 16;
+
+fn padded(size: usize) -> usize {
+    size.next_multiple_of(LANES)
+}
+
+#[inline(always)]
+fn lanes(x: &[f32]) -> &[[f32; LANES]] {
+    x.as_chunks().0
+}
+
+#[inline(always)]
+fn sum(a: &[[f32; LANES]]) -> f64 {
+    let mut sums = [0.0_f32; LANES];
+    for a in a {
+        for l in 0..LANES {
+            sums[l] += a[l];
+        }
+    }
+    sums.iter().map(|&x| f64::from(x)).sum()
+}
+
+#[inline(always)]
+fn dot(a: &[[f32; LANES]], b: &[[f32; LANES]]) -> f64 {
+    let mut sums = [0.0_f32; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for l in 0..LANES {
+            sums[l] += a[l] * b[l];
+        }
+    }
+    sums.iter().map(|&x| f64::from(x)).sum()
+}
+
+#[inline(always)]
+fn product(a: &[[f32; LANES]], b: &[[f32; LANES]]) -> Vec<[f32; LANES]> {
+    let mut out = a.to_vec();
+    for (a, b) in out.iter_mut().zip(b) {
+        for l in 0..LANES {
+            a[l] *= b[l];
+        }
+    }
+    out
+}
+
 /// Central differences, one-sided at the window's edge.
 #[inline(always)]
-fn slopes(cover: &[f32], height: usize, width: usize, slope_u: &mut [f64], slope_v: &mut [f64]) {
+fn slopes(cover: &[f32], height: usize, width: usize, slope_u: &mut [f32], slope_v: &mut [f32]) {
     for i in 0..height {
         let row = &cover[i * width..(i + 1) * width];
         let out = &mut slope_u[i * width..(i + 1) * width];
-        for j in 1..width - 1 {
-            out[j] = 0.5 * (f64::from(row[j + 1]) - f64::from(row[j - 1]));
+        for (o, (next, last)) in out[1..width - 1].iter_mut().zip(row[2..].iter().zip(row)) {
+            *o = 0.5 * (next - last);
         }
-        out[0] = f64::from(row[1]) - f64::from(row[0]);
-        out[width - 1] = f64::from(row[width - 1]) - f64::from(row[width - 2]);
+        out[0] = row[1] - row[0];
+        out[width - 1] = row[width - 1] - row[width - 2];
         let (up, down) = (i.saturating_sub(1), (i + 1).min(height - 1));
-        let share = 1.0 / (down - up) as f64;
+        let share = 1.0 / (down - up) as f32;
         let (above, below) = (&cover[up * width..(up + 1) * width], &cover[down * width..(down + 1) * width]);
         let out = &mut slope_v[i * width..(i + 1) * width];
-        for j in 0..width {
-            out[j] = share * (f64::from(below[j]) - f64::from(above[j]));
+        for (o, (below, above)) in out.iter_mut().zip(below.iter().zip(above)) {
+            *o = share * (below - above);
         }
     }
 }
 
-const LANES: usize = 8; // sums are kept apart in as many, so that any instruction set adds in one order
+type Lanes<'a> = &'a [[f32; LANES]];
 
 /// The weighted normal equations of the four unknowns.
 #[inline(always)]
 fn normal_equations(
-    weight: &[f64],
-    cover: &[f32],
-    slope_u: &[f64],
-    slope_v: &[f64],
-    patch: &[f64],
+    w: Lanes<'_>,
+    c: Lanes<'_>,
+    u: Lanes<'_>,
+    v: Lanes<'_>,
+    y: Lanes<'_>,
     level: f64,
 ) -> (Matrix4<f64>, Vector4<f64>) {
-    let mut sums = [[0.0_f64; LANES]; 14];
-    let mut k = 0;
-    while k + LANES <= weight.len() {
-        for l in 0..LANES {
-            let i = k + l;
-            let columns = [level * f64::from(cover[i]), -level * slope_u[i], -level * slope_v[i]];
-            accumulate(&mut sums, l, weight[i], columns, patch[i]);
-        }
-        k += LANES;
-    }
-    for i in k..weight.len() {
-        let columns = [level * f64::from(cover[i]), -level * slope_u[i], -level * slope_v[i]];
-        accumulate(&mut sums, i - k, weight[i], columns, patch[i]);
-    }
-    let s: [f64; 14] = std::array::from_fn(|n| sums[n].iter().sum());
+    let (wc, wu, wv) = (product(w, c), product(w, u), product(w, v));
+    let (cc, cu, cv) = (dot(&wc, c), dot(&wc, u), dot(&wc, v));
+    let (uu, uv, vv) = (dot(&wu, u), dot(&wu, v), dot(&wv, v));
+    let (oc, ou, ov) = (sum(&wc), sum(&wu), sum(&wv));
     #[rustfmt::skip]
     let normal = Matrix4::new(
-        s[0], s[1], s[2], s[3],
-        s[1], s[4], s[5], s[6],
-        s[2], s[5], s[7], s[8],
-        s[3], s[6], s[8], s[9],
+        sum(w), oc, -ou, -ov,
+        oc, cc, -cu, -cv,
+        -ou, -cu, uu, uv,
+        -ov, -cv, uv, vv,
     );
-    (normal, Vector4::new(s[10], s[11], s[12], s[13]))
-}
-
-#[inline(always)]
-fn accumulate(sums: &mut [[f64; LANES]; 14], l: usize, w: f64, [c, u, v]: [f64; 3], y: f64) {
-    let (wc, wu, wv) = (w * c, w * u, w * v);
-    sums[0][l] += w;
-    sums[1][l] += wc;
-    sums[2][l] += wu;
-    sums[3][l] += wv;
-    sums[4][l] += wc * c;
-    sums[5][l] += wc * u;
-    sums[6][l] += wc * v;
-    sums[7][l] += wu * u;
-    sums[8][l] += wu * v;
-    sums[9][l] += wv * v;
-    sums[10][l] += w * y;
-    sums[11][l] += wc * y;
-    sums[12][l] += wu * y;
-    sums[13][l] += wv * y;
+    let right = Vector4::new(dot(w, y), dot(&wc, y), -dot(&wu, y), -dot(&wv, y));
+    let scale = Matrix4::from_diagonal(&Vector4::new(1.0, level, level, level));
+    (scale * normal * scale, scale * right)
 }
 
 #[cfg(test)]
@@ -281,7 +324,7 @@ mod tests {
         let plane = Plane { codes: &codes, view: &view, height, width };
         let mut complete = 1.0;
         for _ in 0..6 {
-            let seen = locate(plane, &look, &mark, &pose, &motion, &plain).expect("it is seen");
+            let seen = locate(plane, &look, &mark, &pose, &motion, &plain, false).expect("it is seen");
             pose.centre = [pose.centre[0] + seen.offset[0], pose.centre[1] + seen.offset[1]];
             complete = seen.complete;
         }

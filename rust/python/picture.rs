@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods}
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::picture::{Local, Look, Mark, Motion, Plane, Pose, Window, coverage, locate};
+use crate::picture::{Body, Lens, Local, Look, Mark, Motion, Plane, Pose, Speed, Window, align, coverage};
 
 fn exactly<const N: usize>(numbers: &[f64]) -> PyResult<[f64; N]> {
     let message = || PyValueError::new_err(format!("{N} numbers are needed, not {}", numbers.len()));
@@ -49,68 +49,77 @@ fn mark_coverage<'py>(
     Ok(PyArray1::from_vec(py, cover))
 }
 
-type Box4 = (usize, usize, usize, usize);
+type Pixels<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 type Seen<'py> = (
     (f64, f64),
     (f64, f64, f64, f64),
     (f64, f64, f64, f64),
-    Box4,
-    Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>,
+    (usize, usize, usize, usize),
+    Option<Pixels<'py>>,
 );
+type Stepped = ([f64; 3], [[f64; 3]; 3], Vec<[f64; 2]>, Vec<f64>);
+type Aligned<'py> = ((f64, f64, f64), Vec<Option<Seen<'py>>>, Vec<bool>, Option<Stepped>, f64);
 
-/// Finds marks (rows of six numbers) near their expected places, each with its own pose and map; None for
-/// those too little of which is seen.
+/// Moves a pose (u, v, angle) onto a picture by one Gauss-Newton step for each of `rounds` (tolerances, pixels).
 ///
-/// `look` is psf, noise, misfit, gain_slack, rim. With `keep`, weights and residuals of the pixels are returned.
+/// `look` is psf, noise, gain_slack, rim, the least contrast of a mark, the time between rows; `lens` its
+/// middle, size, curve, tilts, aspect, shear; `motion` shift, turn, bend, twist, rate, spin. Returns the pose,
+/// what the last round saw of each mark, which it used, the step that it made of them (None: the disk is not
+/// held; NaN: a mark not seen) and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
 #[pyfunction]
-#[pyo3(signature = (codes, view, light, look, marks, poses, motion, locals, keep = false))]
+#[pyo3(signature = (codes, view, light, look, marks, lens, pose, motion, rounds, without = None, keep = false))]
 #[allow(clippy::too_many_arguments)]
-fn locate_marks<'py>(
+fn align_marks<'py>(
     py: Python<'py>,
     codes: PyReadonlyArray2<'py, u8>,
     view: PyReadonlyArray2<'py, bool>,
     light: PyReadonlyArray1<'py, f64>,
-    look: PyReadonlyArray1<'py, f64>,
+    look: [f64; 6],
     marks: PyReadonlyArray2<'py, f64>,
-    poses: PyReadonlyArray2<'py, f64>,
-    motion: PyReadonlyArray1<'py, f64>,
-    locals: PyReadonlyArray2<'py, f64>,
+    lens: [f64; 8],
+    pose: [f64; 3],
+    motion: [f64; 9],
+    rounds: Vec<f64>,
+    without: Option<usize>,
     keep: bool,
-) -> PyResult<Vec<Option<Seen<'py>>>> {
+) -> PyResult<Aligned<'py>> {
     let (height, width) = (codes.shape()[0], codes.shape()[1]);
     if view.shape() != codes.shape() {
         return Err(PyValueError::new_err("picture and view must have one shape"));
     }
     let light: [f64; 256] = exactly(light.as_slice()?)?;
-    let [psf, noise, misfit, gain_slack, rim] = exactly(look.as_slice()?)?;
-    let motion = motion_of(motion.as_slice()?)?;
-    let (marks, poses, locals) = (marks.as_slice()?, poses.as_slice()?, locals.as_slice()?);
-    let each = marks.chunks(6).zip(poses.chunks(3)).zip(locals.chunks(8));
-    let jobs = each.map(|((m, p), l)| Ok((mark_of(m)?, pose_of(p)?, local_of(l)?)));
-    let jobs = jobs.collect::<PyResult<Vec<_>>>()?;
+    let [psf, noise, gain_slack, rim, faint, per_row] = look;
+    let [u, v, size, curve, tilt_u, tilt_v, aspect, shear] = lens;
+    let lens = Lens { middle: [u, v], size, curve, tilt: [tilt_u, tilt_v], aspect, shear };
+    let (motion, speed) = (motion_of(&motion[..6])?, &motion[6..]);
+    let speed = Speed { rate: [speed[0], speed[1]], spin: speed[2] };
+    let marks = marks.as_slice()?.chunks(6).map(mark_of).collect::<PyResult<Vec<_>>>()?;
     let plane = Plane { codes: codes.as_slice()?, view: view.as_slice()?, height, width };
-    let found = py.detach(|| {
-        let look = Look { light: &light, psf, noise, misfit, gain_slack, rim };
-        jobs.iter()
-            .map(|(mark, pose, local)| locate(plane, &look, mark, pose, &motion, local))
-            .collect::<Vec<_>>()
+    let fit = py.detach(|| {
+        // the rounds say how far edges may be off
+        let look = Look { light: &light, psf, noise, misfit: 0.0, gain_slack, rim };
+        let body = Body { marks: &marks, lens, per_row, faint };
+        let pose = Pose { centre: [pose[0], pose[1]], angle: pose[2] };
+        align(plane, &look, &body, pose, &motion, &speed, &rounds, without, keep)
     });
-    let shown = found.into_iter().map(|s| {
+    let seen = fit.sightings.into_iter().map(|s| {
         s.map(|s| {
             let Window { rows, columns } = s.window;
-            (
-                s.offset.into(),
-                s.information.into(),
-                (s.complete, s.in_view, s.rms, s.gain),
-                (rows.0, rows.1, columns.0, columns.1),
-                keep.then(|| (PyArray1::from_vec(py, s.weight), PyArray1::from_vec(py, s.residual))),
-            )
+            let pixels = s.pixels.map(|(w, r)| (PyArray1::from_vec(py, w), PyArray1::from_vec(py, r)));
+            let shares = (s.complete, s.in_view, s.rms, s.gain);
+            (s.offset.into(), s.information.into(), shares, (rows.0, rows.1, columns.0, columns.1), pixels)
         })
     });
-    Ok(shown.collect())
+    let step = fit.step.map(|s| {
+        let leftover = s.leftover.iter().map(|l| l.unwrap_or([f64::NAN; 2])).collect();
+        let chi2 = s.chi2.iter().map(|c| c.unwrap_or(f64::NAN)).collect();
+        (s.change, s.information.transpose().into(), leftover, chi2)
+    });
+    let Pose { centre, angle } = fit.pose;
+    Ok(((centre[0], centre[1], angle), seen.collect(), fit.used, step, fit.moved))
 }
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(mark_coverage, module)?)?;
-    module.add_function(wrap_pyfunction!(locate_marks, module)?)
+    module.add_function(wrap_pyfunction!(align_marks, module)?)
 }

@@ -243,6 +243,16 @@ def _fitted(trials: list[Trial | None]) -> list[Trial]:
     return [t for t in trials if t]
 
 
+def _one_of_each(trials: list[Trial]) -> list[Trial]:
+    """The best of those that tried one effect with several values of a shape that a fit then found."""
+    found: dict[object, Trial] = {}
+    for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
+        effect = trial.candidates[0].effect
+        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
+        found.setdefault((effect.name, effect.momentum, *fixed), trial)
+    return [trial for trial in trials if trial in found.values()]
+
+
 def _states_first(curves: list[Curve]) -> list[Curve]:
     """The likeliest first, but curves over time, which take up anything slow, after those as likely."""
     late = 2 * NATS
@@ -378,7 +388,8 @@ class Search:
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
         best = passing[:_TRIED]
         self._trying([s.candidate.title for s in best])
-        return _fitted(together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best))
+        found = together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best)
+        return _one_of_each(_fitted(found))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
         """Several effects at once that pass only together."""
@@ -519,9 +530,9 @@ class Search:
                 likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
                 if likeness > _SUPERSET and other.parameters > mine.parameters:
                     continue  # the chosen form with something more that the data do not ask for
-                effect = other.effect.replace(
-                    **{p: trial.fit.parameters[f"{other.effect.name}.{p}"] for p in other.effect.amplitudes}
-                )
+                named = {p: f"{other.effect.name}.{p}" for p in other.effect.parameters}
+                fitted = trial.fit.parameters
+                effect = other.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
                 result.append(
                     Alternative(mine.effect.name, effect, other.title, other.effect.equation, nats, likeness)
                 )

@@ -18,6 +18,7 @@ FOCUS = 0.6  # standard deviation of the lens's blur, pixels
 COARSE = 0.25  # pixels of the shadow's picture per pixel
 # The farthest a point of the disk goes in a sub-frame, pixels: within 1.3 codes of a continuous streak.
 STEP = 1.5
+STILL = 0.02  # pixels; a point that goes no farther is still
 SHADOW_DEPTH, SHADOW_SOFT, SHADOW_SHIFT = 0.16, 0.09, (0.07, 0.10)  # in disk radii; shift right and down
 
 
@@ -119,6 +120,8 @@ class Scene:
 def sub_times(motion: Motion, time: float, camera: Camera, radius: float, readout: float = 0.0) -> Array:
     """Space sub-frames evenly through the exposure, as many as the fastest point of the rim needs.
 
+    They are spread so that their times have the variance of the whole exposure's, not only its mean: where
+    the disk turns back, few of them have to stand for a path that bends.
     A rolling shutter's exposure lasts from the first row's opening to the last row's closing.
     """
     whole = camera.exposure + readout / float(camera.rate)
@@ -126,8 +129,10 @@ def sub_times(motion: Motion, time: float, camera: Camera, radius: float, readou
     path = 0.0
     for a, b in ((opened, middle), (middle, closed)):
         path += math.hypot(b[1] - a[1], b[2] - a[2]) * camera.scale + abs(b[3] - a[3]) * radius
-    n = min(max(math.ceil(path / STEP), 1 if readout == 0 else 32), 1024)
-    return np.asarray(time + whole * ((np.arange(n) + 0.5) / n - 0.5), dtype=np.float64)
+    fewest = 32 if readout else 2 if path > STILL else 1
+    n = min(max(math.ceil(path / STEP), fewest), 1024)
+    spread = 1.0 if readout or n == 1 else 1 / math.sqrt(1 - n**-2)
+    return np.asarray(time + spread * whole * ((np.arange(n) + 0.5) / n - 0.5), dtype=np.float64)
 
 
 def _open(times: Array, rows: np.ndarray, camera: Camera, readout: float) -> Array | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -109,7 +108,7 @@ def meta_of(
 
 
 def _numbers(lens: Lens) -> list[float]:
-    return [] if lens.plain else [lens.middle.real, lens.middle.imag, *astuple(lens)[1:]]
+    return [] if lens.plain else list(lens.row)
 
 
 def table(tracks: Tracks, known: Known, camera: Camera, setup: Setup) -> dict[str, list[Any]]:

@@ -6,11 +6,11 @@ import json
 import math
 import os
 import select
-import struct
 import subprocess
 import sys
+import weakref
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
+from .decoder import HEAD, LOOK, NO_FILM
+
 Plane = NDArray[np.uint8]
 PATIENCE = 60.0  # s for which the decoder may be silent
+DECODER = str(Path(__file__).with_name("decoder.py"))
 MEMORY = 4 << 30  # bytes of address space that it may take
 PIPE = 1 << 20  # bytes that the pipe to it should hold
-HEAD = struct.Struct("<qdIIII?")  # frame: number, time, height, width, chroma's height and width, damaged
 
 
 class TrackError(UddError):
@@ -74,10 +76,12 @@ class Film:
         if find_spec("av") is None:  # what decodes runs elsewhere, where nobody would be told
             raise ModuleNotFoundError("No module named 'av'", name="av")
         self.broken = 0  # packets that did not decode in the last run
-        with _Decoder(self.path, 0.0, look_only=True) as decoder:
-            said = decoder.header
+        self._idle: _Decoder | None = None  # between runs
+        decoder = self._decoder()
+        said = decoder.ask(LOOK)
         if "error" in said:
             raise TrackError(f"{self.path} {said['error']}")
+        self._idle = decoder
         self.promised = int(said["frames"])  # 0 where the container does not say
         self.packets = int(said["packets"])  # coded frames that the file holds
         self.size = (int(said["width"]), int(said["height"]))
@@ -94,70 +98,81 @@ class Film:
         self.broken = 0
         if self.forced is not None:
             since = 0.0  # the header's times are no help in seeking
-        with _Decoder(self.path, since) as decoder:
-            if "error" in decoder.header:
-                raise TrackError(f"{self.path} {decoder.header['error']}")
+        decoder = self._decoder()
+        try:
+            said = decoder.ask(repr(since))
+            if "error" in said:
+                raise TrackError(f"{self.path} {said['error']}")
             for picture in decoder.pictures():
-                if self.forced is None:
-                    yield picture
-                else:
-                    index = picture.index
-                    yield Picture(
-                        index, index / self.forced, picture.y, picture.u, picture.v, picture.damaged
-                    )
+                if self.forced is not None:
+                    picture = replace(picture, t=picture.index / self.forced)
+                yield picture
             self.broken = decoder.broken
+        finally:
+            if decoder.whole:
+                self._idle = decoder
+            else:
+                decoder.end()
+
+    def _decoder(self) -> _Decoder:
+        """The process that is left from the last run, or a new one."""
+        idle, self._idle = self._idle, None
+        return _Decoder(self.path) if idle is None or idle.process.poll() is not None else idle
 
 
 class _Decoder:
-    """The process that decodes, and the pipe from it."""
+    """The process that decodes, and the pipes to and from it. It ends with this object."""
 
-    def __init__(self, path: Path, since: float, look_only: bool = False) -> None:
-        self.broken = 0
-        command = [sys.executable, "-m", "udd.tracking.decoder", str(path), repr(since), str(int(look_only))]
-        paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+    def __init__(self, path: Path) -> None:
+        self.broken, self.whole = 0, False
         self.process = subprocess.Popen(
-            [*command, str(MEMORY)],
-            stdin=subprocess.DEVNULL,
+            [sys.executable, "-P", DECODER, str(path), str(MEMORY)],
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             bufsize=0,
-            env=environment,
         )
+        self.end = weakref.finalize(self, _end, self.process)
         assert self.process.stdout is not None
         self.pipe: IO[bytes] = self.process.stdout
         _widen(self.pipe)
+
+    def ask(self, request: str) -> dict[str, Any]:
+        """What the header says, or an error; pictures follow where a time was asked for."""
+        self.broken, self.whole = 0, False
+        assert self.process.stdin is not None
         try:
+            self.process.stdin.write(request.encode() + b"\n")
             line = self.pipe.readline() if _ready(self.pipe) else b""
-            self.header: dict[str, Any] = json.loads(line) if line else {"error": _NO_FILM}
-        except BaseException:
-            self.__exit__()
-            raise
-
-    def __enter__(self) -> _Decoder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.pipe.close()
-        self.process.wait()
+        except OSError:
+            line = b""
+        return json.loads(line) if line else {"error": NO_FILM}
 
     def pictures(self) -> Iterator[Picture]:
         head = bytearray(HEAD.size)
         while _fill(self.pipe, head):
-            index, t, height, width, rows, columns, damaged = HEAD.unpack(head)
+            index, t, height, width, rows, columns, turns, damaged = HEAD.unpack(head)
             if index < 0:  # the end: what did not decode
-                self.broken = height
+                self.broken, self.whole = height, True
                 return
-            shapes = ((height, width), (rows, columns), (rows, columns))
-            y, u, v = (np.empty(shape, np.uint8) for shape in shapes)
-            if not all(_fill(self.pipe, plane.data.cast("B")) for plane in (y, u, v)):
+            full, half = height * width, rows * columns
+            room = np.empty(full + 2 * half, np.uint8)
+            if not _fill(self.pipe, room.data):
                 break
+            y, u, v = room[:full], room[full : full + half], room[full + half :]
+            y, u, v = y.reshape(height, width), u.reshape(rows, columns), v.reshape(rows, columns)
+            if turns:
+                y, u, v = (np.ascontiguousarray(np.rot90(p, turns)) for p in (y, u, v))
             yield Picture(index, t, y, u, v, damaged)
         self.broken = 1  # it ended in the middle
 
 
-_NO_FILM = "is not a film that can be decoded, or it is cut off"
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            pipe.close()
+    process.wait()
 
 
 def _fill(pipe: IO[bytes], room: Any) -> bool:

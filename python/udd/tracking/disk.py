@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .decode import Picture, TrackError
+from .decode import Picture, Plane, TrackError
 from .look import Look, Pose
 
 RAYS = 180
@@ -41,7 +41,7 @@ def outline(
     rays = np.exp(1j * angles)
     points, group = [], []
     for number, (picture, pose) in enumerate(frames):
-        r = _rim(look.light[picture.y], view, pose.centre, rays, look, span)
+        r = _rim(picture.y, view, pose.centre, rays, look, span)
         ok = np.isfinite(r)
         points.append(r[ok] * rays[ok] * np.exp(-1j * pose.angle))
         group.append(np.full(int(ok.sum()), number))
@@ -74,7 +74,7 @@ def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
 
 
 def _rim(
-    y: NDArray[np.float64],
+    y: Plane,
     view: NDArray[np.bool_],
     centre: complex,
     rays: NDArray[np.complex128],
@@ -88,9 +88,9 @@ def _rim(
     radii = np.arange(span[0] * reach, span[1] * reach, step)
     at = look.lens.picture(centre + radii[None, :] * rays[:, None])
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
-    profile = cv2.remap(
-        y.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    ).astype(np.float64)
+    light = cv2.LUT(y, look.light.astype(np.float32))
+    profile = cv2.remap(light, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    profile = profile.astype(np.float64)
     clear = cv2.remap(view.astype(np.uint8), map_u, map_v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
     fall = profile[:, :-4] - profile[:, 4:]
     k = np.argmax(fall, axis=1) + 2

@@ -58,11 +58,16 @@ def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
     """Connected patches of a half-resolution mask, the largest first."""
     import cv2
 
-    count, _, stats, centre = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    codes = mask.astype(np.uint8)
+    column, row, width, height = cv2.boundingRect(codes)  # most of a picture has none of the colour
+    if not width:
+        return Blobs(np.empty(0, np.complex128), np.empty(0))
+    part = codes[row : row + height, column : column + width]
+    count, _, stats, centre = cv2.connectedComponentsWithStats(part, connectivity=8)
     area = stats[1:count, cv2.CC_STAT_AREA]
     order = np.argsort(-area, kind="stable")[:most]
     order = order[area[order] >= least]
-    xy = centre[1:count][order]
+    xy = centre[1:count][order] + [column, row]
     # a half-resolution sample i covers the full pixels 2i and 2i + 1, whose middle is 2i + 1/2
     return Blobs(np.asarray(2 * (xy[:, 0] + 1j * xy[:, 1]) + (0.5 + 0.5j)), np.asarray(4.0 * area[order]))
 

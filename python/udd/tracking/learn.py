@@ -23,6 +23,7 @@ STEADY = 0.005  # pixels; shapes that change less have settled
 FAR_OFF = 1.0  # pixels; a mark further off its expected place says less about the layout
 
 
+Array = NDArray[np.float64]
 Frame = tuple[Plane, Pose, Motion]
 Seen = tuple[Pose, Motion, list[Sighting | None]]
 
@@ -136,14 +137,15 @@ def _level(
 
 def _reshape(fits: list[Seen], look: Look, height: int) -> tuple[list[Mark], float]:
     marks, psfs = [], []
+    views = [seen_at(look, pose, motion, height) for pose, motion, _ in fits]
     for k, mark in enumerate(look.marks):
         normal, right = np.zeros((4, 4)), np.zeros(4)
         gains = []
-        for pose, motion, sightings in fits:
+        for (_, motion, sightings), (poses, locals_) in zip(fits, views, strict=True):
             s = sightings[k]
             if s is None or s.in_view < WHOLE or s.complete < HALF_SEEN:
                 continue
-            n, r = _shape_step(mark, pose, motion, look, s, height)
+            n, r = _shape_step(mark, poses[k], locals_[k], motion, look, s)
             normal, right = normal + n, right + r
             gains.append(s.gain)
         if not gains:
@@ -165,23 +167,19 @@ def _reshape(fits: list[Seen], look: Look, height: int) -> tuple[list[Mark], flo
 
 
 def _shape_step(
-    mark: Mark, pose: Pose, motion: Motion, look: Look, s: Sighting, height: int
+    mark: Mark, pose: Array, local: Array, motion: Motion, look: Look, s: Sighting
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normal equations for (turn, half sides, psf) after the local unknowns have taken what they can."""
     r0, r1, c0, c1 = s.box
-    psf = look.psf
-    number = next(k for k, m in enumerate(look.marks) if m is mark)
-    poses, locals_ = seen_at(look, pose, motion, height)
-    here = locals_[number]
-    centre, angle = complex(poses[number, 0], poses[number, 1]), float(poses[number, 2])
+    psf, centre, angle = look.psf, complex(pose[0], pose[1]), float(pose[2])
     assert s.weight is not None and s.residual is not None  # kept
 
     def cover(m: Mark, blur: float) -> NDArray[np.float64]:
-        return coverage(m, centre, angle, motion, blur, s.box, here).ravel()
+        return coverage(m, centre, angle, motion, blur, s.box, local).ravel()
 
     base = cover(mark, psf)
     grad_v, grad_u = np.gradient(base.reshape(r1 - r0, c1 - c0))
-    local = np.stack([np.ones_like(base), base, grad_u.ravel(), grad_v.ravel()])
+    free = np.stack([np.ones_like(base), base, grad_u.ravel(), grad_v.ravel()])
     shape = np.stack(
         [
             (cover(replace(mark, turn=mark.turn + 0.01), psf) - base) / 0.01,
@@ -192,8 +190,8 @@ def _shape_step(
     )
     shape *= mark.level
     w = s.weight
-    free = np.linalg.solve((local * w) @ local.T, (local * w) @ shape.T)
-    shape = shape - free.T @ local
+    share = np.linalg.solve((free * w) @ free.T, (free * w) @ shape.T)
+    shape = shape - share.T @ free
     return (shape * w) @ shape.T, (shape * w) @ s.residual
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,11 @@ class Lens:
     def plain(self) -> bool:
         """Whether the map changes nothing."""
         return not (self.curve or self.tilt_u or self.tilt_v or self.aspect or self.shear)
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """As eight numbers: middle u, v, size, curve, tilts, aspect, shear."""
+        return (self.middle.real, self.middle.imag, *astuple(self)[1:])
 
     @np.errstate(invalid="ignore")  # NaN: where the disk was not seen
     def plane(self, picture: Complexes | complex) -> Complexes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from .look import Look, Mark, Motion, Pose
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Stepped = tuple[list[float], list[list[float]], list[list[float]], list[float]]  # as `rigid.Step`
+Triple = tuple[float, float, float]
 Box = tuple[int, int, int, int]  # rows from, to, columns from, to
 
 FAINT = 0.04  # of full light: a mark that differs by less from the disk is none
@@ -70,28 +73,37 @@ def locate(
     look: Look,
     pose: Pose,
     motion: Motion,
+    rounds: Sequence[float] = (MISFIT,),
     *,
-    psf: float | None = None,
     gain_slack: float = 0.1,
-    misfit: float = MISFIT,
+    without: int | None = None,
     keep: bool = False,
-) -> list[Sighting | None]:
+) -> tuple[Triple, list[Sighting | None], list[bool], Stepped | None, float]:
     """Offsets of the marks from their expected places by least squares on the visible pixels.
 
     The light about a mark is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
     gain, du, dv free, the gain within `gain_slack` of 1. `view` is False where something stands in
-    front; pixels that nothing of this explains (a hand, a cable) lose their weight. `psf` overrides
-    the film's own sharpness; edges count as known to `misfit` pixels.
+    front; pixels that nothing of this explains (a hand, a cable) lose their weight. Each of `rounds`
+    takes edges as known to so many pixels and ends with a Gauss-Newton step of the pose.
+
+    Returns the pose at the end (u, v, beta), what the last round saw, which of that it used, its step
+    (None: fewer than two marks hold the disk), and the step's size in pixels.
     """
-    marks = look.table
-    poses, locals_ = seen_at(look, pose, motion, y.shape[0])
-    how = np.array([look.psf if psf is None else psf, look.noise, misfit, gain_slack, look.rim])
-    found = _core.locate_marks(y, view, look.light, how, marks, poses, motion.row, locals_, keep)
-    faint = FAINT * float(look.light[-1])
-    return [
-        None if s is None or abs(mark.level) < faint else _sighting(*s)
-        for s, mark in zip(found, look.marks, strict=True)
-    ]
+    numbers = [look.psf, look.noise, gain_slack, look.rim, FAINT * float(look.light[-1])]
+    at, found, used, step, moved = _core.align_marks(
+        y,
+        view,
+        look.light,
+        (*numbers, look.readout / y.shape[0]),
+        look.table,
+        look.lens.row,
+        (pose.centre.real, pose.centre.imag, pose.angle),
+        (*motion.row, motion.rate.real, motion.rate.imag, motion.spin),
+        rounds,
+        without,
+        keep,
+    )
+    return at, [None if s is None else _sighting(*s) for s in found], used, step, moved
 
 
 def _sighting(
