@@ -26,17 +26,22 @@ class Outline:
     points: int
 
 
-def outline(frames: Sequence[tuple[Picture, Pose]], look: Look, view: NDArray[np.bool_]) -> Outline:
+def outline(
+    frames: Sequence[tuple[Picture, Pose]],
+    look: Look,
+    view: NDArray[np.bool_],
+    span: tuple[float, float] = SPAN,
+) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
     Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
-    averages it out of the centre.
+    averages it out of the centre. The rim is looked for within `span` of the marks' reach.
     """
     angles = np.arange(RAYS) * (2 * np.pi / RAYS)
     rays = np.exp(1j * angles)
     points, group = [], []
     for number, (picture, pose) in enumerate(frames):
-        r = _rim(picture.y, view, pose.centre, rays, look)
+        r = _rim(picture.y, view, pose.centre, rays, look, span)
         ok = np.isfinite(r)
         points.append(r[ok] * rays[ok] * np.exp(-1j * pose.angle))
         group.append(np.full(int(ok.sum()), number))
@@ -74,12 +79,13 @@ def _rim(
     centre: complex,
     rays: NDArray[np.complex128],
     look: Look,
+    span: tuple[float, float],
 ) -> NDArray[np.float64]:
     """Radius of the half-height crossing along each ray [pixels], NaN where none is clear."""
     import cv2
 
-    step, reach = 0.5, abs(look.marks[0].place)
-    radii = np.arange(SPAN[0] * reach, SPAN[1] * reach, step)
+    step, reach = 0.5, look.reach
+    radii = np.arange(span[0] * reach, span[1] * reach, step)
     at = look.lens.picture(centre + radii[None, :] * rays[:, None])
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
     light = cv2.LUT(y, look.light.astype(np.float32))
