@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, SMatrix};
 use rayon::prelude::*;
 
 use super::columns::{Columns, TimeOrigin};
-use super::rows::{Rows, dot};
+use super::rows::Rows;
 use super::score::Candidate;
 use super::{EstimateError, Estimator, Point, Score, Sensor};
 use crate::model::Family;
@@ -18,6 +18,8 @@ const BATCH: usize = 12;
 pub const BASIS: usize = 3;
 /// How a wave's cosine and sine are made of the cosines and sines of those.
 type Share = SMatrix<f64, { 2 * BASIS }, 2>;
+/// What those add to one row.
+type Local = [f64; 2 * BASIS];
 
 /// An effect `a cos(2 pi f t) + b sin(2 pi f t)` at a few frequencies, in one family: within a frame,
 /// every other frequency is a combination of these.
@@ -68,26 +70,37 @@ where
         let mut waves = Columns { seen: Rows::zeros(n * M, width), state: Rows::zeros((n - 1) * D, width) };
         for i in 0..n {
             let pace = point.sets[self.record.film[i]].pace();
+            let links = if i + 1 < n { D } else { 0 };
             for (k, (f, share)) in frequencies.iter().zip(shares).enumerate() {
                 let (sin, cos) = (TAU * f * self.record.t[i] * pace).sin_cos();
                 // cos(phase + local) and sin(phase + local), of the local waves' shares.
                 let (in_cos, in_sin) = (share.column(0), share.column(1));
-                let (in_cos, in_sin) = (in_cos * cos - in_sin * sin, in_cos * sin + in_sin * cos);
-                let combine = |from: &Rows, to: &mut Rows, rows: std::ops::Range<usize>| {
-                    for r in rows {
-                        let (from, to) = (&from.row(r)[..2 * BASIS], &mut to.row_mut(r)[2 * k..2 * k + 2]);
-                        to[0] = dot(from, in_cos.as_slice());
-                        to[1] = dot(from, in_sin.as_slice());
+                let in_both: [Local; 2] =
+                    [(in_cos * cos - in_sin * sin).into(), (in_cos * sin + in_sin * cos).into()];
+                let combined = |local: &Local| {
+                    let mut both = [0.0; 2];
+                    for j in 0..2 * BASIS {
+                        both[0] += local[j] * in_both[0][j];
+                        both[1] += local[j] * in_both[1][j];
                     }
+                    both
                 };
-                combine(&responses.seen, &mut waves.seen, M * i..M * (i + 1));
-                if i + 1 < n {
-                    combine(&responses.state, &mut waves.state, D * i..D * (i + 1));
+                for row in M * i..M * (i + 1) {
+                    let both = combined(&local(&responses.seen, row));
+                    waves.seen.row_mut(row)[2 * k..2 * k + 2].copy_from_slice(&both);
+                }
+                for row in D * i..D * i + links {
+                    let both = combined(&local(&responses.state, row));
+                    waves.state.row_mut(row)[2 * k..2 * k + 2].copy_from_slice(&both);
                 }
             }
         }
         waves
     }
+}
+
+fn local(responses: &Rows, row: usize) -> Local {
+    *responses.row(row).first_chunk().expect("a column for each wave of the basis")
 }
 
 /// How `cos` and `sin` of each frequency are made of those of the basis, on `[0, longest]`: least squares

@@ -26,7 +26,7 @@ from .heldout import (
 )
 from .located import fit_curve, fit_formula
 from .results import Alternative
-from .scan import Scan, Scored, physical, scan, scan_ripples
+from .scan import Scan, Scored, physical, scan, strongest_ripple
 from .together import together
 
 #: Chance that a record without any effect is said to have one, over all candidates together.
@@ -345,11 +345,11 @@ class Search:
         """
 
         def look(current: Fit) -> Look:
-            rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
-            best = [s.candidate for s in rippled[:1]]
+            ripple, frequencies = strongest_ripple(current)
+            best = [ripple.candidate] if ripple else []
             scanned = scan(current, [*library(current.model, self.given), *best])
             curves = scan_curves(current)
-            looks = len(scanned.scored) + len(rippled) + curves.looks
+            looks = len(scanned.scored) + frequencies + curves.looks
             return Look(current, scanned, curves.curves, looks)
 
         found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
