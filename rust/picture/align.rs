@@ -13,6 +13,10 @@ pub struct Speed {
     pub rate: [f64; 2],
     /// Of turning [rad/s].
     pub spin: f64,
+    /// Acceleration of its centre [pixels/s^2].
+    pub bending: [f64; 2],
+    /// Of turning [rad/s^2].
+    pub twisting: f64,
 }
 
 /// The marked disk before its camera.
@@ -112,19 +116,22 @@ fn seen_at(mark: &Mark, body: &Body<'_>, pose: &Pose, speed: &Speed, height: usi
     let place = Complex::new(mark.place[0], mark.place[1]);
     let start = Complex::new(pose.centre[0], pose.centre[1]);
     let rate = Complex::new(speed.rate[0], speed.rate[1]);
+    let bending = Complex::new(speed.bending[0], speed.bending[1]);
     let (mut centre, mut angle) = (start, pose.angle);
     let mut at = centre + place * Complex::cis(angle);
     if body.per_row == 0.0 {
         return (*pose, body.lens.local(at));
     }
+    let mut late = 0.0;
     for _ in 0..3 {
-        let late = body.per_row * (body.lens.picture(at).im + 0.5 - height as f64 / 2.0);
-        centre = start + rate * late;
-        angle = pose.angle + speed.spin * late;
+        late = body.per_row * (body.lens.picture(at).im + 0.5 - height as f64 / 2.0);
+        centre = start + (rate + bending * (0.5 * late)) * late;
+        angle = pose.angle + (speed.spin + 0.5 * speed.twisting * late) * late;
         at = centre + place * Complex::cis(angle);
     }
     let mut local = body.lens.local(at);
-    let moving = rate + Complex::new(0.0, speed.spin) * (at - centre);
+    let moving =
+        rate + bending * late + Complex::new(0.0, speed.spin + speed.twisting * late) * (at - centre);
     local.slope[1] -= moving.re * body.per_row;
     local.slope[3] -= moving.im * body.per_row;
     (Pose { centre: [centre.re, centre.im], angle }, local)

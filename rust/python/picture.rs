@@ -63,7 +63,7 @@ type Aligned<'py> = ((f64, f64, f64), Vec<Option<Seen<'py>>>, Vec<bool>, Option<
 /// Moves a pose (u, v, angle) onto a picture by one Gauss-Newton step for each of `rounds` (tolerances, pixels).
 ///
 /// `look` is psf, noise, gain_slack, rim, the least contrast of a mark, the time between rows; `lens` its
-/// middle, size, curve, tilts, aspect, shear; `motion` shift, turn, bend, twist, rate, spin. Returns the pose,
+/// middle, size, curve, tilts, aspect, shear; `motion` shift, turn, bend, twist, rate, spin, bending, twisting. Returns the pose,
 /// what the last round saw of each mark, which it used, the step that it made of them (None: the disk is not
 /// held; NaN: a mark not seen) and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
 #[pyfunction]
@@ -78,7 +78,7 @@ fn align_marks<'py>(
     marks: PyReadonlyArray2<'py, f64>,
     lens: [f64; 8],
     pose: [f64; 3],
-    motion: [f64; 9],
+    motion: [f64; 12],
     rounds: Vec<f64>,
     without: Option<usize>,
     keep: bool,
@@ -91,8 +91,9 @@ fn align_marks<'py>(
     let [psf, noise, gain_slack, rim, faint, per_row] = look;
     let [u, v, size, curve, tilt_u, tilt_v, aspect, shear] = lens;
     let lens = Lens { middle: [u, v], size, curve, tilt: [tilt_u, tilt_v], aspect, shear };
-    let (motion, speed) = (motion_of(&motion[..6])?, &motion[6..]);
-    let speed = Speed { rate: [speed[0], speed[1]], spin: speed[2] };
+    let [rate_u, rate_v, spin, bending_u, bending_v, twisting] = exactly(&motion[6..])?;
+    let speed = Speed { rate: [rate_u, rate_v], spin, bending: [bending_u, bending_v], twisting };
+    let motion = motion_of(&motion[..6])?;
     let marks = marks.as_slice()?.chunks(6).map(mark_of).collect::<PyResult<Vec<_>>>()?;
     let plane = Plane { codes: codes.as_slice()?, view: view.as_slice()?, height, width };
     let fit = py.detach(|| {

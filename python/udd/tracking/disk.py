@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture, Plane, TrackError
-from .look import Look, Pose
+from .look import Look, Motion, Pose
 
 RAYS = 180
 SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
@@ -23,11 +23,12 @@ class Outline:
     centre: complex
     radius: float
     sigma: float  # of the radius
+    centre_sigma: float  # of each of the centre's coordinates
     points: int
 
 
 def outline(
-    frames: Sequence[tuple[Picture, Pose]],
+    frames: Sequence[tuple[Picture, Pose, Motion]],
     look: Look,
     view: NDArray[np.bool_],
     span: tuple[float, float] = SPAN,
@@ -40,10 +41,12 @@ def outline(
     angles = np.arange(RAYS) * (2 * np.pi / RAYS)
     rays = np.exp(1j * angles)
     points, group = [], []
-    for number, (picture, pose) in enumerate(frames):
-        r = _rim(picture.y, view, pose.centre, rays, look, span)
+    for number, (picture, pose, motion) in enumerate(frames):
+        late = _late(pose.centre + sum(span) / 2 * look.reach * rays, look, picture.y.shape[0])
+        r = _rim(picture.y, view, np.asarray(pose.centre + motion.rate * late), rays, look, span)
         ok = np.isfinite(r)
-        points.append(r[ok] * rays[ok] * np.exp(-1j * pose.angle))
+        turn = pose.angle + motion.spin * late[ok]
+        points.append(r[ok] * rays[ok] * np.exp(-1j * turn))
         group.append(np.full(int(ok.sum()), number))
     z = np.concatenate(points) if points else np.empty(0, dtype=complex)
     if len(z) < 60:
@@ -62,11 +65,18 @@ def outline(
         if np.abs(change).max() < 1e-6:
             break
     # frames are the independent pieces: edges within one share the light and the compression
-    means = np.array(
-        [np.average(rest[g], weights=weight[g]) for g in _groups(np.concatenate(group)) if g.any()]
-    )
+    groups = [g for g in _groups(np.concatenate(group)) if g.any()]
+    means = np.array([np.average(rest[g], weights=weight[g]) for g in groups])
     sigma = float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else 0.5
-    return Outline(centre, radius, max(sigma, 0.01), len(z))
+    pulls = [2 * np.average(rest[g] * arm[g] / np.abs(arm[g]), weights=weight[g]) for g in groups]
+    off = float(np.std(pulls, ddof=1) / np.sqrt(2 * len(pulls))) if len(pulls) > 1 else 0.5
+    return Outline(centre, radius, max(sigma, 0.01), off, len(z))
+
+
+def _late(plane: NDArray[np.complex128], look: Look, height: int) -> NDArray[np.float64]:
+    """How much later than the middle row the rows of points of the plane are exposed [s]."""
+    rows = look.lens.picture(plane).imag
+    return np.asarray(look.readout * ((rows + 0.5) / height - 0.5))
 
 
 def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
@@ -76,17 +86,17 @@ def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
 def _rim(
     y: Plane,
     view: NDArray[np.bool_],
-    centre: complex,
+    centre: NDArray[np.complex128],
     rays: NDArray[np.complex128],
     look: Look,
     span: tuple[float, float],
 ) -> NDArray[np.float64]:
-    """Radius of the half-height crossing along each ray [pixels], NaN where none is clear."""
+    """Radius of the half-height crossing along each ray from its centre [pixels], NaN where none is clear."""
     import cv2
 
     step, reach = 0.5, look.reach
     radii = np.arange(span[0] * reach, span[1] * reach, step)
-    at = look.lens.picture(centre + radii[None, :] * rays[:, None])
+    at = look.lens.picture(centre[:, None] + radii[None, :] * rays[:, None])
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
     light = cv2.LUT(y, look.light.astype(np.float32))
     profile = cv2.remap(light, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .decode import Plane
 from .look import Look, Motion, Pose
-from .marks import MISFIT, coverage
+from .marks import MISFIT, beyond_place, coverage, seen_at
 from .pose import align
 from .survey import Moving
 
 SHARES = np.linspace(0.0, 1.0, 9)  # of the frame interval
 FASTEST = 12
+MOST = 36  # frames from which it is measured again
+ROUNDS = 5
+SMALL = 0.02  # relative change over which slopes are taken
 WORSE = 5.0  # times the least misfit
 PARABOLA = 0.2  # of the step between shares, to which its vertex is good
 STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
@@ -58,6 +62,64 @@ def _best(cost: NDArray[np.float64]) -> float:
         a, b, c = cost[k - 1 : k + 2]
         best += float(0.5 * (a - c) / (a - 2 * b + c) * SHARES[1])
     return best
+
+
+def again(
+    frames: Sequence[tuple[Plane, Pose, Callable[[float], Motion]]],
+    open_for: float,
+    look: Look,
+    view: NDArray[np.bool_],
+) -> float:
+    """The exposure time once more, from frames whose motion for any exposure their neighbours tell.
+
+    Gauss-Newton steps of its logarithm on the pixels about the marks, white, contrast and place left free.
+    """
+    long = np.array([_path(motion(open_for), look) for _, _, motion in frames])
+    fast = [frames[k] for k in np.argsort(-long, kind="stable")[:MOST] if long[k] > STREAK]
+    best = open_for
+    for _ in range(ROUNDS):
+        each = np.array([_pull(y, pose, motion, best, look, view) for y, pose, motion in fast]).reshape(-1, 2)
+        if not each[:, 1].sum() > 0:
+            return open_for
+        step = float(each[:, 0].sum() / each[:, 1].sum())
+        best *= float(np.exp(np.clip(step, -0.1, 0.1)))
+        if abs(step) < 1e-3:
+            break
+    return best
+
+
+def _pull(
+    y: Plane,
+    pose: Pose,
+    motion: Callable[[float], Motion],
+    open_for: float,
+    look: Look,
+    view: NDArray[np.bool_],
+) -> tuple[float, float]:
+    """Product of the residual and the light's slope in the exposure's logarithm, and that slope's square."""
+    now, here = motion(open_for), Pose(pose.centre, pose.angle)
+    fit = align(y, view, look, here, now, [MISFIT, MISFIT], gain_slack=0.3, keep=True)
+    if fit is None:
+        return 0.0, 0.0
+    pull = known = 0.0
+    poses, locals_ = seen_at(look, here, now, y.shape[0])
+    for mark, s, used, (u, v, angle), local in zip(
+        look.marks, fit.sightings, fit.used, poses, locals_, strict=True
+    ):
+        if s is None or not used or s.weight is None or s.residual is None:
+            continue
+        base, more, less = (
+            coverage(mark, complex(u, v), angle, motion(f * open_for), look.psf, s.box, local).ravel()
+            for f in (1.0, 1 + SMALL, 1 - SMALL)
+        )
+        slope = mark.level * s.gain * beyond_place((more - less)[None] / (2 * SMALL), base, s)[0]
+        pull += float((s.weight * slope) @ s.residual)
+        known += float((s.weight * slope) @ slope)
+    return pull, known
+
+
+def _path(motion: Motion, look: Look) -> float:
+    return abs(motion.shift) + abs(motion.turn * look.marks[0].place)
 
 
 def _misfit(m: Moving, share: float, look: Look, view: NDArray[np.bool_]) -> float:

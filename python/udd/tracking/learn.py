@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .decode import Picture, Plane
 from .find import Sight
 from .look import Look, Mark, Motion, Pose
-from .marks import MISFIT, Sighting, coverage, seen_at
+from .marks import MISFIT, Sighting, beyond_place, coverage, seen_at
 from .pose import align
 from .rigid import solve
 
@@ -170,7 +170,6 @@ def _shape_step(
     mark: Mark, pose: Array, local: Array, motion: Motion, look: Look, s: Sighting
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normal equations for (turn, half sides, psf) after the local unknowns have taken what they can."""
-    r0, r1, c0, c1 = s.box
     psf, centre, angle = look.psf, complex(pose[0], pose[1]), float(pose[2])
     assert s.weight is not None and s.residual is not None  # kept
 
@@ -178,8 +177,6 @@ def _shape_step(
         return coverage(m, centre, angle, motion, blur, s.box, local).ravel()
 
     base = cover(mark, psf)
-    grad_v, grad_u = np.gradient(base.reshape(r1 - r0, c1 - c0))
-    free = np.stack([np.ones_like(base), base, grad_u.ravel(), grad_v.ravel()])
     shape = np.stack(
         [
             (cover(replace(mark, turn=mark.turn + 0.01), psf) - base) / 0.01,
@@ -188,10 +185,8 @@ def _shape_step(
             (cover(mark, psf + 0.05) - base) / 0.05,
         ]
     )
-    shape *= mark.level
+    shape = mark.level * beyond_place(shape, base, s)
     w = s.weight
-    share = np.linalg.solve((free * w) @ free.T, (free * w) @ shape.T)
-    shape = shape - share.T @ free
     return (shape * w) @ shape.T, (shape * w) @ s.residual
 
 

@@ -31,8 +31,8 @@ class Motion:
     """How the disk moves during the exposure, about its pose in the middle of it.
 
     At the share s of the exposure (-1/2 to 1/2) it is off by s shift + s^2 bend [pixels] and
-    s turn + s^2 twist [rad]. `rate` [pixels/s] and `spin` [rad/s] are for rows that are exposed at
-    times of their own.
+    s turn + s^2 twist [rad]. `rate` [pixels/s], `spin` [rad/s] and their derivatives `bending` and
+    `twisting` are for rows that are exposed at times of their own.
     """
 
     shift: complex = 0j
@@ -41,12 +41,20 @@ class Motion:
     twist: float = 0.0
     rate: complex = 0j
     spin: float = 0.0
+    bending: complex = 0j
+    twisting: float = 0.0
 
     @property
     def row(self) -> NDArray[np.float64]:
         """As six numbers: shift u, v, turn, bend u, v, twist."""
         shift, bend = complex(self.shift), complex(self.bend)
         return np.array([shift.real, shift.imag, self.turn, bend.real, bend.imag, self.twist])
+
+    @property
+    def rolling(self) -> tuple[float, ...]:
+        """What rows of other times need, as six numbers: rate u, v, spin, bending u, v, twisting."""
+        rate, bending = complex(self.rate), complex(self.bending)
+        return (rate.real, rate.imag, self.spin, bending.real, bending.imag, self.twisting)
 
 
 @dataclass(frozen=True)

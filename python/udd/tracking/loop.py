@@ -257,7 +257,8 @@ def along_contact(known: Known, pose: Pose, spin: float, change: float = 0.0) ->
     rate = contact.velocity(pose.centre, spin)
     bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
     half = 0.5 * open_for**2
-    return Motion(rate * open_for, spin * open_for, bending * half, change * half, rate, spin)
+    shift, turn = rate * open_for, spin * open_for
+    return Motion(shift, turn, bending * half, change * half, rate, spin, bending, change)
 
 
 def _streak(motion: Motion, look: Look) -> float:

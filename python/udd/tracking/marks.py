@@ -98,7 +98,7 @@ def locate(
         look.table,
         look.lens.row,
         (pose.centre.real, pose.centre.imag, pose.angle),
-        (*motion.row, motion.rate.real, motion.rate.imag, motion.spin),
+        (*motion.row, *motion.rolling),
         rounds,
         without,
         keep,
@@ -118,6 +118,16 @@ def _sighting(
     return Sighting(np.array(offset), matrix, *shares, box, weight, residual)
 
 
+def beyond_place(shape: Array, base: Array, s: Sighting) -> Array:
+    """Changes (k, pixels) of a mark of the coverage `base`, less what white, gain and place can do."""
+    r0, r1, c0, c1 = s.box
+    grad_v, grad_u = np.gradient(base.reshape(r1 - r0, c1 - c0))
+    free = np.stack([np.ones_like(base), base, grad_u.ravel(), grad_v.ravel()])
+    weighted = free * s.weight
+    share = np.linalg.solve(weighted @ free.T, weighted @ shape.T)
+    return np.asarray(shape - share.T @ free)
+
+
 def seen_at(look: Look, pose: Pose, motion: Motion, height: int) -> tuple[Array, Array]:
     """For each mark the pose (n, 3) that its rows of the picture see, and its map (n, 8).
 
@@ -134,10 +144,11 @@ def seen_at(look: Look, pose: Pose, motion: Motion, height: int) -> tuple[Array,
     at = pose.centre + places * turn
     for _ in range(3):
         late = per_row * (look.lens.picture(at).imag + 0.5 - height / 2)
-        centre, angle = pose.centre + motion.rate * late, pose.angle + motion.spin * late
+        centre = pose.centre + (motion.rate + 0.5 * motion.bending * late) * late
+        angle = pose.angle + (motion.spin + 0.5 * motion.twisting * late) * late
         at = centre + places * np.exp(1j * angle)
     locals_ = look.lens.locals(at)
-    speed = motion.rate + 1j * motion.spin * (at - centre)
+    speed = motion.rate + motion.bending * late + 1j * (motion.spin + motion.twisting * late) * (at - centre)
     if not locals_.flags.writeable or look.lens.plain:
         locals_ = locals_.copy()
         locals_[:, 0], locals_[:, 1] = at.real, at.imag

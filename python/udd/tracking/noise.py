@@ -13,12 +13,13 @@ BELIEF = 5.0  # a frame is trusted as if the film had told this many coordinates
 GROUP = 40  # frames with like streaks from which their usual disagreement is taken
 
 
-def covariance(tracks: Tracks) -> Array:
-    """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad.
+def covariance(tracks: Tracks, centre_sigma: float = 0.0) -> Array:
+    """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad, the centre known to so much.
 
     The fit's own covariance assumes independent pixels of known noise. Compression, lens and light
     are neither; the marks' disagreement shows by how much: a rigid disk leaves 2 m - 3 of the 2 m
-    coordinates of m marks over.
+    coordinates of m marks over. Where the centre is among them only the rim says; what it is off by turns
+    with the disk.
     """
     chi2, info = np.array(tracks.chi2), np.array(tracks.information)
     marks = np.isfinite(chi2).sum(axis=1)
@@ -31,6 +32,7 @@ def covariance(tracks: Tracks) -> Array:
     out = np.full(info.shape, np.nan)
     if good.any():
         out[good] = inflation[good, None, None] * np.linalg.inv(info[good])
+        out[good] += np.diag([centre_sigma**2, centre_sigma**2, 0.0])
     return out
 
 

@@ -67,6 +67,7 @@ def prepare(
         )
         for m in in_motion
     ]
+    paths = {m.picture.index: path for m, (_, _, path) in zip(in_motion, frames, strict=True)}
     interval = float(np.median([m.interval for m in in_motion])) if in_motion else 0.0
     given = wanted.given("readout")
     rolling = readout(frames, look, view, interval) if given is None else Readout(given, 0.0)
@@ -89,15 +90,15 @@ def prepare(
         frames = frames[:0]
     if len(frames) >= FEWEST:
         look = refine(look, frames, view, 2, fixed)
-    sharp: list[tuple[Picture, Pose]] = []
+    sharp: list[tuple[Picture, Pose, Motion]] = []
     for picture, sight in seen[:SHARP]:
-        pose = Pose(*_in_plane(look.lens, sight, body))
-        if align(picture.y, view, look, pose, Motion(), [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
-            sharp.append((picture, pose))
+        pose, motion = Pose(*_in_plane(look.lens, sight, body)), paths.get(picture.index, Motion())
+        if align(picture.y, view, look, pose, motion, [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
+            sharp.append((picture, pose, motion))
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
     rim = _rim(film, sharp, look, view, setup)
-    colours = colours_of([p for p, _ in sharp], [q for _, q in sharp], look, view)
+    colours = colours_of([p for p, _, _ in sharp], [q for _, q, _ in sharp], look, view)
     if rim is not None:
         look = replace(look, rim=rim.radius - RIM_SMEAR)
     look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, setup)
@@ -107,7 +108,7 @@ def prepare(
 
 
 def _rim(
-    film: Film, sharp: list[tuple[Picture, Pose]], look: Look, view: NDArray[np.bool_], setup: Setup
+    film: Film, sharp: list[tuple[Picture, Pose, Motion]], look: Look, view: NDArray[np.bool_], setup: Setup
 ) -> Outline | None:
     """The disk's outline; None where it does not show and the layout says where its centre is."""
     layout = setup.layout

@@ -47,6 +47,8 @@ class Local:
             self.twisting * half,
             self.rate,
             self.spin,
+            self.bending,
+            self.twisting,
         )
 
 

@@ -19,6 +19,7 @@ from .calibration import camera_of, meta_of
 from .config import Config, settings
 from .decode import Film, Picture, TrackError
 from .disk import Outline
+from .exposure import again as retimed
 from .exposure import at_middle
 from .find import COLOURS, FEWEST, sightings
 from .glimpse import Glimpse
@@ -244,12 +245,11 @@ def track_in_detail(
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     if refine:
-        if known.readout.value and setup.calibrate.given("readout") is None:
-            known = _timed(known, look_over, tracks)
+        known = _timed(known, look_over, tracks, setup)
         tracks = _again(film, known, tracks, progress)
     drop_weak(tracks)
     camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), pivot)
-    measurement = tabulated(film, tracks, known, camera, setup, doubtful, refine)
+    measurement = tabulated(film, tracks, known, camera, setup, rim, doubtful, refine)
     return Tracking(measurement, tracks, known, camera, rim)
 
 
@@ -279,7 +279,7 @@ def _by_tags(
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     camera = camera_of(tracks, known, size_of(known.look.places, None, setup), setup.pivot)
-    measurement = tabulated(film, tracks, known, camera, setup, doubtful, False)
+    measurement = tabulated(film, tracks, known, camera, setup, None, doubtful, False)
     return Tracking(measurement, tracks, known, camera, None)
 
 
@@ -305,10 +305,19 @@ def _learn(film: Film, look_over: Survey, setup: Setup) -> tuple[Known, Outline 
 
 
 def tabulated(
-    film: Film, tracks: Tracks, known: Known, camera: Camera, setup: Setup, doubtful: int, twice: bool
+    film: Film,
+    tracks: Tracks,
+    known: Known,
+    camera: Camera,
+    setup: Setup,
+    rim: Outline | None,
+    doubtful: int,
+    twice: bool,
 ) -> Measurement:
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
-    values, sigma, rho = metres(tracks, covariance(tracks), camera)
+    # Where the layout is taken as said, so is the centre.
+    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else 0.0
+    values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma), camera)
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
@@ -354,18 +363,23 @@ def _follow(
         return follow(film.pictures(), known, tick)
 
 
-def _timed(known: Known, look_over: Survey, tracks: Tracks) -> Known:
-    """The readout once more, now that every frame's motion is known from its neighbours."""
+def _timed(known: Known, look_over: Survey, tracks: Tracks, setup: Setup) -> Known:
+    """Exposure and readout once more, now that every frame's motion is known from its neighbours."""
     around = Around(tracks)
     frames = []
     for picture in look_over.pictures:
         here = around.at(picture.index) if picture.index < len(tracks.t) else None
         if here is not None and here.held and not tracks.flag[picture.index]:
-            frames.append((picture.y, here.pose, here.motion(known.exposure)))
-    again = readout(frames, known.look, known.view, around.interval)
-    if not again.value:
-        return known
-    return replace(known, look=replace(known.look, readout=again.value), readout=again)
+            frames.append((picture.y, here))
+    if known.readout.value and setup.calibrate.given("readout") is None:
+        moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
+        again = readout(moving, known.look, known.view, around.interval)
+        if again.value:
+            known = replace(known, look=replace(known.look, readout=again.value), readout=again)
+    if known.exposure and setup.calibrate.given("exposure") is None:
+        paths = [(y, here.pose, here.motion) for y, here in frames]
+        known = replace(known, exposure=retimed(paths, known.exposure, known.look, known.view))
+    return known
 
 
 def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
