@@ -101,7 +101,8 @@ def test_scale_and_contact_come_out_of_the_film(measured: Measurement) -> None:
     # 0.3 mm is what the fit can be given without harm; a camera pixel is 1 mm here
     assert abs(float(meta["pivot_u"]) - PIVOT[0]) < 0.1 and abs(float(meta["pivot_v"]) - PIVOT[1]) < 0.1
     assert float(meta["drive_seen"]) == pytest.approx(0.012, rel=0.02)
-    assert float(meta["exposure"]) == pytest.approx(EXPOSURE, rel=0.25)
+    # measured again in the second pass; edges are known to 0.12 pixels of streaks of some twenty
+    assert float(meta["exposure"]) == pytest.approx(EXPOSURE, rel=0.06)
 
 
 def test_errors_are_honest(measured: Measurement, motion: Motion) -> None:
