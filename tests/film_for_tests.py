@@ -171,3 +171,43 @@ def write(
             out.mux(stream.encode(f))
         out.mux(stream.encode(None))
     return path
+
+
+def swinging(
+    theta: Callable[[float], float],
+    t: float,
+    exposure: float,
+    rng: np.random.Generator,
+    *,
+    long: float = 230.0,
+    radius: float = 13.0,
+    pivot: tuple[float, float] = (158.3, 61.7),
+    clutter: bool = True,
+) -> NDArray[np.uint8]:
+    """A plain pendulum: a red bob on a grey rod before a wall with a red patch; light added up."""
+    angles = [theta(float(t + exposure * x)) for x in ((np.arange(5) + 0.5) / 5 - 0.5 if exposure else [0.0])]
+    ends = np.array([[pivot[0] + long * np.sin(a), pivot[1] + long * np.cos(a)] for a in angles])
+    low = np.floor(np.minimum(ends.min(axis=0) - radius - 3, np.array(pivot) - 3)).astype(int)
+    high = np.ceil(np.maximum(ends.max(axis=0) + radius + 3, np.array(pivot) + 3)).astype(int)
+    (c0, r0), (c1, r1) = np.maximum(low, 0), np.minimum(high, (WIDTH, HEIGHT))
+    shift = 4
+    paint = light((200, 38, 44)).tolist()
+
+    def at(u: float, v: float) -> list[int]:
+        return [round((OVER * z + (OVER - 1) / 2) * 2**shift) for z in (u - c0, v - r0)]
+
+    total = np.zeros((r1 - r0, c1 - c0, 3), dtype=np.float32)
+    for u, v in ends:
+        image = np.broadcast_to(light(WALL), ((r1 - r0) * OVER, (c1 - c0) * OVER, 3)).copy()
+        if clutter:
+            cv2.circle(image, at(40, 350), 20 * OVER << shift, paint, -1, cv2.LINE_8, shift)
+        cv2.line(image, at(*pivot), at(u, v), light((90, 92, 95)).tolist(), 2 * OVER, cv2.LINE_AA, shift)
+        size = round((radius * OVER - 0.5) * 2**shift)  # cv2 fills what the outline touches
+        cv2.circle(image, at(u, v), size, paint, -1, cv2.LINE_8, shift)
+        total += _shrink(image)
+    picture = np.broadcast_to(light(WALL), (HEIGHT, WIDTH, 3)).copy()
+    if clutter:
+        cv2.circle(picture, (40, 350), 20, paint, -1)
+    picture[r0:r1, c0:c1] = total / np.float32(len(ends))
+    noisy = codes(picture).astype(float) + rng.normal(0, 1.5, picture.shape)
+    return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))

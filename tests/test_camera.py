@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -154,3 +155,47 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path, capsys: pytest.Captu
     ]:
         assert main(argv) == 1
         assert says in capsys.readouterr().err
+
+
+class Impatient(Webcam):
+    """Somebody presses Ctrl-C when the k-th frame comes."""
+
+    def __init__(self, shots: list[tuple[float, NDArray[np.uint8]]], *presses: int) -> None:
+        super().__init__(shots)
+        self.count, self.presses = 0, presses
+
+    def read(self) -> tuple[bool, Any]:
+        self.count += 1
+        for _ in range(self.presses.count(self.count)):
+            signal.raise_signal(signal.SIGINT)
+        return super().read()
+
+
+def test_ctrl_c_ends_the_recording_and_keeps_the_film(tmp_path: Path) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    camera = Impatient(grey([10.0 + 40 * k for k in range(300)]), 40)
+    made = record(tmp_path / "x.mp4", camera=camera, seconds=20)
+    assert len(made.t) == 39 and len(stamps(made.path)) == 39 and camera.released == 1
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize("presses", [(5,), (40, 40)], ids=["too early", "twice"])
+def test_ctrl_c_too_early_or_twice_leaves_nothing(presses: tuple[int, ...], tmp_path: Path) -> None:
+    camera = Impatient(grey([10.0 + 40 * k for k in range(300)]), *presses)
+    with pytest.raises(KeyboardInterrupt):
+        record(tmp_path / "x.mp4", camera=camera, seconds=20)
+    assert camera.released == 1 and list(tmp_path.iterdir()) == []
+
+
+def test_the_command_tracks_what_was_recorded_until_ctrl_c(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng, motion = np.random.default_rng(5), rolling(2.0)
+    times = [k / FPS for k in range(45)]
+    shots = [(1e3 * (7 + t), np.ascontiguousarray(frame(motion, t, 0.008, rng)[..., ::-1])) for t in times]
+    camera = Impatient(shots, 40)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda _: camera)
+    film, table = tmp_path / "film.mp4", tmp_path / "m.csv"
+    argv = ["track", "--camera", "0", "--film", str(film), "--disk-radius", str(RADIUS), "--fast"]
+    assert main([*argv, "--pivot", "161.3,190.6", "--out", str(table)]) == 0, capsys.readouterr().err
+    assert len(udd.read_measurement(table)) == 39

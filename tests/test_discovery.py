@@ -11,7 +11,7 @@ import pytest
 import simulated
 import udd
 from udd.discovery.candidates import ripples
-from udd.discovery.scan import scan, scan_ripples
+from udd.discovery.scan import scan, scan_ripples, strongest_ripple
 from udd.errors import FitError
 
 E = udd.effects
@@ -83,6 +83,14 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.ratio == (1.0, 1.0, 1.0)
 
 
+def test_a_shape_between_those_tried_is_found():
+    found = discovered(E.stribeck(c=0.01, fade=1.7), seed=1, duration=60.0)
+    (effect,) = found.effects
+    assert effect.title == "Stribeck friction"
+    for name, value in (("c", 0.01), ("fade", 1.7)):
+        assert abs(effect.parameters[name] - value) < 4 * effect.errors[name] + 0.004 * value
+
+
 def test_what_a_film_gets_wrong_is_no_effect():
     # Marks that are read a little differently in every orientation: a fifth of a milliradian, more than the
     # noise of a precise film, four times a turn. It looks like the torque of an uneven disk.
@@ -137,14 +145,30 @@ def test_two_effects_are_found():
 def test_ripples_from_one_response_equal_those_scored_singly():
     measured, _states = simulated.film(udd.Disk(0.045), np.random.default_rng(2), 20.0)
     fitted = udd.fit(measured, udd.Disk(0.045))
-    together = scan_ripples(fitted)
+    listed = ripples(fitted.model, fitted.record.t)
+    together = scan_ripples(fitted, listed)
     few = slice(20, len(together), 90)
-    singly = scan(fitted, ripples(fitted.model, fitted.record.t)[few]).scored
+    singly = scan(fitted, listed[few]).scored
     for a, b in zip(together[few], singly, strict=True):
         # Within a frame, waves are combined from three frequencies, good to 1e-5; where the friction switches
         # within it they are followed at three places, which is good to a hundredth of the error.
         np.testing.assert_allclose(a.amplitudes, b.amplitudes, rtol=2e-3, atol=2e-2 * max(b.errors))
         assert a.chi2 == pytest.approx(b.chi2, rel=5e-3, abs=1e-3)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.25, 0.5])
+def test_the_strongest_ripple_is_found_between_lines_too(shift):
+    # Lines are 1/duration apart; a quarter off is the farthest from those that are looked at.
+    f = (30.0 + shift) / 20.0
+    truth = udd.Disk(0.08, effects=[E.drive_ripple(a=6e-3, b=0.0, f=f)])
+    measured, _states = simulated.film(truth, np.random.default_rng(3), 20.0)
+    fitted = udd.fit(measured, udd.Disk(0.08))
+    listed = ripples(fitted.model, fitted.record.t)
+    best = max(scan_ripples(fitted, listed), key=lambda s: s.chi2)
+    found, looks = strongest_ripple(fitted)
+    assert best.chi2 > 30.0
+    assert found is not None and found.candidate == best.candidate
+    assert looks == len(listed)
 
 
 def test_a_result_is_data():

@@ -362,15 +362,21 @@ def test_lens_and_tilt_come_out_of_rigidity() -> None:
     assert np.allclose(true_lens.plane(points), plane, atol=1e-8)
     noisy = points + 0.03 * (rng.normal(size=points.shape) + 1j * rng.normal(size=points.shape))
     noisy[::3, 1] = np.nan
-    found = calibrate(noisy, (700, 550))
-    assert found is not None
+    bent = calibrate(noisy, (700, 550))
+    assert bent.found
+    found = bent.lens
+    # the standard error of the curve covers, to 4 of them
+    assert 0 < bent.sigma[0] < 0.01 and abs(found.curve - true_lens.curve) < 4 * bent.sigma[0]
     # the distances between the marks, in the frames' own unit of length, must be the same everywhere again
     back = found.plane(points)
     spread = np.abs(back[:, 0] - back[:, 2])
-    bent = np.abs(points[:, 0] - points[:, 2])
-    assert spread.std() < 0.15 * bent.std() and spread.std() < 0.1
+    before = np.abs(points[:, 0] - points[:, 2])
+    assert spread.std() < 0.15 * before.std() and spread.std() < 0.1
     flat = plane + 0.03 * (rng.normal(size=points.shape) + 1j * rng.normal(size=points.shape))
-    assert calibrate(flat, (700, 550)) is None  # nothing to mend is left alone
+    left = calibrate(flat, (700, 550))
+    assert left.lens.plain and not left.found  # nothing to mend is left alone
+    given = calibrate(noisy, (700, 550), curve=0.014, tilt=0.0)
+    assert (given.lens.curve, given.lens.tilt_u, given.sigma.tolist()) == (0.014, 0.0, [0.0] * 5)
 
 
 def test_turns_across_a_gap_follow_the_rates_around_it() -> None:

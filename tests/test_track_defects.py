@@ -83,7 +83,8 @@ def test_dropped_repeated_and_black_frames(tmp_path: Path) -> None:
     m = udd.track(film.path)
     assert len(m) == len(film.t) and np.allclose(m.t, film.t, atol=1e-4)
     said = {round(t * 25): flag for t, flag in zip(m.t, m.flag, strict=True) if flag}
-    assert {k: flag[:3] for k, flag in said.items()} == {50: "dup", 51: "dup", 70: "bla"}
+    assert {k: flag[:3] for k, flag in said.items()} == {32: "gap", 50: "dup", 51: "dup", 70: "bla"}
+    assert said[32] == "gap: 2 frames are missing before" and m.seen[30]  # the row of frame 32
     assert rms(errors(m, film))[:2].max() < 0.1
 
 

@@ -108,6 +108,7 @@ def smooth(measurement: Measurement, *, gap: float = 0.1, slip: float | None = N
         measurement.flag,
         {**measurement.meta, **said},
         measurement.names,
+        measurement.quality,
     )
 
 

@@ -35,7 +35,7 @@ pub use record::{Free, Point, Record, Role, Set};
 pub use rows::Rows;
 pub use score::{Candidate, Score};
 pub use sensor::{AngleSensor, Direct, DiskCamera, Sensor};
-pub use waves::Probe;
+pub use waves::{BASIS, Probe};
 
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SMatrix};
 use rayon::prelude::*;
 
 use super::columns::{Columns, TimeOrigin};
-use super::rows::{Rows, add, dot};
+use super::rows::Rows;
 use super::score::Candidate;
 use super::{EstimateError, Estimator, Point, Score, Sensor};
 use crate::model::Family;
@@ -14,13 +14,20 @@ use crate::model::Family;
 /// How many frequencies are scored in one solve.
 const BATCH: usize = 12;
 
+/// How many waves all others are made of.
+pub const BASIS: usize = 3;
+/// How a wave's cosine and sine are made of the cosines and sines of those.
+type Share = SMatrix<f64, { 2 * BASIS }, 2>;
+/// What those add to one row.
+type Local = [f64; 2 * BASIS];
+
 /// An effect `a cos(2 pi f t) + b sin(2 pi f t)` at a few frequencies, in one family: within a frame,
 /// every other frequency is a combination of these.
 pub struct Probe<F> {
     /// The effect once per frequency, with the amplitudes `a, b` of each.
     pub candidate: Candidate<F>,
     /// The frequencies, Hz.
-    pub frequencies: Vec<f64>,
+    pub frequencies: [f64; BASIS],
 }
 
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
@@ -57,37 +64,34 @@ where
     }
 
     /// The columns of waves from the responses to the probe's.
-    fn waves(
-        &self,
-        point: &Point<D>,
-        responses: &Columns,
-        frequencies: &[f64],
-        shares: &[DMatrix<f64>],
-    ) -> Columns {
+    fn waves(&self, point: &Point<D>, responses: &Columns, frequencies: &[f64], shares: &[Share]) -> Columns {
         let n = self.record.t.len();
         let width = 2 * frequencies.len();
         let mut waves = Columns { seen: Rows::zeros(n * M, width), state: Rows::zeros((n - 1) * D, width) };
         for i in 0..n {
             let pace = point.sets[self.record.film[i]].pace();
+            let links = if i + 1 < n { D } else { 0 };
             for (k, (f, share)) in frequencies.iter().zip(shares).enumerate() {
                 let (sin, cos) = (TAU * f * self.record.t[i] * pace).sin_cos();
                 // cos(phase + local) and sin(phase + local), of the local waves' shares.
-                let mut own = vec![0.0; 2 * share.nrows()];
-                let (in_cos, in_sin) = own.split_at_mut(share.nrows());
-                let (c, s) = (share.column(0), share.column(1));
-                add(in_cos, cos, c.as_slice());
-                add(in_cos, -sin, s.as_slice());
-                add(in_sin, sin, c.as_slice());
-                add(in_sin, cos, s.as_slice());
-                let combine = |from: &Rows, to: &mut Rows, rows: std::ops::Range<usize>| {
-                    for r in rows {
-                        to.row_mut(r)[2 * k] = dot(from.row(r), in_cos);
-                        to.row_mut(r)[2 * k + 1] = dot(from.row(r), in_sin);
+                let (in_cos, in_sin) = (share.column(0), share.column(1));
+                let in_both: [Local; 2] =
+                    [(in_cos * cos - in_sin * sin).into(), (in_cos * sin + in_sin * cos).into()];
+                let combined = |local: &Local| {
+                    let mut both = [0.0; 2];
+                    for j in 0..2 * BASIS {
+                        both[0] += local[j] * in_both[0][j];
+                        both[1] += local[j] * in_both[1][j];
                     }
+                    both
                 };
-                combine(&responses.seen, &mut waves.seen, M * i..M * (i + 1));
-                if i + 1 < n {
-                    combine(&responses.state, &mut waves.state, D * i..D * (i + 1));
+                for row in M * i..M * (i + 1) {
+                    let both = combined(&local(&responses.seen, row));
+                    waves.seen.row_mut(row)[2 * k..2 * k + 2].copy_from_slice(&both);
+                }
+                for row in D * i..D * i + links {
+                    let both = combined(&local(&responses.state, row));
+                    waves.state.row_mut(row)[2 * k..2 * k + 2].copy_from_slice(&both);
                 }
             }
         }
@@ -95,20 +99,25 @@ where
     }
 }
 
+fn local(responses: &Rows, row: usize) -> Local {
+    *responses.row(row).first_chunk().expect("a column for each wave of the basis")
+}
+
 /// How `cos` and `sin` of each frequency are made of those of the basis, on `[0, longest]`: least squares
 /// on a fine grid. With a basis that spans the frequencies asked for, three are good to 1e-6.
-fn shares(basis: &[f64], longest: f64, frequencies: &[f64]) -> Vec<DMatrix<f64>> {
+fn shares(basis: &[f64; BASIS], longest: f64, frequencies: &[f64]) -> Vec<Share> {
     const POINTS: usize = 17;
     let time = |row: usize| longest * row as f64 / (POINTS - 1) as f64;
     let wave =
         |f: f64, column: usize, t: f64| if column == 0 { (TAU * f * t).cos() } else { (TAU * f * t).sin() };
-    let made_of = DMatrix::from_fn(POINTS, 2 * basis.len(), |row, c| wave(basis[c / 2], c % 2, time(row)));
+    let made_of = DMatrix::from_fn(POINTS, 2 * BASIS, |row, c| wave(basis[c / 2], c % 2, time(row)));
     let svd = made_of.svd(true, true);
     frequencies
         .iter()
         .map(|&f| {
             let wanted = DMatrix::from_fn(POINTS, 2, |row, c| wave(f, c, time(row)));
-            svd.solve(&wanted, 1e-9).expect("both factors were computed")
+            let found = svd.solve(&wanted, 1e-9).expect("both factors were computed");
+            Share::from_column_slice(found.as_slice())
         })
         .collect()
 }

@@ -10,7 +10,7 @@ use super::errors::FitError;
 use super::interrupt;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, Candidate, Columns, Direct, DiskCamera, EstimateError, Estimator, Free, Options,
+    AngleSensor, BASIS, Candidate, Columns, Direct, DiskCamera, EstimateError, Estimator, Free, Options,
     PLACES_PER_LINK, Point, Probe, Record, Role, Rows, Sensor, Set,
 };
 use crate::integrate::Tolerance;
@@ -318,7 +318,7 @@ fn score_ripples<'py>(
         return Err(PyValueError::new_err("only a disk has a drive"));
     };
     let highest = frequencies.iter().copied().fold(0.0, f64::max);
-    let basis: Vec<f64> = (1..=3).map(|k| highest * f64::from(k) / 3.0).collect();
+    let basis = std::array::from_fn(|k| highest * (k + 1) as f64 / BASIS as f64);
     let (mut wide, mut more, mut amplitudes) = (family.clone(), Vec::new(), Vec::new());
     for &f in &basis {
         wide.effects.push(Effect::new(Kind::DriveRipple));

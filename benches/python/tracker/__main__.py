@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
 import time
@@ -23,7 +24,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from films import Case, film, named
+from films import Case, film, named, shared
 from scoring import Score, score
 
 HEAD = (
@@ -58,7 +59,11 @@ def main() -> int:
         print(f"{name} is not installed here; the table goes without it")
     trackers = {name: tracker for name, tracker in trackers.items() if name in wanted}
     for case in named([w for w in args.only.split(",") if w]):
-        made = film(case, args.folder, args.seed)
+        found = shared(case) if case.name.startswith("shared") else (case, film(case, args.folder, args.seed))
+        if found is None:
+            print(f"{case.name:34} is not here", flush=True)
+            continue
+        case, made = found
         for name, tracker in trackers.items():
             try:
                 s = tracker(case, made)
@@ -100,7 +105,7 @@ def ours(case: Case, made, **options) -> Score:  # type: ignore[no-untyped-def]
     place = complex(float(m.meta["pivot_u"]), float(m.meta["pivot_v"]))
     scale = float(m.meta["px_per_m"])
     off = abs(place - complex(*made.pivot)) / scale * 1e3
-    drive = float(m.meta["drive_seen"]) / case.W - 1
+    drive = float(m.meta["drive_seen"]) / case.W - 1 if case.W else math.nan
     return score(case, made, m.t, m.values.copy(), m.covariance(), rate, off, drive)
 
 

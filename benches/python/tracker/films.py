@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import math
 import pickle
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,36 @@ def film(case: Case, folder: Path, seed: int) -> Film:
     return made
 
 
+SHARED = Path(__file__).resolve().parents[4] / "shared" / "video"
+SHARED_CASES = (
+    Case("shared: zero_drive", (0.1, 1.0, 0.01), W=0.0),
+    Case("shared: plain", (0.1, 1.0, 0.01)),
+    Case("shared: unknown_1", (0.1, 1.0, 0.01), W=0.042),
+    Case("shared: unknown_2", (0.1, 1.0, 0.01), W=0.042),
+    Case("shared: hard", (0.3, 4.0, 0.02), W=0.055),
+)
+
+
+def shared(case: Case) -> tuple[Case, Film] | None:
+    """A film with its truth from the folder beside the repository; None where it is not there.
+
+    Their scale and contact are known to about a pixel only, so the errors to look at are those of the shape.
+    """
+    path = SHARED / f"{case.name.removeprefix('shared: ')}.mp4"
+    if not path.is_file():
+        return None
+    with path.with_suffix(".truth.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    state = np.array([[float(r[name] or "nan") for name in ("Omega", "Y", "Z", "beta")] for r in rows])
+    bad = {name: tuple(k for k, r in enumerate(rows) if r["flag"] == said) for name, said in _FLAGS}
+    t, held = np.array([float(r["time"]) for r in rows]), np.array([r["state"] == "run" for r in rows])
+    made = Film(path, t, state, held, (550, 700), 1750.0, (275.0, 330.0), 0.08)
+    return replace(case, defects=bad), made
+
+
+_FLAGS = (("repeated", "dup"), ("black", "black"))
+
+
 def run(case: Case, seed: int) -> udd.Trajectory:
     """Draw starts until the disk stays on the wheels, or leaves them in the middle of the film.
 
@@ -96,4 +127,4 @@ def run(case: Case, seed: int) -> udd.Trajectory:
 
 def named(words: Sequence[str]) -> list[Case]:
     """Cases whose name holds one of the words; all without words."""
-    return [c for c in CASES if not words or any(w in c.name for w in words)]
+    return [c for c in (*CASES, *SHARED_CASES) if not words or any(w in c.name for w in words)]

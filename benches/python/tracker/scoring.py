@@ -31,8 +31,10 @@ class Score:
     rate: float  # frames/s, wall clock
 
     def passes(self, case: Case) -> bool:
-        """Whether the row's limits are met."""
+        """Whether the row's limits are met; of films whose contact nobody knows by the shape."""
         length, angle, lost = case.limits
+        if case.name.startswith("shared"):
+            return self.shape <= length and self.angle <= angle and self.lost <= lost
         return self.length <= length and self.angle <= angle and self.lost <= lost and self.wrong == 0
 
 

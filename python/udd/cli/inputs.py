@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,9 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 )
         return read_measurement(args.file, args.columns, states, **known), None
     if args.pendulum is not None:
-        raise UddError("a film of a pendulum cannot be tracked: --pendulum takes a table with t,theta")
+        raise UddError(
+            "a pendulum's film is tracked first (udd track --bob): --pendulum takes a table with t,theta"
+        )
     found = tracked(args, 0.08 if args.R is None else args.R)
     return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
 
@@ -92,13 +95,18 @@ def tracked(args: argparse.Namespace, radius: float | None, **options: Any) -> M
     """Track a film; one that is cut off is refused, unless its user knows."""
     from udd.tracking import track
 
+    return whole(args, lambda: track(args.file, disk_radius=radius, progress=watched(), **options))
+
+
+def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measurement:
+    """What `measure` makes of a film; one that is cut off is refused, unless its user knows."""
     with warnings.catch_warnings(record=True) as said:
-        found = track(args.file, disk_radius=radius, progress=watched(), **options)
+        found = measure()
     missing = int(found.meta.get("frames_missing", 0))
-    whole = missing + len(found)
-    if missing > _CUT * whole and not args.partial:
+    promised = missing + len(found)
+    if missing > _CUT * promised and not args.partial:
         raise UddError(
-            f"{args.file} is cut off: {missing} of its {whole} frames are missing "
+            f"{args.file} is cut off: {missing} of its {promised} frames are missing "
             "(--partial uses what there is)"
         )
     for warning in said:

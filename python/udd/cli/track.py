@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import tempfile
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from udd.errors import UddError
 
 from .answer import Answer, watched
-from .inputs import add_partial, is_film, tracked
+from .inputs import add_partial, is_film, whole
 from .options import new, numbers
 
 if TYPE_CHECKING:
@@ -49,12 +50,26 @@ def add(commands: Any) -> None:
         metavar="M",
         help="from the marks' centres to the disk's (default 65/80 R)",
     )
+    parser.add_argument("--scale", type=float, metavar="PX", help="pixels per metre, given instead of found")
+    parser.add_argument(
+        "--region", metavar="U0,V0,U1,V1", help="part of the picture in which the disk moves [pixels]"
+    )
+    parser.add_argument(
+        "--calibrate",
+        metavar="ITEM=HOW,...",
+        help="on, off or a number for layout, scale, lens, tilt, readout [s], exposure [s], pivot; "
+        "such as lens=off,readout=0.02 (default: all on)",
+    )
+    parser.add_argument(
+        "--bob", metavar="COLOUR", help="the film is one of a plain pendulum with a bob of this colour"
+    )
+    parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob")
     parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
     parser.add_argument(
         "--config",
         type=Path,
         metavar="TOML",
-        help="file with disk_radius, mark_distance, fps, pivot, refine; options given beside it win",
+        help="file with any of these, and with layout (marks or tags of another disk); options win",
     )
     parser.add_argument("--fast", action="store_true", help="without the second pass")
     parser.add_argument(
@@ -68,6 +83,9 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--overlay", type=Path, metavar="MP4", help="film to write, what was found drawn upon it"
+    )
+    parser.add_argument(
+        "--page", type=Path, metavar="HTML", help="page to write: what was found, and how well"
     )
     add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
@@ -89,7 +107,8 @@ def run(args: argparse.Namespace) -> Answer:
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
     said, recording = ("", {}) if args.camera is None else _record(args)
-    m = _tracked(args, options).with_meta(**more)
+    detail: list[Any] = []
+    m = _tracked(args, options, detail).with_meta(**more)
     text, data = _summary(m)
     text, data = said + text, {**recording, **data}
     if args.overlay is not None:
@@ -98,6 +117,12 @@ def run(args: argparse.Namespace) -> Answer:
         overlay(args.file, m, args.overlay)
         text += f"\nwritten: {args.overlay}"
         data["overlay"] = args.overlay
+    if args.page is not None:
+        from udd.tracking import page
+
+        page(args.file, detail[0] if detail and not args.smooth else m, args.page, command=_command(args))
+        text += f"\nwritten: {args.page}"
+        data["page"] = args.page
     if args.out is not None:
         m.to_csv(args.out)
         return Answer(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
@@ -134,8 +159,39 @@ def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
     return f"{made}\nwritten: {made.path}\n", {"recording": {**told, "film": made.path}}
 
 
-def _tracked(args: argparse.Namespace, options: dict[str, Any]) -> Measurement:
-    m = tracked(args, args.disk_radius, **options)
+_SAID = (
+    *("disk_radius", "mark_distance", "fps", "pivot", "scale", "region", "calibrate", "bob", "length"),
+    "config",
+)
+
+
+def _command(args: argparse.Namespace) -> str:
+    """The command that makes the page again."""
+    words = ["udd", "track", args.file.name]
+    for name in _SAID:
+        value = getattr(args, name)
+        if value is not None:
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    words += ["--fast"] if args.fast else []
+    return shlex.join([*words, "--page", args.page.name])
+
+
+def _tracked(
+    args: argparse.Namespace, options: dict[str, Any], detail: list[Any] | None = None
+) -> Measurement:
+    """Track the film; what was found on the way comes into `detail`."""
+
+    def measure() -> Measurement:
+        from udd.tracking.run import Tracking, track_whole
+
+        found = track_whole(args.file, progress=watched(), disk_radius=args.disk_radius, **options)
+        if not isinstance(found, Tracking):
+            return found
+        if detail is not None:
+            detail.append(found)
+        return found.measurement
+
+    m = whole(args, measure)
     if not args.smooth:
         return m
     from udd.smoothing import smooth
@@ -150,8 +206,25 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         if len(place) != 2:
             raise UddError(f"--pivot must be two numbers U,V, not {args.pivot}")
         pivot = (place[0], place[1])
-    options = {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps}
+    options = {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps, "scale": args.scale}
+    if args.region is not None:
+        options["region"] = numbers([args.region], "--region")
+    if args.calibrate is not None:
+        options["calibrate"] = _calibrate(args.calibrate)
+    options |= {"bob": args.bob, "length": args.length}
     return {**options, "refine": False if args.fast else None, "config": args.config}
+
+
+def _calibrate(said: str) -> dict[str, Any]:
+    """From lens=off,readout=0.02."""
+    found: dict[str, Any] = {}
+    for part in said.split(","):
+        name, equals, value = (x.strip() for x in part.partition("="))
+        if not equals:
+            raise UddError(f"--calibrate must be like lens=off,readout=0.02, not {said}")
+        switch = {"on": True, "off": False}.get(value)
+        found[name] = numbers([value], f"--calibrate {name}")[0] if switch is None else switch
+    return found
 
 
 def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
@@ -167,8 +240,11 @@ def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
     }
     if m.sigma is not None:
         spread = np.nanmedian(m.sigma, axis=0)
-        y, z, beta = 1e3 * spread
-        text += f"; median standard errors {y:.2g} mm, {z:.2g} mm, {beta:.2g} mrad"
+        each = [
+            f"{1e3 * s:.2g} {'mm' if name in ('Y', 'Z') else 'mrad'}"
+            for name, s in zip(m.names, spread, strict=True)
+        ]
+        text += f"; median standard errors {', '.join(each)}"
         data["sigma_median"] = dict(zip(m.names, spread, strict=True))
     return text, data
 
@@ -180,6 +256,8 @@ def _folder(args: argparse.Namespace) -> Answer:
         raise UddError(f"{args.file}: there is no film in this folder")
     if args.overlay is not None:
         raise UddError("--overlay is for one film, not for a folder")
+    if args.page is not None:
+        raise UddError("--page is for one film, not for a folder")
     if args.out is None or (args.out.exists() and not args.out.is_dir()):
         raise UddError("say with --out in which folder the tables of the films are to be written")
     options = _options(args)
@@ -197,6 +275,9 @@ def _folder(args: argparse.Namespace) -> Answer:
         table = args.out / f"{film.stem}.csv"
         m.to_csv(table)
         text, data = _summary(m)
-        lines.append(f"{film.name}: {text}; drive {100 * float(m.meta['drive_seen']):.3f} cm/s")
+        drive = m.meta.get("drive_seen")
+        lines.append(
+            f"{film.name}: {text}" + (f"; drive {100 * drive:.3f} cm/s" if drive is not None else "")
+        )
         rows.append({"film": film.name, "file": table, **data})
     return Answer("\n".join(lines), {"films": rows, "failed": failed}, 1 if failed else 0)

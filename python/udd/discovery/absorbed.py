@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 from udd.fitting import Fit
 
-from .curves import Curve, score_groups
+from .curves import Curve, score_splines
 from .forcing import responses
 from .smoothing import Absorbed
 
@@ -18,7 +18,7 @@ _ABSORBED = 0.05  # a curve of which the free parameters leave no more is theirs
 
 def absorbed(curve: Curve, fit: Fit) -> Absorbed:
     """Which curves the fit's free parameters take up, all but a twentieth of their effect."""
-    (known,) = score_groups(responses(fit), [(curve.slot, curve.coordinates)], [curve.splines], known=True)
+    (known,) = score_splines(responses(fit), [curve.slot], curve.coordinates, curve.splines, known=True)
     k = len(known.information)
     full = known.information + 1e-9 * np.trace(known.information) / k * np.eye(k)
     share, vectors = eigh(curve.score.information, full)

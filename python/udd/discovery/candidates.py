@@ -40,8 +40,8 @@ class Candidate:
 
     @property
     def parameters(self) -> int:
-        """How many numbers a fit would find: the amplitudes and, where there is one, the frequency."""
-        return sum(p.role != "shape" for p in self.effect.spec.parameters)
+        """How many numbers a fit would find: the amplitudes, a frequency, and shapes of any value."""
+        return sum(p.sought for p in self.effect.spec.parameters)
 
     @property
     def amplitude_names(self) -> list[str]:

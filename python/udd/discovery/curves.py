@@ -16,6 +16,7 @@ from .coordinates import Coordinate, Slot, coordinates, slots
 from .forcing import Responses, Score, responses, score_forcings
 from .smoothing import Absorbed, chance, smooth
 from .splines import Spline, along, product, rough_product
+from .together import together
 
 Array = NDArray[np.float64]
 
@@ -202,26 +203,30 @@ def scan_curves(
 
 
 def _score(found: Responses, groups: Sequence[tuple[Slot, tuple[Coordinate, ...]]]) -> list[Curve]:
-    splines = [_splines(found, own) for _slot, own in groups]
-    scores = score_groups(found, groups, splines)
-    return [
-        _curve(found, slot, own, own_splines, score)
-        for (slot, own), own_splines, score in zip(groups, splines, scores, strict=True)
-    ]
+    """Every slot's curve over the same coordinates at once: what the splines are there is the same."""
+    over: dict[tuple[str, ...], tuple[tuple[Coordinate, ...], list[Slot]]] = {}
+    for slot, own in groups:
+        over.setdefault(tuple(c.name for c in own), (own, []))[1].append(slot)
+
+    def one(item: tuple[tuple[Coordinate, ...], list[Slot]]) -> list[Curve]:
+        own, slots = item
+        splines = _splines(found, own)
+        scores = score_splines(found, slots, own, splines)
+        return [_curve(found, slot, own, splines, score) for slot, score in zip(slots, scores, strict=True)]
+
+    return [curve for part in together(one, over.values()) for curve in part]
 
 
-def score_groups(
+def score_splines(
     found: Responses,
-    groups: Sequence[tuple[Slot, tuple[Coordinate, ...]]],
-    splines: Sequence[tuple[Spline, ...]],
+    slots: Sequence[Slot],
+    own: tuple[Coordinate, ...],
+    splines: tuple[Spline, ...],
     known: bool = False,
 ) -> list[Score]:
-    """Score the splines' coefficients of several curves, each curve as if it were alone."""
-    columns = (
-        found.columns(slot, *_designs(found, own, own_splines))
-        for (slot, own), own_splines in zip(groups, splines, strict=True)
-    )
-    return score_forcings(found.fit, list(columns), known)
+    """Score the splines' coefficients of a curve in each of several slots, each curve as if it were alone."""
+    designs = _designs(found, own, splines)
+    return score_forcings(found.fit, [found.columns(slot, *designs) for slot in slots], known)
 
 
 def refined(curve: Curve, fit: Fit) -> Curve:
@@ -233,14 +238,14 @@ def refined(curve: Curve, fit: Fit) -> Curve:
     finer = _splines(found, curve.coordinates)
     if len(finer) == 1:
         finer = (replace(finer[0], intervals=_FINER * finer[0].intervals),)
-    (score,) = score_groups(found, [(curve.slot, curve.coordinates)], [finer])
+    (score,) = score_splines(found, [curve.slot], curve.coordinates, finer)
     return _curve(found, curve.slot, curve.coordinates, finer, score)
 
 
 def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     """The curve from the score around another fit, whose model holds the curve with coefficients `at`."""
     found = responses(fit)
-    (score,) = score_groups(found, [(curve.slot, curve.coordinates)], [curve.splines])
+    (score,) = score_splines(found, [curve.slot], curve.coordinates, curve.splines)
     smoothed = smooth(score, curve.roughness, _observations(fit), at)
     moved = replace(score, gradient=score.gradient + score.information @ at)
     return replace(

@@ -156,7 +156,8 @@ def _describe(step: Step, final: Fit) -> list[Found]:
         result.append(
             Found(
                 effect=effect,
-                title=candidate.title,
+                # A candidate's title states the shape that it was tried with.
+                title=effect.title if effect.spec.shaped else candidate.title,
                 equation=effect.equation,
                 expression=effect.expression,
                 parameters=dict(effect.parameters),

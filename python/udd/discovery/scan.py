@@ -24,6 +24,7 @@ from .terms import waves
 _ABSORBED = 1e-4
 _ALIKE = 1e6  # condition of the information from which on candidates act alike
 _WAVES = 100  # scored at a time: what a long record takes in memory
+_LINES = 24  # of a scan over frequencies, looked at between them too
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,26 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
     return Scan(scored, gradient, information, columns, scatter)
 
 
-def scan_ripples(fit: Fit) -> list[Scored]:
-    """Score a drive ripple at every frequency that the record can tell apart; nothing for a pendulum.
+def strongest_ripple(fit: Fit) -> tuple[Scored | None, int]:
+    """The strongest drive ripple of all that the record can tell apart, and how many those are.
 
-    Of a user's own model, a wave in each equation.
+    They lie half a line apart. One that lies between two lines shows in both, with two fifths of its
+    strength: only beside the strongest lines all are looked at. Of a user's own model, the strongest wave in
+    any equation; nothing for a pendulum.
     """
     if isinstance(fit.model, OwnModel):
-        return _scan_waves(fit, fit.model)
+        found = _scan_waves(fit, fit.model)
+        return max(found, key=lambda s: s.chi2, default=None), len(found)
     candidates = ripples(fit.model, fit.record.t)
+    lines = scan_ripples(fit, candidates[::2])
+    best = sorted(range(len(lines)), key=lambda k: -lines[k].chi2)[:_LINES]
+    between = sorted({2 * k + side for k in best for side in (-1, 1)} & set(range(len(candidates))))
+    beside = scan_ripples(fit, [candidates[k] for k in between])
+    return max(lines + beside, key=lambda s: s.chi2, default=None), len(candidates)
+
+
+def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
+    """Score drive ripples."""
     if not candidates:
         return []
     frequencies = [c.effect.parameters["f"] for c in candidates]

@@ -26,7 +26,7 @@ from .heldout import (
 )
 from .located import fit_curve, fit_formula
 from .results import Alternative
-from .scan import Scan, Scored, physical, scan, scan_ripples
+from .scan import Scan, Scored, physical, scan, strongest_ripple
 from .together import together
 
 #: Chance that a record without any effect is said to have one, over all candidates together.
@@ -114,6 +114,13 @@ class Look:
         """The gain of the best explanation."""
         singles = [self.nats(s) for s in self.library.scored if s.physical]
         return max([c.evidence for c in self.curves] + singles, default=0.0)
+
+
+def _wider(look: Look) -> Look:
+    """With the surfaces over two coordinates."""
+    found = scan_curves(look.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
+    curves = sorted(look.curves + found.curves, key=lambda c: -c.evidence)
+    return replace(look, curves=curves, looks=look.looks + found.looks)
 
 
 def _price(fitted: Fit) -> float:
@@ -243,6 +250,16 @@ def _fitted(trials: list[Trial | None]) -> list[Trial]:
     return [t for t in trials if t]
 
 
+def _one_of_each(trials: list[Trial]) -> list[Trial]:
+    """The best of those that tried one effect with several values of a shape that a fit then found."""
+    found: dict[object, Trial] = {}
+    for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
+        effect = trial.candidates[0].effect
+        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
+        found.setdefault((effect.name, effect.momentum, *fixed), trial)
+    return [trial for trial in trials if trial in found.values()]
+
+
 def _states_first(curves: list[Curve]) -> list[Curve]:
     """The likeliest first, but curves over time, which take up anything slow, after those as likely."""
     late = 2 * NATS
@@ -306,8 +323,12 @@ class Search:
         states = [State(base, whole, before)]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            looks.append(self._look(states[-1].part))
-            found = self._addition(states[-1], looks[-1])
+            look = self._look(states[-1].part)
+            found = self._known(states[-1], look)
+            if found is None:
+                look = _wider(look)
+                found = self._located(states[-1], look)
+            looks.append(look)
             if found is None:
                 break
             accepted.append(found[0])
@@ -322,18 +343,20 @@ class Search:
         A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
         where it is held tightly. The scores with the stronger explanation count.
         """
-        found = []
-        for current in dict.fromkeys((fitted, loosened(fitted, _SCATTER))):
-            rippled = sorted(scan_ripples(current), key=lambda s: -s.chi2)
-            best = [s.candidate for s in rippled[:1]]
+
+        def look(current: Fit) -> Look:
+            ripple, frequencies = strongest_ripple(current)
+            best = [ripple.candidate] if ripple else []
             scanned = scan(current, [*library(current.model, self.given), *best])
-            curves = scan_curves(current, pairs=True)
-            looks = len(scanned.scored) + len(rippled) + curves.looks
-            found.append(Look(current, scanned, curves.curves, looks))
+            curves = scan_curves(current)
+            looks = len(scanned.scored) + frequencies + curves.looks
+            return Look(current, scanned, curves.curves, looks)
+
+        found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
         return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
 
-    def _addition(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best thing to add that passes: an effect of the library, some of them together, or a curve.
+    def _known(self, current: State, look: Look) -> tuple[Step, State] | None:
+        """The best addition of the library that passes: an effect, or some of them together.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
@@ -342,15 +365,17 @@ class Search:
         singles = self._singles(current, passing)
         if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             singles += self._rivals(current, look, max(look.nats(s) for s in passing))
-        faults = look.fit.faults
-        known = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
-        likely = _states_first(known)[:_CURVES]
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
             or self._group(current, look, 3)
-            or self._accept(current, self._curves(current, likely), look)
         )
+
+    def _located(self, current: State, look: Look) -> tuple[Step, State] | None:
+        """The best curve or surface that passes."""
+        faults = look.fit.faults
+        shown = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+        return self._accept(current, self._curves(current, _states_first(shown)[:_CURVES]), look)
 
     def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
         """Formulas that may explain the data as well as what the library has."""
@@ -378,7 +403,8 @@ class Search:
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
         best = passing[:_TRIED]
         self._trying([s.candidate.title for s in best])
-        return _fitted(together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best))
+        found = together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best)
+        return _one_of_each(_fitted(found))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
         """Several effects at once that pass only together."""
@@ -519,9 +545,9 @@ class Search:
                 likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
                 if likeness > _SUPERSET and other.parameters > mine.parameters:
                     continue  # the chosen form with something more that the data do not ask for
-                effect = other.effect.replace(
-                    **{p: trial.fit.parameters[f"{other.effect.name}.{p}"] for p in other.effect.amplitudes}
-                )
+                named = {p: f"{other.effect.name}.{p}" for p in other.effect.parameters}
+                fitted = trial.fit.parameters
+                effect = other.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
                 result.append(
                     Alternative(mine.effect.name, effect, other.title, other.effect.equation, nats, likeness)
                 )

@@ -48,6 +48,13 @@ class Parameter:
     role: str
     grid: tuple[float, ...]
 
+    @property
+    def sought(self) -> bool:
+        """Whether a fit that adds the effect finds it; not a shape that is one of a few whole numbers."""
+        if self.role == "shape":
+            return len(self.grid) > 1 and any(value % 1 for value in self.grid)
+        return True
+
     def check(self, effect: str, value: object, *, strict: bool) -> float:
         """The value as a float, within the range; amplitudes may leave it unless `strict`."""
         result = number(f"{self.name} of {effect}", value)
@@ -97,6 +104,11 @@ class Spec:
     momenta: tuple[str, ...]
     treatments: tuple[str, ...]
     parameters: tuple[Parameter, ...]
+
+    @property
+    def shaped(self) -> bool:
+        """Whether a fit that adds the effect finds a shape of it too."""
+        return any(p.sought and p.role == "shape" for p in self.parameters)
 
     def make(self, *, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
         """The effect with these parameter values; the others take their defaults.

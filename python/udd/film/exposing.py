@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from udd.film.defects import WOBBLE_PERIOD, Defects, lit, source_of_pixels
 from udd.film.light import Picture, to_code
 from udd.film.motion import Array, Motion
 from udd.film.scene import back_shapes, blurred, front_shapes, over, paint
-from udd.film.sprite import FINE, disk_sprite
+from udd.film.sprite import FINE, Patch, disk_sprite
 
 FOCUS = 0.6  # standard deviation of the lens's blur, pixels
 COARSE = 0.25  # pixels of the shadow's picture per pixel
@@ -25,14 +26,20 @@ class Scene:
     """Everything but the motion, drawn once; `expose` gives the picture of one frame."""
 
     def __init__(
-        self, camera: Camera, radius: float, background: Picture, support: float, defects: Defects
+        self,
+        camera: Camera,
+        radius: float,
+        background: Picture,
+        support: float,
+        defects: Defects,
+        patches: Sequence[Patch] | None = None,
     ) -> None:
         unit = radius / 0.08
         self.camera = camera
         self.radius = radius * camera.scale
         self.defects = defects
         offsets = np.asarray(defects.mark_offsets, dtype=np.float64) * camera.scale
-        self.sprite = disk_sprite(self.radius, FOCUS, offsets, defects.mark_strength)
+        self.sprite = disk_sprite(self.radius, FOCUS, offsets, defects.mark_strength, patches)
         back = paint(back_shapes(unit) if support > 0 else [], camera, FOCUS)
         front = paint(front_shapes(unit, support, defects.bars), camera, FOCUS)
         self.below = over(back, background)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,7 @@ from udd.film.motion import (
     then_falling,
 )
 from udd.film.scene import room
+from udd.film.sprite import Patch
 from udd.measurement import Measurement
 
 # Farther off than this between the samples, a mark would be seen in the wrong place.
@@ -89,6 +91,7 @@ def render(
     quality: float = 20.0,
     codec: str = "h264",
     defects: Defects | None = None,
+    layout: Sequence[Mapping[str, Any]] | None = None,
     seed: int = 0,
     progress: bool = False,
 ) -> Film:
@@ -137,6 +140,9 @@ def render(
     defects : udd.film.Defects, optional
         What goes wrong: clutter, cross-bars, a camera that stands aside, a rolling shutter, uneven light,
         marks glued off their places, frames dropped, and so on; by default nothing.
+    layout : sequence of mappings, optional
+        Square marks instead of the four: ``{"at": [y, z], "colour": "red"}`` or ``{"at": [y, z], "tag":
+        "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given); sides upright at beta = 0.
     seed : int
         Seed of the noise. The same call gives the same film.
     progress : bool
@@ -189,7 +195,7 @@ def render(
     wall = _background(background, camera, radius)
     if defects.clutter:
         wall = hung(wall, camera, defects.clutter, radius / 0.08)
-    scene = Scene(camera, radius, wall, support, defects)
+    scene = Scene(camera, radius, wall, support, defects, _patches(layout, radius))
     write_film(
         target,
         _frames(scene, motion, t[0] + stamps, numbers, defects, Noise(noise, seed), progress),
@@ -229,6 +235,27 @@ def _frames(
         if number not in defects.repeated or last is None:
             last = noise.on(scene.expose(motion, float(times[number])))
         yield np.zeros_like(last) if number in defects.black else last
+
+
+def _patches(layout: Sequence[Mapping[str, Any]] | None, radius: float) -> list[Patch] | None:
+    """The marks of a layout as patches in units of the disk's radius."""
+    if layout is None:
+        return None
+    from udd.tracking.layout import read_layout
+    from udd.tracking.tags import cells_of, is_tags, read_tags
+
+    side = radius / 5
+    plain = [{key: value for key, value in mark.items() if key != "side"} for mark in layout]
+    if is_tags(layout):
+        tags = read_tags(layout)
+        return [
+            Patch((t.at.real / radius, -t.at.imag / radius), t.side / radius, tag=cells_of(t)) for t in tags
+        ]
+    marks = read_layout(plain)
+    return [
+        Patch((at.real / radius, -at.imag / radius), float(said.get("side", side)) / radius, colour)
+        for at, colour, said in zip(marks.places, marks.colours, layout, strict=True)
+    ]
 
 
 def _background(background: ArrayLike | None, camera: Camera, radius: float) -> Picture:

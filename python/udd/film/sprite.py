@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from udd.film.light import Picture, to_light
 FINE = 2  # sprite pixels per picture pixel
 DISK = (232, 230, 222)
 # Clockwise from the red mark, which sits at the angle beta.
+INK = (24, 24, 26)  # of a printed tag
 MARKS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
 # In units of the disk's radius: 65 mm and 16 mm for R = 80 mm.
 MARK_CENTRE, MARK_SIDE = 65 / 80, 16 / 80
@@ -23,11 +25,12 @@ def disk_sprite(
     focus: float,
     offsets: NDArray[np.float64] | None = None,
     strength: Sequence[float] = (1.0,) * 4,
+    patches: Sequence[Patch] | None = None,
 ) -> Picture:
     """Draw the disk of `radius` picture pixels, (n, n, 4): light times cover in red, green, blue, and cover.
 
     The marks are `offsets` (4, 2) picture pixels off their places, clockwise and outward, and their colours
-    are mixed with the disk's by `strength`.
+    are mixed with the disk's by `strength`. `patches`, in units of the radius, take the place of all four.
 
     n is odd, so the disk's centre lies on the middle pixel. Edges are drawn from the exact distance to them,
     then blurred by `focus` (picture pixels), so that no place and no angle is favoured.
@@ -40,7 +43,9 @@ def disk_sprite(
     x, y = v[None, :], v[:, None]
     disk = np.clip(r - np.hypot(x, y) + 0.5, 0.0, 1.0)
     light = np.broadcast_to(to_light(DISK), (v.size, v.size, 3)).astype(np.float64)
-    for quarter, colour in enumerate(MARKS):
+    for patch in patches or ():
+        _stick(light, x / r, y / r, patch)
+    for quarter, colour in enumerate(MARKS if patches is None else ()):
         angle = quarter * math.pi / 2
         aside, out = (0.0, 0.0) if offsets is None else (float(v) * FINE for v in offsets[quarter])
         sine, cosine = round(math.sin(angle)), round(math.cos(angle))
@@ -51,6 +56,32 @@ def disk_sprite(
         light += float(strength[quarter]) * mark[..., None] * (to_light(colour) - light)
     sprite = np.concatenate([light * disk[..., None], disk[..., None]], axis=-1).astype(np.float32)
     return blurred(sprite, focus * FINE)
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A square stuck on the disk, its sides upright at beta = 0: of one colour, or a printed tag.
+
+    `at` is its centre (right, up) and `side` its side in units of the disk's radius.
+    """
+
+    at: tuple[float, float]
+    side: float
+    colour: tuple[int, int, int] = (0, 0, 0)
+    tag: NDArray[np.uint8] | None = None  # cells of a tag, 0 or 255
+
+
+def _stick(light: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64], patch: Patch) -> None:
+    """Draw a patch into the light of a sprite; x to the right and y down, in radii."""
+    pixel = float(x[0, 1] - x[0, 0])
+    cells = np.zeros((1, 1), np.uint8) if patch.tag is None else patch.tag
+    step = patch.side / len(cells)
+    left, top = patch.at[0] - patch.side / 2, -patch.at[1] - patch.side / 2
+    for row, column in np.ndindex(cells.shape):
+        across = _band(x / pixel, (left + (column + 0.5) * step) / pixel, step / pixel)
+        cover = across * _band(y / pixel, (top + (row + 0.5) * step) / pixel, step / pixel)
+        colour = to_light(patch.colour if patch.tag is None else INK if cells[row, column] == 0 else DISK)
+        light += cover[..., None] * (colour - np.broadcast_to(to_light(DISK), 3))
 
 
 def _band(v: NDArray[np.float64], centre: float, width: float) -> NDArray[np.float64]:

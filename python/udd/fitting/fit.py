@@ -154,7 +154,7 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
     The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
-    line.
+    line; a shape that may have any value is, once the rest has been found, within a factor of some two.
 
     Parameters
     ----------
@@ -170,12 +170,18 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     order = list(problem.models[0].parameters)
     names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
     line = 0.5 / float(np.ptp(fitted.record.t))
-    scanned = [(e, p.name) for e in effects for p in e.spec.parameters if p.role == "frequency"]
-    waves = [(f"{e.name}.{name}", e.parameters[name]) for e, name in scanned]
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
+    own = [(e, p) for e in effects for p in e.spec.parameters if p.sought]
+    waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "frequency"]
+    shapes = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "shape"]
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
     problem = replace(problem, free=problem.free + more)
-    return tighten(fitted.measurements, problem, point, problem.schedule[1:])
+    found = tighten(fitted.measurements, problem, point, problem.schedule[1:])
+    if not shapes:
+        return found
+    more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
+    problem = replace(problem, free=problem.free + more)
+    return tighten(fitted.measurements, problem, found.point, problem.schedule[found.level :])
 
 
 def refit(fitted: Fit) -> Fit:

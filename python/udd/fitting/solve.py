@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
-from udd.errors import FitError
+from udd.errors import FitError, ModelError
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -45,10 +45,13 @@ def solve(
     record = problem.record
     names = [f.name for f in problem.free]
     end = Point(found["states"], tuple(found["sets"]))
-    models = tuple(
-        model.with_parameters(dict(zip(model.parameters, values, strict=True)))
-        for model, (values, _camera, _clock) in zip(problem.models, end.sets, strict=True)
-    )
+    try:
+        models = tuple(
+            model.with_parameters(dict(zip(model.parameters, values, strict=True)))
+            for model, (values, _camera, _clock) in zip(problem.models, end.sets, strict=True)
+        )
+    except ModelError as error:  # a shape left its range
+        raise FitError(f"the fit went where the model has no meaning: {error}") from error
     seen = record.observed
     # Every state but a run's first is tied to the one before: what remains are the frames' misfits.
     runs = 1 + int((~record.linked).sum())

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .table import ANGLES, DISK, PENDULUM, Measurement, MeasurementError, check_length
+from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, MeasurementError, check_length
 
 ALIASES = {
     "time": "t",
@@ -283,9 +283,24 @@ def _measurement(
     if have & set(pairs):
         rho = np.column_stack([need(name) for name in pairs])
     meta = {"source": path.name} | extra | table.meta | meta
-    m = _located(table, lambda: Measurement(t, values, sigma, rho, flag, meta, names))
+    quality = _quality(table, names) if "px_per_m" in meta else {}
+    m = _located(table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality))
     check_length(m)
     return m
+
+
+def _quality(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """What a tracked film's file says of each frame; in anybody else's the names may mean anything."""
+    found: dict[str, NDArray[Any]] = {}
+    for name in (n for n in QUALITY if n in table.names and n not in names):
+        if name == "method":
+            k = table.names.index(name)
+            found[name] = np.array([row[k] if k < len(row) else "" for row in table.rows], dtype=np.str_)
+        else:
+            found[name] = _column(table, name)
+            if name == "marks" and np.isfinite(found[name]).all():
+                found[name] = found[name].astype(np.int64)
+    return found
 
 
 _WANTED = {"t", "x", "y", "flag", *DISK, *PENDULUM}

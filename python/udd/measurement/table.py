@@ -16,6 +16,8 @@ from udd.errors import UddError
 DISK = ("Y", "Z", "beta")
 PENDULUM = ("theta",)
 ANGLES = ("beta", "theta")
+QUALITY = ("marks", "complete", "residual_px", "blur_px", "method")  # what a tracked film says of each frame
+USABLE = ("gap", "degraded")  # flags of frames that hold what they show all the same
 SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
 
 
@@ -40,11 +42,16 @@ class Measurement:
     rho : array_like, shape (n, m (m - 1) / 2), optional
         Correlations of the errors, in the order of `pairs`.
     flag : sequence of str, optional
-        Why a frame is not usable; the empty string is a good frame.
+        Why a frame is not usable; the empty string is a good frame. One that begins with ``gap`` (frames are
+        missing before this one) or ``degraded`` is a remark: the row counts, with its standard errors.
     meta : mapping, optional
         What else is known: ``R`` [m], ``W`` [m/s], ``source``, ``fps``, ...
     names : tuple of str, optional
         Column names; found from the number of columns if not given.
+    quality : mapping, optional
+        What is known of how each row came about, by name (n,): of a tracked film ``marks`` (number seen),
+        ``complete`` (share of the marks' edges in view), ``residual_px`` (r.m.s. misfit of the marks),
+        ``blur_px`` (length of the streaks) and ``method`` ("refined", "fast" or "none").
 
     Raises
     ------
@@ -67,6 +74,7 @@ class Measurement:
     flag: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, dtype=np.str_))
     meta: Mapping[str, Any] = field(default_factory=dict)
     names: tuple[str, ...] = ()
+    quality: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def __init__(
         self,
@@ -77,6 +85,7 @@ class Measurement:
         flag: ArrayLike | None = None,
         meta: Mapping[str, Any] | None = None,
         names: tuple[str, ...] = (),
+        quality: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         times = np.array(t, dtype=np.float64)
         if isinstance(values, Mapping):
@@ -102,6 +111,10 @@ class Measurement:
         put(self, "flag", flags)
         put(self, "meta", dict(meta or {}))
         put(self, "names", names)
+        known = {name: np.array(column) for name, column in (quality or {}).items()}
+        put(self, "quality", known)
+        if (odd := next((name for name, column in known.items() if column.shape != (n,)), None)) is not None:
+            raise MeasurementError(f"{odd} has shape {known[odd].shape}, expected {(n,)}")
         if times.shape != (n,) or flags.shape != (n,) or m != len(names):
             raise MeasurementError(f"t, values and flag have different lengths: {times.shape}, {table.shape}")
         if self.sigma is not None and self.sigma.shape != (n, m):
@@ -109,7 +122,7 @@ class Measurement:
         if self.rho is not None and self.rho.shape != (n, len(self.pairs)):
             raise MeasurementError(f"rho has shape {self.rho.shape}, expected {(n, len(self.pairs))}")
         check(self, lambda i: f"row {i}")
-        for array in (times, table, self.sigma, self.rho, flags):
+        for array in (times, table, self.sigma, self.rho, flags, *known.values()):
             if array is not None:
                 array.setflags(write=False)
 
@@ -125,8 +138,8 @@ class Measurement:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Usable rows, shape (n,): every coordinate is there and the flag is empty."""
-        return np.asarray(np.isfinite(self.values).all(axis=1) & (self.flag == ""))
+        """Usable rows, shape (n,): every coordinate is there and the flag is empty or a mere remark."""
+        return np.asarray(np.isfinite(self.values).all(axis=1) & usable(self.flag))
 
     @property
     def duration(self) -> float:
@@ -136,8 +149,10 @@ class Measurement:
     def __len__(self) -> int:
         return len(self.t)
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """A column by name, or a standard error as ``sigma_<name>``."""
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A column by name (of `quality` too), or a standard error as ``sigma_<name>``."""
+        if name in self.quality and name not in self.names:
+            return self.quality[name]
         table, column = self.values, name
         if name.startswith("sigma_") and self.sigma is not None:
             table, column = self.sigma, name.removeprefix("sigma_")
@@ -177,6 +192,7 @@ class Measurement:
             self.flag[pick],
             self.meta,
             self.names,
+            {name: column[pick] for name, column in self.quality.items()},
         )
 
     def with_meta(self, **changes: Any) -> Measurement:
@@ -197,6 +213,11 @@ class Measurement:
         from .write import to_parquet
 
         to_parquet(self, path)
+
+
+def usable(flag: NDArray[np.str_]) -> NDArray[np.bool_]:
+    """Whether each flag is empty, or says something of a row that counts all the same."""
+    return np.asarray([not said or said.startswith(USABLE) for said in flag.tolist()], dtype=bool)
 
 
 def _columns(values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]) -> NDArray[np.float64]:
@@ -241,8 +262,8 @@ def check(m: Measurement, where: Any) -> None:
 
 def check_length(m: Measurement) -> None:
     """Refuse a record with fewer usable rows than a fit has unknowns."""
-    usable = int(m.seen.sum())
-    if usable == 0:
+    count = int(m.seen.sum())
+    if count == 0:
         raise MeasurementError(f"no usable row: {', '.join(m.names)} are empty, NaN or flagged throughout")
-    if usable < SHORTEST:
-        raise MeasurementError(f"too short: {usable} usable rows, at least {SHORTEST} are needed")
+    if count < SHORTEST:
+        raise MeasurementError(f"too short: {count} usable rows, at least {SHORTEST} are needed")

@@ -22,11 +22,14 @@ def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:
     table = numbers(m)
     flagged = bool((m.flag != "").any())
 
+    words = {name: column.tolist() for name, column in m.quality.items() if column.dtype.kind not in "iuf"}
+
     lines = [f"# {key} = {_text(key, value)}" for key, value in m.meta.items()]
-    lines.append(",".join([*table, *(["flag"] if flagged else [])]))
+    lines.append(",".join([*table, *words, *(["flag"] if flagged else [])]))
     for i, row in enumerate(zip(*(column.tolist() for column in table.values()), strict=True)):
         # repr: the shortest text that reads back exactly
         cells = ["" if math.isnan(x) else repr(x) for x in row]
+        cells += [_cell(str(column[i])) for column in words.values()]
         if flagged:
             cells.append(_cell(str(m.flag[i])))
         lines.append(",".join(cells))
@@ -40,6 +43,7 @@ def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
     except ImportError:
         raise MeasurementError("Parquet files need the package pyarrow (pip install pyarrow)") from None
     columns: dict[str, Any] = dict(numbers(m))
+    columns |= {name: column.tolist() for name, column in m.quality.items() if column.dtype.kind not in "iuf"}
     columns["flag"] = [str(x) for x in m.flag]
     schema = {key: _text(key, value) for key, value in m.meta.items()}
     buffer = io.BytesIO()
@@ -47,13 +51,14 @@ def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
     write_whole(path, buffer.getvalue())
 
 
-def numbers(m: Measurement) -> dict[str, NDArray[np.float64]]:
+def numbers(m: Measurement) -> dict[str, NDArray[Any]]:
     """The numeric columns of the file, by name and in order."""
     table = {"t": m.t} | {name: m.values[:, k] for k, name in enumerate(m.names)}
     if m.sigma is not None:
         table |= {f"sigma_{name}": m.sigma[:, k] for k, name in enumerate(m.names)}
     if m.rho is not None:
         table |= {f"rho_{a}{b}": m.rho[:, k] for k, (a, b) in enumerate(m.pairs)}
+    table |= {name: column for name, column in m.quality.items() if column.dtype.kind in "iuf"}
     return table
 
 

@@ -72,14 +72,14 @@ def write(
         innovations=surprises,
         numbers=words.headline(discovery),
         command=command or words.command(discovery, None if origin is None else Path(origin).name),
-        version=_version("udd"),
-        versions=_versions(),
-        source=_identity(origin),
+        version=version_of("udd"),
+        versions=versions()[1],
+        source=identity(origin),
     )
     write_whole(target, page.encode())
 
 
-def _identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
+def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
     """A file's name and SHA-256."""
     if path is None:
         return None
@@ -90,16 +90,19 @@ def _identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
         raise UddError(f"{path} cannot be read: {error.strerror}") from None
 
 
-def _version(name: str) -> str:
+def version_of(name: str) -> str:
+    """A package's version."""
     try:
         return version(name)
     except PackageNotFoundError:
         return "(of unknown version)"
 
 
-def _versions() -> str:
-    """What the numbers may depend on."""
+def versions() -> tuple[str, str]:
+    """The version of udd, and in words all that the numbers may depend on."""
     import platform
 
-    packages = ", ".join(f"{name} {_version(name)}" for name in ("udd", "numpy", "scipy"))
-    return f"{packages}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+    packages = ", ".join(f"{name} {version_of(name)}" for name in ("udd", "numpy", "scipy"))
+    return version_of(
+        "udd"
+    ), f"{packages}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"

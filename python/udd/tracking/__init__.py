@@ -6,6 +6,7 @@ from .camera import Recording, record
 from .decode import Film, TrackError
 from .glimpse import Glimpse
 from .overlay import overlay
+from .page import page
 from .result import Pixels, pixels
 from .run import Tracking, pictures_at, pictures_between, track, track_in_detail
 
@@ -17,6 +18,7 @@ __all__ = [
     "TrackError",
     "Tracking",
     "overlay",
+    "page",
     "pictures_at",
     "pictures_between",
     "pixels",

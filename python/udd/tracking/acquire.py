@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture
-from .find import COLOURS, Blobs, blobs
+from .find import Blobs, blobs
 from .look import Look, Pose
 
+SAME = 0.985  # cosine between two colours' directions above which they are one
 NEAR = 0.22  # of the marks' reach: how far a blob may lie from the mark it stands for
 
 
 def colours_of(
     pictures: list[Picture], poses: list[Pose], look: Look, view: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Colour differences (U, V) of the four marks' middles, shape (4, 2), from frames whose pose is known."""
-    out = np.full((4, 2), np.nan)
+    """Colour differences (U, V) of the marks' middles, shape (n, 2), from frames whose pose is known."""
+    out = np.full((len(look.marks), 2), np.nan)
     for k, mark in enumerate(look.marks):
         samples = []
         for picture, pose in zip(pictures, poses, strict=True):
@@ -48,8 +49,8 @@ def classify(
     # a streak is a pale version of its mark: same hue, down to a fifth of the strength
     strong = (size > np.maximum(0.2 * strength[best], 9.0)) & (size > 0.9 * np.hypot(u, v)) & open_
     out = []
-    for k in range(len(COLOURS)):
-        b = blobs(strong & (best == k), least=4, most=8)
+    for alike in (unit @ unit.T > SAME) | np.eye(len(unit), dtype=bool):
+        b = blobs(strong & alike[best], least=4, most=8)
         out.append(Blobs(b.centre + 2 * (c0 + 1j * r0), b.area))
     return out
 
@@ -62,9 +63,9 @@ def candidates(patches: list[Blobs], look: Look, guess: Pose | None) -> list[Pos
     """
     patches = [Blobs(look.lens.plane(p.centre), p.area) for p in patches]
     places = np.array([m.place for m in look.marks])
-    reach = float(abs(places[0]))
+    reach = look.reach
     found: list[tuple[float, Pose]] = []
-    for i, j in combinations(range(4), 2):
+    for i, j in combinations(range(len(places)), 2):
         arm = places[j] - places[i]
         for a in patches[i].centre:
             for b in patches[j].centre:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
 import time
 import warnings
 from collections.abc import Iterator
@@ -122,6 +124,9 @@ def record(
     presentation, and a lost frame is a gap in them; `udd.track` reads them. The camera's clock tells when
     a frame was taken; the computer's when it arrived, later by a delay that wavers by some milliseconds.
 
+    Ctrl-C ends the recording: the film holds what was recorded until then. A second Ctrl-C, or one before the
+    tenth frame, leaves no film and raises ``KeyboardInterrupt``.
+
     Examples
     --------
     >>> import udd
@@ -134,11 +139,14 @@ def record(
     seconds = number("seconds", seconds, above=0.0)
     require_video()
     source, name = _opened(camera)
+    by_hand = Stop()
     try:
-        shots = _Shots(source, name, seconds, progress)
+        shots = _Shots(source, name, seconds, progress, by_hand)
         stream = iter(shots)
         start = list(islice(stream, FEWEST))
         if len(start) < FEWEST:
+            if by_hand.asked:
+                raise KeyboardInterrupt
             raise TrackError(f"{name} gave {len(start)} frames, at least {FEWEST} are needed")
         height, width = (side // 2 * 2 for side in start[0][1].shape[:2])  # colour is stored for 2 x 2 pixels
         first, second = tee(chain(start, stream))
@@ -146,9 +154,10 @@ def record(
         pictures = (np.ascontiguousarray(bgr[:height, :width, ::-1]) for _, bgr in second)
         write_film(target, pictures, (width, height), Fraction(RATE), QUALITY, numbers=times, ticks=TICKS)
     finally:
+        by_hand.end()
         source.release()
     made = Recording(target, np.array(shots.t) - shots.t[0], shots.clock)
-    if made.t[-1] < seconds - max(1.0, 2 * LATE * made.interval):
+    if not by_hand.asked and made.t[-1] < seconds - max(1.0, 2 * LATE * made.interval):
         warnings.warn(f"{name} stopped after {made.t[-1]:.1f} of {seconds:g} s", stacklevel=2)
     return made
 
@@ -171,10 +180,31 @@ def _opened(camera: int | Source) -> tuple[Source, str]:
     return source, name
 
 
+class Stop:
+    """Ctrl-C as a wish: the first ends the recording with the film whole, a second one ends all."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.before: Any = None
+        if threading.current_thread() is threading.main_thread():
+            self.before = signal.signal(signal.SIGINT, self._ask)
+
+    def _ask(self, *_: object) -> None:
+        self.asked = True
+        self.end()
+
+    def end(self) -> None:
+        """Ctrl-C means again what it meant before."""
+        if self.before is not None:
+            signal.signal(signal.SIGINT, self.before)
+            self.before = None
+
+
 class _Shots:
     """Frames of a camera with their times, until the time is over or the camera stops."""
 
-    def __init__(self, source: Source, name: str, seconds: float, progress: bool) -> None:
+    def __init__(self, source: Source, name: str, seconds: float, progress: bool, by_hand: Stop) -> None:
+        self.by_hand = by_hand
         self.source, self.name, self.seconds, self.progress = source, name, seconds, progress
         self.t: list[float] = []
         self.clock = "camera"
@@ -191,7 +221,7 @@ class _Shots:
                 t = own if self.clock == "camera" else arrived
                 if self.t and t - self.t[-1] < 1 / (RATE * TICKS):
                     continue  # a time that stands still shows no new instant
-                if self.t and t - self.t[0] > self.seconds:
+                if self.by_hand.asked or (self.t and t - self.t[0] > self.seconds):
                     return
                 bar.update(t - self.t[-1] if self.t else 0.0)
                 self.t.append(t)

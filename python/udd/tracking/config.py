@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from .decode import TrackError
+from .layout import read_bob, read_layout
+from .setup import read_calibrate, read_region
+from .tags import is_tags, read_tags
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
 
@@ -21,7 +24,9 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     ----------
     config : path or mapping
         A TOML file, or what would stand in one: ``disk_radius``, ``mark_distance`` [m], ``fps`` [1/s],
-        ``pivot`` (two numbers [pixels]), ``refine`` (true or false).
+        ``pivot`` (two numbers [pixels]), ``refine`` (true or false), ``scale`` [pixels per metre],
+        ``region`` (four numbers [pixels]), ``layout`` (a list of marks, each with ``at`` and ``colour``),
+        ``calibrate`` (a table of what is to be found in the film), ``bob`` (a colour), ``length`` [m].
     **given
         The same by name; None is not given.
 
@@ -43,6 +48,8 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
         kind, read = _KINDS[key]
         try:
             found[key] = read(value)
+        except TrackError as error:
+            raise TrackError(f"{where}: {error}") from None
         except (TypeError, ValueError, OverflowError):
             raise TrackError(f"{where}: {key} must be {kind}, not {value!r}") from None
     return {**found, **{key: value for key, value in given.items() if value is not None}}
@@ -82,10 +89,25 @@ def _switch(value: Any) -> bool:
     return value
 
 
+def _bob(value: Any) -> Any:
+    read_bob(value)
+    return value
+
+
+def _layout(value: Any) -> Any:
+    return read_tags(value) if is_tags(value) else read_layout(value)
+
+
 _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "disk_radius": ("a positive number of metres", _positive),
     "mark_distance": ("a positive number of metres", _positive),
     "fps": ("a positive number of frames per second", _positive),
     "pivot": ("two numbers of pixels [u, v]", _place),
     "refine": ("true or false", _switch),
+    "scale": ("a positive number of pixels per metre", _positive),
+    "region": ("four numbers of pixels [u0, v0, u1, v1]", read_region),
+    "layout": ("a list of marks", _layout),
+    "calibrate": ("a table", read_calibrate),
+    "bob": ("the colour of a pendulum's bob", _bob),
+    "length": ("a positive number of metres", _positive),
 }

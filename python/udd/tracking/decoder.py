@@ -145,7 +145,7 @@ def pictures(
     origin = stream.start_time or 0
     if since > 0 and stream.time_base:
         container.seek(origin + int(since / stream.time_base), stream=stream)
-    packets = container.demux(stream)
+    packets, fields = container.demux(stream), Fields(stream)
     while row < MOST_BROKEN:
         try:
             packet = next(packets)
@@ -156,7 +156,7 @@ def pictures(
         except av.error.FFmpegError:
             broken[0], row, damaged = broken[0] + 1, row + 1, True
             continue
-        for frame in frames:
+        for frame in fields(frames):
             wrong = bool(frame.is_corrupt or packet.is_corrupt)
             # frames are coded as changes: after a broken one all are wrong up to the next whole one
             damaged = wrong or (damaged and not frame.key_frame)
@@ -170,6 +170,39 @@ def pictures(
             broken[0] += wrong
             yield index, t, frame, damaged
             index, last = index + 1, t
+
+
+class Fields:
+    """Frames as they are; of interlaced ones each half by itself, its missing rows filled in by bwdif.
+
+    The rows of such a frame are of two instants, half a frame apart: a moving disk is a comb.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self.graph: Any = None
+
+    def __call__(self, frames: list[Any]) -> Iterator[Any]:
+        """What a packet held, in order; the last half frame of a film is left in the filter."""
+        import av
+
+        for frame in frames:
+            if self.graph is None and not frame.interlaced_frame:
+                yield frame
+                continue
+            if self.graph is None:
+                self.graph = av.filter.Graph()
+                source = self.graph.add_buffer(template=self.stream)
+                halves = self.graph.add("bwdif", "mode=send_field:parity=auto:deint=interlaced")
+                source.link_to(halves)
+                halves.link_to(self.graph.add("buffersink"))
+                self.graph.configure()
+            self.graph.push(frame)
+            while True:
+                try:
+                    yield self.graph.pull()
+                except (av.error.BlockingIOError, av.error.EOFError):
+                    break
 
 
 if __name__ == "__main__":

@@ -27,18 +27,23 @@ class Outline:
     points: int
 
 
-def outline(frames: Sequence[tuple[Picture, Pose, Motion]], look: Look, view: NDArray[np.bool_]) -> Outline:
+def outline(
+    frames: Sequence[tuple[Picture, Pose, Motion]],
+    look: Look,
+    view: NDArray[np.bool_],
+    span: tuple[float, float] = SPAN,
+) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
     Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
-    averages it out of the centre.
+    averages it out of the centre. The rim is looked for within `span` of the marks' reach.
     """
     angles = np.arange(RAYS) * (2 * np.pi / RAYS)
     rays = np.exp(1j * angles)
     points, group = [], []
     for number, (picture, pose, motion) in enumerate(frames):
-        late = _late(pose.centre + sum(SPAN) / 2 * abs(look.marks[0].place) * rays, look, picture.y.shape[0])
-        r = _rim(picture.y, view, np.asarray(pose.centre + motion.rate * late), rays, look)
+        late = _late(pose.centre + sum(span) / 2 * look.reach * rays, look, picture.y.shape[0])
+        r = _rim(picture.y, view, np.asarray(pose.centre + motion.rate * late), rays, look, span)
         ok = np.isfinite(r)
         turn = pose.angle + motion.spin * late[ok]
         points.append(r[ok] * rays[ok] * np.exp(-1j * turn))
@@ -84,12 +89,13 @@ def _rim(
     centre: NDArray[np.complex128],
     rays: NDArray[np.complex128],
     look: Look,
+    span: tuple[float, float],
 ) -> NDArray[np.float64]:
     """Radius of the half-height crossing along each ray from its centre [pixels], NaN where none is clear."""
     import cv2
 
-    step, reach = 0.5, abs(look.marks[0].place)
-    radii = np.arange(SPAN[0] * reach, SPAN[1] * reach, step)
+    step, reach = 0.5, look.reach
+    radii = np.arange(span[0] * reach, span[1] * reach, step)
     at = look.lens.picture(centre[:, None] + radii[None, :] * rays[:, None])
     map_u, map_v = at.real.astype(np.float32), at.imag.astype(np.float32)
     light = cv2.LUT(y, look.light.astype(np.float32))

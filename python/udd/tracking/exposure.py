@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,30 +20,48 @@ MOST = 36  # frames from which it is measured again
 ROUNDS = 5
 SMALL = 0.02  # relative change over which slopes are taken
 WORSE = 5.0  # times the least misfit
+PARABOLA = 0.2  # of the step between shares, to which its vertex is good
 STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
 
 
-def exposure(moving: Sequence[Moving], look: Look, view: NDArray[np.bool_]) -> float:
-    """Exposure time [s]: what explains the fastest survey frames best; 0 if none is fast."""
-    reach = abs(look.marks[0].place)
+@dataclass(frozen=True)
+class Exposure:
+    """Exposure time and its standard error [s], from leaving out frames in turn and from the steps tried."""
+
+    value: float
+    sigma: float
+
+
+def exposure(moving: Sequence[Moving], look: Look, view: NDArray[np.bool_]) -> Exposure:
+    """Exposure time: what explains the fastest survey frames best; 0 if none is fast."""
+    reach = look.reach
     paths = [abs(m.rate) * m.interval + abs(m.turning) * m.interval * reach for m in moving]
     order = np.argsort(-np.array(paths), kind="stable")[:FASTEST]
     fast = [moving[k] for k in order if paths[k] > STREAK]
     if not fast:
-        return 0.0
-    cost = np.zeros(len(SHARES))
+        return Exposure(0.0, np.inf)
+    costs = []
     for m in fast:
         each = np.array([_misfit(m, share, look, view) for share in SHARES])
         if np.isfinite(each).any():
-            cost += np.minimum(each / each.min(), WORSE)  # one frame never outvotes the others
-    if not cost.any():
-        return 0.0
+            costs.append(np.minimum(each / each.min(), WORSE))  # one frame never outvotes the others
+    if not costs:
+        return Exposure(0.0, np.inf)
+    cost = np.sum(costs, axis=0)
+    interval, n = float(np.median([m.interval for m in fast])), len(costs)
+    others = np.array([_best(cost - one) for one in costs])  # delete-one jackknife
+    sigma = float(np.sqrt((n - 1) * others.var())) if n > 1 else np.inf
+    return Exposure(_best(cost) * interval, float(np.hypot(sigma, PARABOLA * SHARES[1])) * interval)
+
+
+def _best(cost: NDArray[np.float64]) -> float:
+    """Share of the interval at which the cost is least."""
     k = int(np.argmin(cost))
     best = float(SHARES[k])
     if 0 < k < len(SHARES) - 1:  # the vertex of the parabola through the lowest three
         a, b, c = cost[k - 1 : k + 2]
         best += float(0.5 * (a - c) / (a - 2 * b + c) * SHARES[1])
-    return best * float(np.median([m.interval for m in fast]))
+    return best
 
 
 def again(

@@ -149,7 +149,7 @@ def sightings(pictures: list[Picture]) -> tuple[list[Sight | None], int | None]:
     for chroma in (LEAST_CHROMA, FADED):
         patches = [coloured(p, chroma) for p in pictures]
         for without in (None, 0, 1, 2, 3):
-            sights = _agreeing([squares(p, without) for p in patches])
+            sights = agreeing([squares(p, without) for p in patches])
             if _count(sights) > (1 if without is None else 2) * max(_count(best[0]), FEWEST - 1):
                 best = sights, without
             if _count(best[0]) >= max(FEWEST, len(pictures) // 10):
@@ -161,7 +161,7 @@ def _count(sights: list[Sight | None]) -> int:
     return sum(s is not None for s in sights)
 
 
-def _agreeing(everything: list[list[tuple[float, Sight]]]) -> list[Sight | None]:
+def agreeing(everything: list[list[tuple[float, Sight]]]) -> list[Sight | None]:
     """One sight a picture, of the size that most agree on: the camera stands still."""
     reaches = np.array([s.reach for found in everything for _, s in found[:20]])
     weight = np.array([1 / (0.01 + misfit) for found in everything for misfit, _ in found[:20]])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture, Plane
-from .find import BODY, Sight
+from .find import Sight
 from .look import Look, Mark, Motion, Pose
 from .marks import MISFIT, Sighting, beyond_place, coverage, seen_at
 from .pose import align
@@ -29,25 +29,36 @@ Seen = tuple[Pose, Motion, list[Sighting | None]]
 
 
 def first_look(
-    seen: Sequence[tuple[Picture, Sight]], view: NDArray[np.bool_], white: float, light: NDArray[np.float64]
+    seen: Sequence[tuple[Picture, Sight]],
+    view: NDArray[np.bool_],
+    white: float,
+    light: NDArray[np.float64],
+    body: NDArray[np.complex128],
 ) -> Look:
-    """Four equal squares at the corners of a square: what the blobs say."""
+    """Equal squares at the places `body` (in units of the outermost's distance): what the blobs say."""
     frames = [(p.y, Pose(s.centre, s.angle)) for p, s in seen[:MOST]]
     reach = float(np.median([s.reach for _, s in seen]))
     half = float(np.sqrt(np.median([s.area for _, s in seen]))) / 2
     marks = [
         Mark(complex(d) * reach, (half, half), 0.0, _level(frames, complex(d) * reach, view, white, light))
-        for d in BODY
+        for d in body
     ]
     # the true rim is found later, with these marks
     return Look(marks, 0.8, _noise(seen, view, light, white), light, reach + 1.3 * half)
 
 
-def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds: int = ROUNDS) -> Look:
+def refine(
+    look: Look,
+    frames: Sequence[Frame],
+    view: NDArray[np.bool_],
+    rounds: int = ROUNDS,
+    fixed: NDArray[np.complex128] | None = None,
+) -> Look:
     """Fit shape, place and contrast of the four marks to frames whose pose is roughly known.
 
     Poses and shapes are found in turns: poses (changed in place) from the present shapes, then one
-    joint least-squares step per mark for its shape with the pose of every frame left free.
+    joint least-squares step per mark for its shape with the pose of every frame left free. With `fixed`
+    places they keep these, at a scale of their own.
     """
     for turn in range(rounds):
         fits: list[Seen] = []
@@ -57,6 +68,8 @@ def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds:
             if fit is not None:
                 fits.append((pose, motion, fit.sightings))
         marks, psf = _reshape(fits, look, view.shape[0])
+        if fixed is not None:
+            marks = _like(marks, fixed)
         change = max(
             abs(m.place - n.place) + abs(m.half[0] - n.half[0])
             for m, n in zip(marks, look.marks, strict=True)
@@ -65,6 +78,13 @@ def refine(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_], rounds:
         if change < STEADY and turn > rounds // 2:
             break
     return look
+
+
+def _like(marks: list[Mark], body: NDArray[np.complex128]) -> list[Mark]:
+    """The marks at the places of `body`, as large as they are."""
+    now = np.array([m.place for m in marks])
+    factor = float(np.vdot(body, now).real / np.vdot(body, body).real)
+    return [replace(m, place=complex(factor * z)) for m, z in zip(marks, body, strict=True)]
 
 
 def places(look: Look, frames: Sequence[Frame], view: NDArray[np.bool_]) -> NDArray[np.complex128]:

@@ -84,46 +84,74 @@ class Lens:
         return np.column_stack([*(x for z in columns for x in (z.real, z.imag)), *slopes])
 
 
+@dataclass(frozen=True)
+class Bent:
+    """A lens and how well it is known: standard errors of curve, tilt u, tilt v, aspect and shear."""
+
+    lens: Lens
+    sigma: Array
+    found: bool  # else no lens is clearly better than none
+
+
 UNBENT = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0])
 PLAIN = Lens()
+SQUARE = np.array([-1j, 1, 1j, -1])
 
 
-def calibrate(points: Complexes, shape: tuple[int, int]) -> Lens | None:
-    """Find the map under which the marks keep their distances; None if none is clearly better than none.
+def calibrate(
+    points: Complexes,
+    shape: tuple[int, int],
+    body: Complexes = SQUARE,
+    curve: float | None = None,
+    tilt: float | None = None,
+) -> Bent:
+    """Find the map under which the marks keep their distances, if one is clearly better than none.
 
     Parameters
     ----------
     points : complex, shape (frames, marks)
         Picture positions of the marks [pixels], NaN where not seen.
     shape : (height, width) of the picture.
+    body : complex, shape (marks,)
+        Where the marks are about, in any unit.
+    curve, tilt : float, optional
+        Given, not found: the lens's curvature; whatever is not None leaves the tilt away.
     """
     from scipy.optimize import least_squares
 
     points = points[np.isfinite(points).sum(axis=1) >= 3]
-    if len(points) < FEWEST:
-        return None
     middle, size = complex(shape[1] / 2, shape[0] / 2), float(np.hypot(*shape) / 2)
-    first, seen = _layout(points), np.isfinite(points)
+    fixed = np.array([0.0 if curve is None else curve, 0, 0, 0, 0])
+    as_given = Lens(middle, size, *(float(v) for v in fixed)) if fixed.any() else PLAIN
+    free = np.array([curve is None, *[tilt is None] * 4])
+    if len(points) < FEWEST or len(body) < 3 or not free.any():
+        return Bent(as_given, np.where(free, np.inf, 0.0), False)
+    first, seen = _layout(points, body), np.isfinite(points)
+    n = len(body)
 
     def rest(x: Array, with_lens: bool) -> Array:
-        lens = Lens(middle, size, *x[:5]) if with_lens else Lens()
-        off = _misfit(lens.plane(np.where(seen, points, middle)), seen, x[5:9] + 1j * x[9:13])
+        lens = Lens(middle, size, *np.where(free, x[:5], fixed)) if with_lens else as_given
+        off = _misfit(lens.plane(np.where(seen, points, middle)), seen, x[5 : 5 + n] + 1j * x[5 + n :])
         return np.concatenate([off, 0.02 * x[:5] / PRIOR, 1e-6 * (x[5:] - start[5:])])
 
     start = np.concatenate([np.zeros(5), first.real, first.imag])
     flat = least_squares(lambda x: rest(x, False), start, loss="soft_l1", f_scale=0.1)
     bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
+    spare = max(int(2 * seen.sum() - 3 * len(points)) - 2 * n - 5, 1)
+    # the loss is about rms^2 / 2 per spare coordinate; the weak priors are in the Jacobian
+    spread = np.linalg.pinv(bent.jac.T @ bent.jac, hermitian=True)[:5, :5] * (2 * bent.cost / spare)
+    sigma = np.where(free, np.sqrt(np.diag(spread)), 0.0)
     if bent.cost > BETTER**2 * flat.cost:
-        return None
-    return Lens(middle, size, *(float(v) for v in bent.x[:5]))
+        return Bent(as_given, sigma, False)
+    return Bent(Lens(middle, size, *(float(v) for v in np.where(free, bent.x[:5], fixed))), sigma, True)
 
 
-def _layout(points: Complexes) -> Complexes:
+def _layout(points: Complexes, body: Complexes) -> Complexes:
     """The marks' places on the disk, from the frame that shows them best."""
-    whole = points[np.isfinite(points).all(axis=1)]
-    best = whole[0] if len(whole) else points[0]
-    reach = np.nanmean(np.abs(best - np.nanmean(best)))
-    return np.asarray(reach * np.array([-1j, 1, 1j, -1]))
+    best = points[np.argmax(np.isfinite(points).sum(axis=1))]
+    seen = np.isfinite(best)
+    part, at = body[seen] - body[seen].mean(), best[seen] - best[seen].mean()
+    return np.asarray(body * abs(np.vdot(part, at)) / np.vdot(part, part).real)
 
 
 def _misfit(points: Complexes, seen: NDArray[np.bool_], places: Complexes) -> Array:

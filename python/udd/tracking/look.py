@@ -75,6 +75,11 @@ class Look:
         return np.array([m.row for m in self.marks])
 
     @cached_property
+    def reach(self) -> float:
+        """Distance of the outermost mark [pixels]."""
+        return float(np.abs(self.places).max())
+
+    @cached_property
     def places(self) -> NDArray[np.complex128]:
         """The marks' centres, (n,)."""
         return np.array([m.place for m in self.marks])

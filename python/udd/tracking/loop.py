@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .acquire import candidates, classify
 from .decode import Picture
+from .lens import Bent
 from .look import Look, Motion, Pose
 from .marks import MISFIT
 from .pivot import Contact
@@ -40,9 +41,9 @@ class Tracks:
     centre: list[complex]
     angle: list[float]  # unwrapped
     information: list[Array]  # (3, 3) of (u, v, beta) for the assumed pixel noise
-    leftover: list[Array]  # (4, 2) misfit of each mark [pixels], NaN where not used
-    chi2: list[Array]  # (4,)
-    complete: list[Array]  # (4,) share of each mark's edges in view
+    leftover: list[Array]  # (marks, 2) misfit of each [pixels], NaN where not used
+    chi2: list[Array]  # (marks,)
+    complete: list[Array]  # (marks,) share of each mark's edges in view
     streak: list[float]  # blur length at the marks [pixels]
     flag: list[str]
     method: list[str]  # "fast" or "refined", empty where the disk was not held
@@ -55,10 +56,12 @@ class Known:
     look: Look
     view: NDArray[np.bool_]
     colours: Array
-    exposure: float
+    exposure: float  # [s]
     white: float  # brightness code of the bare disk
     contact: Contact | None
     readout: Readout
+    exposure_sigma: float = np.inf
+    bent: Bent | None = None  # the lens with its uncertainty
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def follow(
     for picture in pictures:
         flag, fit, pose, motion = _one(picture, known, past, last)
         last = picture.y
-        _append(tracks, picture.t, flag, fit, pose, _streak(motion, known.look))
+        append(tracks, picture.t, flag, fit, pose, _streak(motion, known.look), len(known.look.marks))
         if fit is not None:
             past = [*past[-2:], Held(picture.t, pose, motion.spin)]
         tick(picture, pose)
@@ -101,7 +104,7 @@ def _one(
     if float(picture.y[::8, ::8].std()) < FLAT:
         return "black: the frame shows nothing", None, nowhere, Motion()
     guess = predict(past, picture.t, known.contact)
-    if last is not None and guess is not None and _repeats(picture.y, last, guess, past[-1].pose, known.look):
+    if last is not None and guess is not None and repeats(picture.y, last, guess, past[-1].pose, known.look):
         return "dup: the frame repeats the one before", None, nowhere, Motion()
     if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
@@ -125,7 +128,7 @@ def hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: lis
     most_off = MOST_OFF + STREAK_OFF * _streak(motion, known.look)
     start = Pose(pose.centre, pose.angle)
     fit = align(picture.y, known.view, known.look, pose, motion, rounds)
-    if fit is not None and fit.used.sum() == 4 and _worst(fit)[1] > most_off:
+    if fit is not None and fit.used.sum() >= 4 and _worst(fit)[1] > most_off:
         pose.centre, pose.angle = start.centre, start.angle
         fit = align(picture.y, known.view, known.look, pose, motion, rounds, without=_worst(fit)[0])
     if fit is None or fit.moved > 0.5 + 0.1 * most_off or _worst(fit)[1] > most_off:
@@ -142,8 +145,11 @@ def _worst(fit: Fit) -> tuple[int, float]:
 def _on_the_disk(picture: Picture, known: Known, pose: Pose) -> bool:
     """Whether the disk is where the marks say: bare and bright inside the square of the marks."""
     look = known.look
-    inner = 0.7 * (abs(look.marks[0].place) - np.hypot(*look.marks[0].half))
-    points = look.lens.picture(pose.centre + inner * BARE)
+    half = np.hypot(*look.marks[0].half)
+    inner = 0.7 * (look.reach - half) * BARE
+    marks = look.places * np.exp(1j * pose.angle)
+    bare = np.abs(inner[:, None] - marks[None, :]).min(axis=1) > 1.2 * half  # of the standard marks all
+    points = look.lens.picture(pose.centre + inner[bare])
     r, c = np.round(points.imag).astype(int), np.round(points.real).astype(int)
     height, width = picture.y.shape
     ok = (r >= 0) & (r < height) & (c >= 0) & (c < width)
@@ -160,7 +166,7 @@ def _anywhere(
 ) -> tuple[Fit, Pose, Motion] | None:
     """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
     shape = picture.y.shape
-    reach = abs(known.look.marks[0].place)
+    reach = known.look.reach
     box = (0, shape[0], 0, shape[1])
     fresh = guess is not None and picture.t - past[-1].t < FRESH
     if guess is not None and fresh:
@@ -195,7 +201,7 @@ def _motions(past: list[Held], pose: Pose, t: float, known: Known, fresh: bool) 
         return [_motion(past, pose, t, known)]
     if known.exposure <= 0:
         return [Motion()]
-    step = 2 * STREAK_STEP / (abs(known.look.marks[0].place) * known.exposure)
+    step = 2 * STREAK_STEP / (known.look.reach * known.exposure)
     count = int(np.ceil(FASTEST / step))
     rates = step * np.arange(-count, count + 1)
     if known.contact is not None:
@@ -256,12 +262,12 @@ def along_contact(known: Known, pose: Pose, spin: float, change: float = 0.0) ->
 
 
 def _streak(motion: Motion, look: Look) -> float:
-    return abs(motion.shift) + abs(motion.turn * look.marks[0].place)
+    return abs(motion.shift) + abs(motion.turn) * look.reach
 
 
-def _repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before: Pose, look: Look) -> bool:
+def repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before: Pose, look: Look) -> bool:
     """Whether a frame is a copy of the last although the disk should have moved."""
-    reach = abs(look.marks[0].place)
+    reach = look.reach
     if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
         return False
     changed, size = 0, 0
@@ -274,16 +280,19 @@ def _repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before:
     return size > 0 and changed < UNCHANGED
 
 
-def _append(tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float) -> None:
+def append(
+    tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float, marks: int
+) -> None:
+    """One more row."""
     tracks.t.append(t)
     tracks.flag.append(flag)
     tracks.centre.append(pose.centre)
     tracks.angle.append(pose.angle)
     tracks.streak.append(streak)
     tracks.information.append(np.full((3, 3), np.nan))
-    tracks.leftover.append(np.full((4, 2), np.nan))
-    tracks.chi2.append(np.full(4, np.nan))
-    tracks.complete.append(np.zeros(4))
+    tracks.leftover.append(np.full((marks, 2), np.nan))
+    tracks.chi2.append(np.full(marks, np.nan))
+    tracks.complete.append(np.zeros(marks))
     tracks.method.append("" if fit is None else "fast")
     if fit is not None:
         put(tracks, -1, fit, pose, streak)

@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture
-from .find import BODY, Sight
+from .find import Sight
 
 DARKER = 0.12  # relative change of brightness that is no longer the bare disk
 TINTED = 9.0  # colour difference (of 127) that is no longer the bare disk
 MARGIN = 2
 
 
-def visible(seen: Sequence[tuple[Picture, Sight]]) -> tuple[NDArray[np.bool_], float]:
+def visible(
+    seen: Sequence[tuple[Picture, Sight]], body: NDArray[np.complex128]
+) -> tuple[NDArray[np.bool_], float]:
     """Pixels where the disk is in full view, and the disk's brightness.
 
     A pixel which should show the bare disk (inside the square of the marks' reach, away from the
@@ -31,7 +33,7 @@ def visible(seen: Sequence[tuple[Picture, Sight]]) -> tuple[NDArray[np.bool_], f
     for picture, sight in seen:
         np.maximum(brightest, picture.y, out=brightest)
         box = _box(sight, height, width)
-        here = _should_be_bare(sight, box)
+        here = _should_be_bare(sight, box, body)
         y = picture.y[box]
         level = _middle(y[here]) if here.any() else 255.0
         level = _middle(y[here & (y > 0.8 * level)]) if here.any() else level
@@ -71,12 +73,14 @@ def _box(sight: Sight, height: int, width: int) -> tuple[slice, slice]:
     return part(sight.centre.imag, height), part(sight.centre.real, width)
 
 
-def _should_be_bare(sight: Sight, box: tuple[slice, slice]) -> NDArray[np.bool_]:
+def _should_be_bare(
+    sight: Sight, box: tuple[slice, slice], body: NDArray[np.complex128]
+) -> NDArray[np.bool_]:
     """Pixels of the box inside the marks' reach and away from the marks."""
     dv = (np.arange(box[0].start, box[0].stop) - sight.centre.imag).astype(np.float32)[:, None]
     du = (np.arange(box[1].start, box[1].stop) - sight.centre.real).astype(np.float32)[None, :]
     here = du * du + dv * dv < np.float32((1.08 * sight.reach) ** 2)
     clear = np.float32(1.1 * np.sqrt(sight.area))
-    for direction in BODY * sight.reach * np.exp(1j * sight.angle):
+    for direction in body * sight.reach * np.exp(1j * sight.angle):
         here &= (du - np.float32(direction.real)) ** 2 + (dv - np.float32(direction.imag)) ** 2 > clear**2
     return np.asarray(here)

@@ -15,7 +15,6 @@ from .decode import Film
 from .result import Pixels, pixels
 from .rgb import rgb
 
-COLOURS = ((230, 40, 40), (240, 140, 30), (40, 90, 230), (30, 160, 60))
 FOUND, CONTACT, SAID = (0, 220, 220), (255, 0, 200), (255, 230, 0)
 FINE = 4  # bits of sub-pixel coordinates
 SLOWEST, LIKELY = 1.0, 25.0  # frames/s: what containers take; where the film does not say
@@ -85,7 +84,7 @@ def draw(image: NDArray[np.uint8], where: Pixels, k: int, flag: str) -> None:
     cv2.drawMarker(image, (int(u) >> FINE, int(v) >> FINE), CONTACT, cv2.MARKER_CROSS, 14, 1)
     if np.isfinite(where.angle[k]):
         cv2.polylines(image, [points(where.rim[k])], True, FOUND, 1, cv2.LINE_AA, FINE)
-        for mark, colour in zip(where.marks[k], COLOURS, strict=True):
+        for mark, colour in zip(where.marks[k], where.colours, strict=True):
             x, y = points(mark)
             for radius, paint in ((6, (255, 255, 255)), (4, colour)):
                 cv2.circle(image, (int(x), int(y)), radius << FINE, paint, 2, cv2.LINE_AA, FINE)

@@ -23,6 +23,7 @@ class Pivot:
     covariance: Array
     drive: complex
     rms: float  # misfit [pixels]
+    drive_sigma: float = np.nan
 
 
 def pivot(
@@ -42,7 +43,7 @@ def pivot(
     """
     rows: list[NDArray[np.complex128]] = []
     values: list[NDArray[np.complex128]] = []
-    for a, b in _windows(t, good):
+    for a, b in windows(t, good):
         time, beta = t[a:b], angle[a:b]
         turn = np.exp(-1j * beta)
         dt = time - time[0]
@@ -66,10 +67,11 @@ def pivot(
     normal = (design.conj().T * weight**2) @ design
     # misfits within a window go together: count windows, not frames
     inflation = len(value) / max(len(rows) - 1, 1)
-    variance = rms**2 * inflation * np.real(np.linalg.inv(normal + 1e-12 * np.eye(2))[0, 0])
+    spread = rms**2 * inflation * np.real(np.diag(np.linalg.inv(normal + 1e-12 * np.eye(2))))
+    variance = float(spread[0])
     if not np.isfinite(variance) or variance > (WORST * reach) ** 2:
         return None
-    return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms)
+    return Pivot(complex(x[0]), variance * np.eye(2), complex(x[1]), rms, float(np.sqrt(spread[1])))
 
 
 def _rolling(
@@ -128,7 +130,7 @@ def rough_contact(
     return Contact(complex(x[0]), complex(x[1]))
 
 
-def _windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Index ranges of unbroken good frames, cut to at most `WINDOW` seconds."""
     if len(t) < 2:
         return []

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .acquire import colours_of
 from .decode import Film, Picture, TrackError
-from .disk import Outline, outline
-from .exposure import exposure
-from .find import BODY, Sight
+from .disk import SPAN, Outline, outline
+from .exposure import Exposure, exposure
+from .find import Sight
 from .learn import first_look, places, refine
 from .lens import Lens, calibrate
 from .look import Look, Motion, Pose
@@ -19,7 +20,8 @@ from .marks import MISFIT
 from .occluder import visible
 from .pivot import Contact, rough_contact
 from .pose import align
-from .readout import readout
+from .readout import Readout, readout
+from .setup import Setup
 from .survey import Moving, Survey, moving, repeats_last
 
 FEWEST = 3  # frames in motion from which marks are learned a second time
@@ -28,69 +30,98 @@ FOR_LENS = 90  # frames from which tilt and lens are measured
 LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
 SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
+NEAR_RIM = 0.12  # of the radius by which the rim may be off where a layout says it is
 
 
 def prepare(
-    film: Film, look_over: Survey, sights: list[Sight | None], seen: list[tuple[Picture, Sight]]
-) -> tuple[Known, Outline]:
+    film: Film,
+    look_over: Survey,
+    sights: list[Sight | None],
+    seen: list[tuple[Picture, Sight]],
+    setup: Setup,
+) -> tuple[Known, Outline | None]:
     """Learn from the survey's pictures, in which the disk was found at `sights` (`seen`: slowest first).
 
     Raises
     ------
     TrackError
-        No picture is sharp enough, or the rim does not stand out from the background.
+        No picture is sharp enough, or the rim does not stand out from the background and is needed.
     """
-    view, white = visible(seen)
-    look = first_look(seen, view, white, film.light)
-    look = refine(look, [(p.y, Pose(s.centre, s.angle), Motion()) for p, s in seen], view)
+    body, wanted = setup.layout.unit, setup.calibrate
+    fixed = None if wanted.layout else body
+    view, white = visible(seen, body)
+    view = view & setup.view(view.shape)
+    look = first_look(seen, view, white, film.light, body)
+    look = refine(look, [(p.y, Pose(s.centre, s.angle), Motion()) for p, s in seen], view, fixed=fixed)
     # a second time with frames whose speed is known, hence their blur
     in_motion = moving(look_over.bursts, sights)
-    open_for = exposure(in_motion, look, view)
+    given = wanted.given("exposure")
+    open_for = exposure(in_motion, look, view) if given is None else Exposure(given, 0.0)
     in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
     in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
     frames = [
         (
             m.picture.y,
             Pose(m.sight.centre, m.sight.angle),
-            Motion(m.rate * open_for, m.turning * open_for, rate=m.rate, spin=m.turning),
+            Motion(m.rate * open_for.value, m.turning * open_for.value, rate=m.rate, spin=m.turning),
         )
         for m in in_motion
     ]
     paths = {m.picture.index: path for m, (_, _, path) in zip(in_motion, frames, strict=True)}
     interval = float(np.median([m.interval for m in in_motion])) if in_motion else 0.0
-    rolling = readout(frames, look, view, interval)
+    given = wanted.given("readout")
+    rolling = readout(frames, look, view, interval) if given is None else Readout(given, 0.0)
     if rolling.value:
         look = replace(look, readout=rolling.value)
-        look = refine(look, frames, view)
-        rolling = readout(frames, look, view, interval)
-        look = replace(look, readout=rolling.value)
+        look = refine(look, frames, view, fixed=fixed)
+        if given is None:
+            rolling = readout(frames, look, view, interval)
+            look = replace(look, readout=rolling.value)
     for _ in range(LENS_ROUNDS):
-        lens = calibrate(places(look, frames[:FOR_LENS], view), view.shape)
-        if lens is None:
+        at = places(look, frames[:FOR_LENS], view)
+        bent = calibrate(at, view.shape, body, wanted.given("lens"), wanted.given("tilt"))
+        if bent.lens.plain:
             break
-        look = replace(look, lens=lens)
+        look = replace(look, lens=bent.lens)
         for (_, pose, _), m in zip(frames, in_motion, strict=True):
-            pose.centre, pose.angle = _in_plane(lens, m.sight)
-        look = refine(look, frames, view)
+            pose.centre, pose.angle = _in_plane(bent.lens, m.sight, body)
+        look = refine(look, frames, view, fixed=fixed)
     else:
         frames = frames[:0]
     if len(frames) >= FEWEST:
-        look = refine(look, frames, view, 2)
+        look = refine(look, frames, view, 2, fixed)
     sharp: list[tuple[Picture, Pose, Motion]] = []
-
     for picture, sight in seen[:SHARP]:
-        pose, motion = Pose(*_in_plane(look.lens, sight)), paths.get(picture.index, Motion())
+        pose, motion = Pose(*_in_plane(look.lens, sight, body)), paths.get(picture.index, Motion())
         if align(picture.y, view, look, pose, motion, [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
             sharp.append((picture, pose, motion))
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
-    try:
-        rim = outline(sharp, look, view)
-    except TrackError as error:
-        raise TrackError(f"{film.path}: {error}") from None
+    rim = _rim(film, sharp, look, view, setup)
     colours = colours_of([p for p, _, _ in sharp], [q for _, q, _ in sharp], look, view)
-    look = replace(_centred(look, rim.centre), rim=rim.radius - RIM_SMEAR)
-    return Known(look, view, colours, open_for, white, _contact(in_motion, look), rolling), rim
+    if rim is not None:
+        look = replace(look, rim=rim.radius - RIM_SMEAR)
+    look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, setup)
+    contact = _contact(in_motion, look)
+    known = Known(look, view, colours, open_for.value, white, contact, rolling, open_for.sigma, bent)
+    return known, rim
+
+
+def _rim(
+    film: Film, sharp: list[tuple[Picture, Pose, Motion]], look: Look, view: NDArray[np.bool_], setup: Setup
+) -> Outline | None:
+    """The disk's outline; None where it does not show and the layout says where its centre is."""
+    layout = setup.layout
+    span = SPAN
+    if not layout.standard:
+        ratio = setup.radius / layout.reach
+        span = ((1 - NEAR_RIM) * ratio, (1 + NEAR_RIM) * ratio)
+    try:
+        return outline(sharp, look, view, span)
+    except TrackError as error:
+        if not layout.standard:
+            return None
+        raise TrackError(f"{film.path}: {error}") from None
 
 
 def _contact(in_motion: list[Moving], look: Look) -> Contact | None:
@@ -99,28 +130,36 @@ def _contact(in_motion: list[Moving], look: Look) -> Contact | None:
     before = look.lens.plane(np.array([m.step[0] for m in in_motion], dtype=np.complex128))
     after = look.lens.plane(np.array([m.step[1] for m in in_motion], dtype=np.complex128))
     turn, dt = np.array([m.step[2] for m in in_motion]), np.array([m.step[3] for m in in_motion])
-    return rough_contact(before, after, turn, dt, abs(look.marks[0].place))
+    return rough_contact(before, after, turn, dt, look.reach)
 
 
-def _in_plane(lens: Lens, sight: Sight) -> tuple[complex, float]:
+def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[complex, float]:
     """A sight in the picture as a pose in the plane of the disk."""
-    arms = BODY * sight.reach * np.exp(1j * sight.angle)
+    arms = body * sight.reach * np.exp(1j * sight.angle)
     marks = lens.plane(sight.centre + arms)
-    turn = float(np.angle(np.vdot(arms, marks - marks.mean())))
-    return complex(marks.mean()), sight.angle + turn
+    spread = arms - arms.mean()
+    spin = complex(np.vdot(spread, marks - marks.mean()))
+    turn = float(np.angle(spin))
+    factor = spin / float(np.vdot(spread, spread).real)
+    return complex(marks.mean() - factor * arms.mean()), sight.angle + turn
 
 
-def _centred(look: Look, centre: complex) -> Look:
-    """Marks as seen from the disk's own centre, red at beta.
+def _centred(look: Look, centre: complex, setup: Setup) -> Look:
+    """Marks as seen from the disk's own centre; of the standard ones red at beta.
 
-    Where all four stand at right angles as nearly as they are known, all four say where beta is.
+    Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
+    all the marks of any other layout.
     """
-    places = look.places - centre
-    turns = places / np.abs(places) / BODY
-    off = np.angle(turns / turns.mean()) * np.abs(places)
-    turn = complex(turns[0])
-    if np.abs(off).max() < SQUARE:
-        turn = complex(turns.mean() / abs(turns.mean()))
+    places, body = look.places - centre, setup.layout.unit
+    if setup.layout.standard:
+        turns = places / np.abs(places) / body
+        off = np.angle(turns / turns.mean()) * np.abs(places)
+        turn = complex(turns[0])
+        if np.abs(off).max() < SQUARE:
+            turn = complex(turns.mean() / abs(turns.mean()))
+    else:
+        turn = complex(np.vdot(body - body.mean(), places - places.mean()))
+        turn /= abs(turn)
     marks = [
         replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
     ]

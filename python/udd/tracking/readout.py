@@ -57,7 +57,7 @@ def readout(
 
 
 def _speed(motion: Motion, look: Look) -> float:
-    return abs(motion.rate) + abs(motion.spin) * abs(look.marks[0].place)
+    return abs(motion.rate) + abs(motion.spin) * look.reach
 
 
 def _compare(

@@ -86,7 +86,7 @@ def _again(picture: Picture, k: int, known: Known, around: Around, tracks: Track
     motion = here.motion(known.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
     fit = hold(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
-    reach = abs(known.look.marks[0].place)
+    reach = known.look.reach
     streak = abs(motion.shift) + abs(motion.turn) * reach
     if fit is None:
         return
@@ -114,7 +114,8 @@ def drop_weak(tracks: Tracks) -> None:
             tracks.flag[k], tracks.method[k] = "lost: too few marks in a long streak", ""
             tracks.centre[k], tracks.angle[k] = complex(np.nan, np.nan), np.nan
             tracks.information[k] = np.full((3, 3), np.nan)
-            tracks.chi2[k], tracks.leftover[k] = np.full(4, np.nan), np.full((4, 2), np.nan)
+            tracks.chi2[k] = np.full_like(tracks.chi2[k], np.nan)
+            tracks.leftover[k] = np.full_like(tracks.leftover[k], np.nan)
 
 
 class Around:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from udd.measurement import Measurement
 
+from .layout import STANDARD
 from .lens import PLAIN, Lens
 from .loop import Tracks
 
@@ -30,6 +31,7 @@ class Camera:
     pivot_sigma: float  # [m]
     pivot_from: str  # "rolling constraint", "support" or "given"
     drive: complex  # velocity of the driven material that goes with it [m/s, Y + iZ], NaN if unknown
+    drive_sigma: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,12 @@ class Pixels:
 
     centre: Array  # (n, 2)
     angle: Array  # (n,) beta [rad]
-    marks: Array  # (n, 4, 2): red, orange, blue, green
+    marks: Array  # (n, marks, 2); of the standard disk red, orange, blue, green
     rim: Array  # (n, 73, 2): a closed line; a circle but for tilt and lens
     radius: float
     pivot: Array  # (2,)
     scale: float  # pixels per metre
+    colours: tuple[tuple[int, int, int], ...]  # of the marks, sRGB
 
 
 def pixels(m: Measurement) -> Pixels:
@@ -58,12 +61,16 @@ def pixels(m: Measurement) -> Pixels:
     KeyError
         The measurement does not come from a film.
     """
+    if m.kind == "pendulum":
+        return _of_pendulum(m)
     scale = float(m.meta["px_per_m"])
     pivot = complex(float(m.meta["pivot_u"]), float(m.meta["pivot_v"]))
     bent = [float(x) for x in m.meta["lens"]]
     lens = Lens(complex(bent[0], bent[1]), *bent[2:]) if bent else PLAIN
     places = np.array(m.meta["marks_px"], dtype=float) @ [1, 1j]
     radius = scale * float(m.meta["R"])
+    said = m.meta.get("marks_rgb", STANDARD.colours)  # an older file says nothing
+    colours = tuple((int(r), int(g), int(b)) for r, g, b in said)
     ring = radius * np.exp(2j * np.pi * np.arange(73) / 72)
     centre = pivot + scale * (m["Y"] - 1j * m["Z"])
     marks = centre[:, None] + places * np.exp(1j * m["beta"])[:, None]
@@ -73,7 +80,21 @@ def pixels(m: Measurement) -> Pixels:
         return np.stack([at.real, at.imag], axis=-1)
 
     rim = show(centre[:, None] + ring)
-    return Pixels(show(centre), m["beta"], show(marks), rim, radius, show(np.array(pivot)), scale)
+    return Pixels(show(centre), m["beta"], show(marks), rim, radius, show(np.array(pivot)), scale, colours)
+
+
+def _of_pendulum(m: Measurement) -> Pixels:
+    """The bob as a disk whose one mark is its middle."""
+    pivot = np.array([float(m.meta["pivot_u"]), float(m.meta["pivot_v"])])
+    long, radius, theta = float(m.meta["length_px"]), float(m.meta["bob_px"]), m["theta"]
+    centre = pivot + long * np.column_stack([np.sin(theta), np.cos(theta)])
+    ring = 2 * np.pi * np.arange(73) / 72
+    rim = centre[:, None] + radius * np.column_stack([np.cos(ring), np.sin(ring)])
+    (red, green, blue), *_ = m.meta["marks_rgb"]
+    scale = float(m.meta["px_per_m"] or np.nan)
+    return Pixels(
+        centre, theta, centre[:, None], rim, radius, pivot, scale, ((int(red), int(green), int(blue)),)
+    )
 
 
 def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array, Array]:

@@ -40,7 +40,7 @@ def solve(
     weighted = (trusted @ maps).reshape(-1, 3)
     normal = maps.reshape(-1, 3).T @ weighted
     right = weighted.T @ offset.ravel()
-    reach = abs(marks[0].place)
+    reach = max(abs(m.place) for m in marks)
     scale = np.diag([1.0, 1.0, 1 / reach])  # so that pixels compare with pixels
     eigen = np.linalg.eigvalsh(scale @ normal @ scale)
     if eigen[0] <= 1e-4 * max(eigen[-1], 1e-12):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from udd.measurement import DISK, Measurement, check_length
 
+from .bob import track_bob
+from .calibration import camera_of, meta_of
 from .config import Config, settings
 from .decode import Film, Picture, TrackError
 from .disk import Outline
@@ -21,25 +23,26 @@ from .exposure import again as retimed
 from .exposure import at_middle
 from .find import COLOURS, FEWEST, sightings
 from .glimpse import Glimpse
-from .lens import Lens
-from .look import Pose
+from .layout import STANDARD, read_bob
+from .layout import sightings as matching
+from .look import Look, Pose
 from .loop import Known, Tracks, follow
 from .noise import covariance
-from .pivot import pivot as rolling
-from .pivot import support
 from .prepare import prepare
+from .quality import quality, remarks
 from .readout import readout
 from .refine import LONG, Around, drop_weak
 from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
-from .scale import Scale, scale
+from .scale import scale as size_of
+from .setup import Calibrate, Layout, Region, Setup, read_calibrate, read_layout, read_region
 from .survey import Survey, slowest, survey
+from .tags import Tag, follow_tags, is_tags, layout_of, read_tags
 
 VAGUE = 0.005  # of the disk's radius: a position known no better is not given
 VAGUE_SAYS = "vague: too blurred or hidden to be placed"
 GONE_SAYS = "gone: the disk has left the wheels"
-CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Tracking:
     tracks: Tracks
     known: Known
     camera: Camera
-    outline: Outline
+    outline: Outline | None
 
 
 def track(
@@ -61,16 +64,22 @@ def track(
     fps: float | None = None,
     pivot: tuple[float, float] | None = None,
     refine: bool | None = None,
+    layout: Layout | Sequence[Mapping[str, Any]] | None = None,
+    scale: float | None = None,
+    region: Region | None = None,
+    calibrate: Calibrate | Mapping[str, bool | float] | None = None,
+    bob: str | Sequence[int] | None = None,
+    length: float | None = None,
     config: Config | None = None,
     progress: bool = False,
 ) -> Measurement:
-    """Measure the motion of a disk with four coloured marks in a film.
+    """Measure the motion of a disk with coloured marks in a film.
 
     Parameters
     ----------
     video : path
         A film by a camera at rest, showing the whole disk with square marks red, orange, blue,
-        green (clockwise) near its rim.
+        green (clockwise) near its rim, or with those of `layout`.
     disk_radius : float, optional
         Radius of the disk [m], 0.08 if not given; with the marks' distance it sets the scale.
     mark_distance : float, optional
@@ -82,6 +91,23 @@ def track(
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
     refine : bool, optional
         Go over the film a second time, with each frame's blur known from its neighbours; so if not given.
+    layout : sequence of mappings, optional
+        Marks of another disk, two or more: ``{"at": [y, z], "colour": "red"}``, with the place [m] when
+        beta = 0 and the colour by name or as sRGB codes ``[r, g, b]``. Square or rectangular patches, each
+        with a margin of the disk about it. Or printed tags, one or more of one dictionary:
+        ``{"tag": "4x4_50:7", "at": [y, z], "side": 0.03}``, upright at beta = 0.
+    scale : float, optional
+        Pixels per metre in the disk's plane, given instead of found.
+    region : (u0, v0, u1, v1), optional
+        The part of the picture in which the disk moves [pixels]; nothing outside it is looked at.
+    calibrate : mapping, optional
+        What the film is asked for: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: found (so
+        if not given); False: as given, or not there; a number (lens, readout [s], exposure [s]): just that.
+    bob : str or (r, g, b), optional
+        The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
+        picture's vertical, about the centre of the bob's path (or `pivot`).
+    length : float, optional
+        Of that pendulum, from the pivot to the bob's middle [m]; sets the scale.
     config : path or mapping, optional
         A TOML file (or what would stand in one) with any of the arguments above; what is given here wins.
     progress : bool
@@ -91,14 +117,17 @@ def track(
     -------
     Measurement
         ``Y, Z`` [m], ``beta`` [rad, unwrapped] at mid-exposure with standard errors and correlations,
-        one row per frame; a frame that cannot be used holds NaN and says why in ``flag``. ``meta``
-        holds the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``, ``exposure``, ...
+        one row per frame; a frame that cannot be used holds NaN and says why in ``flag`` (``dup``,
+        ``black``, ``damaged``, ``vague``, ``lost``, ``gone``); ``gap`` (frames are missing before it) and
+        ``degraded`` are remarks. ``quality`` holds number of marks, completeness, residual, blur and
+        method of each frame. ``meta`` holds the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``,
+        ``exposure``, ..., and in ``calibration`` every item as value, standard error and how it is known.
 
     Raises
     ------
     TrackError
         The file is missing, empty, not a film or too short; no marks are found; the radius is not a
-        positive number; the config holds an unknown key or a value of the wrong kind.
+        positive number; the layout or the config holds an unknown key or a value of the wrong kind.
 
     Notes
     -----
@@ -111,6 +140,13 @@ def track(
     >>> m = udd.track("run.mp4", disk_radius=0.08)  # doctest: +SKIP
     >>> m.to_csv("run.csv")  # doctest: +SKIP
     >>> m = udd.track("run.mp4", config={"fps": 240.0, "pivot": [275, 310.5]})  # doctest: +SKIP
+    >>> m = udd.track("run.mp4", calibrate={"lens": False, "readout": 0.02})  # doctest: +SKIP
+    >>> three = [{"at": [0.0, 0.06], "colour": "red"}, {"at": [0.05, -0.03], "colour": "blue"}]
+    >>> three += [{"at": [-0.05, -0.03], "colour": [112, 48, 160]}]
+    >>> m = udd.track("run.mp4", layout=three)  # doctest: +SKIP
+    >>> tag = {"tag": "apriltag_36h11:7", "at": [0.0, 0.0], "side": 0.05}
+    >>> m = udd.track("run.mp4", layout=[tag])  # doctest: +SKIP
+    >>> swing = udd.track("clock.mp4", bob="red", length=0.8)  # doctest: +SKIP
     """
     given = {
         "disk_radius": disk_radius,
@@ -118,9 +154,57 @@ def track(
         "fps": fps,
         "pivot": pivot,
         "refine": refine,
+        "layout": layout,
+        "scale": scale,
+        "region": region,
+        "calibrate": calibrate,
     }
+    found = track_whole(video, config=config, progress=progress, **given, bob=bob, length=length)
+    return found.measurement if isinstance(found, Tracking) else found
+
+
+def track_whole(
+    video: str | os.PathLike[str], *, config: Config | None = None, progress: bool = False, **given: Any
+) -> Tracking | Measurement:
+    """As `track`, with what was found on the way where the film is a disk's."""
     known = settings({} if config is None else config, **given)
-    return track_in_detail(video, **known, progress=progress).measurement
+    if known.get("bob") is not None:
+        return _pendulum(video, progress=progress, **known)
+    if known.pop("length", None) is not None:
+        raise TrackError("length is a pendulum's: say its bob's colour too")
+    return track_in_detail(video, **known, progress=progress)
+
+
+def _pendulum(
+    video: str | os.PathLike[str],
+    *,
+    bob: Any,
+    progress: bool,
+    length: float | None = None,
+    fps: float | None = None,
+    pivot: tuple[float, float] | None = None,
+    scale: float | None = None,
+    region: Region | None = None,
+    calibrate: Calibrate | Mapping[str, bool | float] | None = None,
+    refine: bool = False,
+    **more: Any,
+) -> Measurement:
+    """A plain pendulum's film; there is one pass whatever `refine` says."""
+    from tqdm import tqdm
+
+    if more:
+        raise TrackError(f"{', '.join(more)}: not for a pendulum, which has a bob and a length alone")
+    setup = Setup(
+        pivot=pivot,
+        layout=read_bob(bob),
+        scale=None if scale is None else _length(scale, "scale", "pixels per metre"),
+        region=None if region is None else read_region(region),
+        calibrate=read_calibrate({} if calibrate is None else calibrate),
+    )
+    film = Film(video, fps=fps)
+    metres_long = None if length is None else _length(length, "length")
+    with tqdm(total=film.packets, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
+        return track_bob(film, metres_long, setup, lambda _: bar.update())
 
 
 def track_in_detail(
@@ -131,26 +215,29 @@ def track_in_detail(
     fps: float | None = None,
     pivot: tuple[float, float] | None = None,
     refine: bool = True,
+    layout: Layout | Sequence[Mapping[str, Any]] = STANDARD,
+    scale: float | None = None,
+    region: Region | None = None,
+    calibrate: Calibrate | Mapping[str, bool | float] | None = None,
     progress: bool = False,
     watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
     """As `track`, with everything that was found on the way, in pixels; `watch` is told of each frame."""
-    radius = _length(disk_radius, "disk_radius")
-    distance = None if mark_distance is None else _length(mark_distance, "mark_distance")
+    tags = read_tags(layout) if is_tags(layout) and not isinstance(layout, Layout) else ()
+    setup = Setup(
+        _length(disk_radius, "disk_radius"),
+        None if mark_distance is None else _length(mark_distance, "mark_distance"),
+        pivot,
+        layout_of(tags) if tags else read_layout(layout),
+        None if scale is None else _length(scale, "scale", "pixels per metre"),
+        None if region is None else read_region(region),
+        read_calibrate({} if calibrate is None else calibrate),
+    )
     film = Film(video, fps=fps)
+    if tags:
+        return _by_tags(film, tags, setup, progress, watch)
     look_over = survey(film)
-    sights, missing = sightings(look_over.pictures)
-    seen = slowest(look_over.bursts, sights)
-    if len(seen) < FEWEST:
-        raise TrackError(
-            f"{film.path}: no disk with marks in red, orange, blue and green (clockwise) was found: "
-            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all four"
-        )
-    if missing is not None:
-        warnings.warn(
-            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=3
-        )
-    known, rim = prepare(film, look_over, sights, seen)
+    known, rim = _learn(film, look_over, setup)
     tracks = _follow(film, known, look_over.frames, progress, watch)
     centre, angle = np.array(tracks.centre), np.array(tracks.angle)
     if known.contact is None:  # else the paths were curved, and poses stand in their middle
@@ -158,34 +245,104 @@ def track_in_detail(
     angle, doubtful = recount(np.array(tracks.t), angle)
     tracks = replace(tracks, centre=list(centre), angle=list(angle))
     if refine:
-        known = _timed(known, look_over, tracks)
+        known = _timed(known, look_over, tracks, setup)
         tracks = _again(film, known, tracks, progress)
     drop_weak(tracks)
-    size = scale(known.look.places, rim, radius, distance)
-    camera = _camera(tracks, known, size, pivot)
-    values, sigma, rho = metres(tracks, covariance(tracks, rim.centre_sigma), camera)
-    gone = left_the_wheels(values, radius, camera.pivot_sigma)
+    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), pivot)
+    measurement = tabulated(film, tracks, known, camera, setup, rim, doubtful, refine)
+    return Tracking(measurement, tracks, known, camera, rim)
+
+
+def _by_tags(
+    film: Film,
+    tags: Sequence[Tag],
+    setup: Setup,
+    progress: bool,
+    watch: Callable[[Glimpse], object] | None,
+) -> Tracking:
+    """Printed tags: each frame by itself, in one pass."""
+    from tqdm import tqdm
+
+    frames = film.promised or film.packets
+    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
+
+        def tick(picture: Picture, pose: Pose) -> None:
+            bar.update()
+            if watch is not None:
+                look = Look([], 0.0, 1.0, film.light, np.inf)
+                watch(Glimpse(picture, pose, look, frames, film.full_range))
+
+        tracks, known = follow_tags(film, film.pictures(), tags, setup, tick)
+    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
+    if known.exposure:
+        centre, angle = at_middle(np.array(tracks.t), centre, angle, known.exposure)
+    angle, doubtful = recount(np.array(tracks.t), angle)
+    tracks = replace(tracks, centre=list(centre), angle=list(angle))
+    camera = camera_of(tracks, known, size_of(known.look.places, None, setup), setup.pivot)
+    measurement = tabulated(film, tracks, known, camera, setup, None, doubtful, False)
+    return Tracking(measurement, tracks, known, camera, None)
+
+
+def _learn(film: Film, look_over: Survey, setup: Setup) -> tuple[Known, Outline | None]:
+    """Find the disk in the survey, and learn all that is needed to follow it."""
+    inside = [setup.inside(p) for p in look_over.pictures]
+    missing, what = None, "red, orange, blue and green (clockwise)"
+    if setup.layout.standard:
+        sights, missing = sightings(inside)
+    else:
+        sights, what = matching(inside, setup.layout, setup.scale), "the layout's colours"
+    seen = slowest(look_over.bursts, sights)
+    if len(seen) < FEWEST:
+        raise TrackError(
+            f"{film.path}: no disk with marks in {what} was found: "
+            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all {len(setup.layout.places)}"
+        )
+    if missing is not None:
+        warnings.warn(
+            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=4
+        )
+    return prepare(film, look_over, sights, seen, setup)
+
+
+def tabulated(
+    film: Film,
+    tracks: Tracks,
+    known: Known,
+    camera: Camera,
+    setup: Setup,
+    rim: Outline | None,
+    doubtful: int,
+    twice: bool,
+) -> Measurement:
+    """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
+    # Where the layout is taken as said, so is the centre.
+    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else 0.0
+    values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma), camera)
+    gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
-    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > VAGUE * radius
+    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > VAGUE * setup.radius
     for table in (values, sigma, rho):
         table[vague] = np.nan
     tracks.flag = [VAGUE_SAYS if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
     tracks.flag = [GONE_SAYS if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
-    meta = _meta(film, look_over, tracks, known, camera, radius, doubtful)
-    measurement = Measurement(np.array(tracks.t), values, sigma, rho, np.array(tracks.flag), meta, DISK)
+    meta = meta_of(film, tracks, known, camera, setup, doubtful)
+    seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
+    tracks.flag = remarks(np.array(tracks.t), tracks.flag, seen_how, twice)
+    flag = np.array(tracks.flag)
+    measurement = Measurement(np.array(tracks.t), values, sigma, rho, flag, meta, DISK, seen_how)
     try:
         check_length(measurement)
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}") from None
-    return Tracking(measurement, tracks, known, camera, rim)
+    return measurement
 
 
-def _length(value: float, name: str) -> float:
+def _length(value: float, name: str, unit: str = "metres") -> float:
     try:
         length = float(value)
     except (TypeError, ValueError):
-        raise TrackError(f"{name} must be a number of metres, not {value!r}") from None
+        raise TrackError(f"{name} must be a number of {unit}, not {value!r}") from None
     if not (math.isfinite(length) and length > 0):
         raise TrackError(f"{name} must be positive and finite, not {value!r}")
     return length
@@ -206,7 +363,7 @@ def _follow(
         return follow(film.pictures(), known, tick)
 
 
-def _timed(known: Known, look_over: Survey, tracks: Tracks) -> Known:
+def _timed(known: Known, look_over: Survey, tracks: Tracks, setup: Setup) -> Known:
     """Exposure and readout once more, now that every frame's motion is known from its neighbours."""
     around = Around(tracks)
     frames = []
@@ -214,12 +371,12 @@ def _timed(known: Known, look_over: Survey, tracks: Tracks) -> Known:
         here = around.at(picture.index) if picture.index < len(tracks.t) else None
         if here is not None and here.held and not tracks.flag[picture.index]:
             frames.append((picture.y, here))
-    if known.readout.value:
+    if known.readout.value and setup.calibrate.given("readout") is None:
         moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
         again = readout(moving, known.look, known.view, around.interval)
         if again.value:
             known = replace(known, look=replace(known.look, readout=again.value), readout=again)
-    if known.exposure:
+    if known.exposure and setup.calibrate.given("exposure") is None:
         paths = [(y, here.pose, here.motion) for y, here in frames]
         known = replace(known, exposure=retimed(paths, known.exposure, known.look, known.view))
     return known
@@ -238,77 +395,6 @@ def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
         with tqdm(total=len(tracks.t), unit="frame", desc=f"refine {film.path.name}") as bar:
             tracks = second_pass(film.pictures(), known, tracks, lambda _: bar.update(), streaks_only)
     return tracks
-
-
-def _camera(tracks: Tracks, known: Known, size: Scale, given: tuple[float, float] | None) -> Camera:
-    angle, centre = np.array(tracks.angle), np.array(tracks.centre)
-    good = np.isfinite(angle)
-    found = rolling(np.array(tracks.t), centre, angle, good, abs(known.look.marks[0].place))
-    drive = complex(np.nan, np.nan) if found is None else complex(np.conj(found.drive) / size.value)
-
-    def camera(place: complex, sigma: float, origin: str) -> Camera:
-        return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive)
-
-    if given is not None:
-        place = complex(float(given[0]), float(given[1]))
-        if not np.isfinite(place):
-            raise TrackError(f"pivot must be two finite numbers, not {given!r}")
-        return camera(complex(known.look.lens.plane(place)), 0.0, "given")
-    if found is not None:
-        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / size.value, "rolling constraint")
-    guess = support(known.view)
-    if guess is None:
-        raise TrackError(
-            "the motion does not tell where the contact point is (the disk hardly turns, or turns steadily) "
-            "and no support is seen: give pivot=(u, v) in pixels"
-        )
-    warnings.warn(
-        "the motion does not tell where the contact point is; it is taken from the support, to about "
-        f"{CLOSE_ENOUGH:.0f} mm",
-        stacklevel=4,
-    )
-    return camera(complex(known.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
-
-
-def _meta(
-    film: Film, look_over: Survey, tracks: Tracks, known: Known, camera: Camera, radius: float, doubtful: int
-) -> dict[str, Any]:
-    lost = sum(flag != "" for flag in tracks.flag)
-    missing = max(0, film.promised - len(tracks.t))
-    if missing or film.broken:
-        warnings.warn(
-            f"{film.path}: {missing or film.broken} frames are missing or do not decode; "
-            "the film may be cut off",
-            stacklevel=4,
-        )
-    return {
-        "source": film.path.name,
-        "R": radius,
-        "fps": film.fps,
-        "frames": len(tracks.t),
-        "frames_missing": missing,
-        "frames_lost": lost,
-        "turns_doubtful": doubtful,
-        "exposure": known.exposure,
-        "readout": known.readout.value,
-        "readout_sigma": known.readout.sigma,
-        "px_per_m": camera.scale,
-        "px_per_m_sigma": camera.scale_sigma,
-        "px_per_m_from": camera.scale_from,
-        "pivot_u": camera.pivot.real,
-        "pivot_v": camera.pivot.imag,
-        "pivot_sigma": camera.pivot_sigma,
-        "pivot_from": camera.pivot_from,
-        "drive_seen": float(camera.drive.imag),
-        "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
-        "marks_px": [[m.place.real, m.place.imag] for m in known.look.marks],
-        "psf_px": known.look.psf,
-        "lens": _numbers(known.look.lens),
-    }
-
-
-def _numbers(lens: Lens) -> list[float]:
-    return [] if lens.plain else list(lens.row)
 
 
 def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[NDArray[np.uint8]]:

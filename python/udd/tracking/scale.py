@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .disk import Outline
-from .find import BODY
+from .setup import Setup
 
 REACH = 65 / 80  # of the radius: where the marks of the standard disk have their centres
 RIM_EDGE = 0.35  # pixels: how well light and lens let one say where a bright disk ends
 PLACED = 0.02  # pixels: how well the marks' mean places are known
+BY_HAND = 0.05e-3  # m: how well two marks are glued where the layout says; three and more show it themselves
 UNLIKE = 0.015  # relative difference from the rim's scale at which the marks are not the standard ones
 
 
@@ -25,24 +26,32 @@ class Scale:
     origin: str
 
 
-def scale(
-    places: NDArray[np.complex128], rim: Outline, radius: float, mark_distance: float | None = None
-) -> Scale:
+def scale(places: NDArray[np.complex128], rim: Outline | None, setup: Setup) -> Scale:
     """Combine the marks' spacing, their distance from the disk's centre known, with the rim's radius.
 
     Each counts by its uncertainty: that of the rim is where its edge lies; that of the marks shows in how far
-    they are from a perfect square. Without a given distance the marks count where they fit the standard disk.
+    they are from their layout. Without a given distance the standard marks count where they fit the standard
+    disk.
     """
-    by_rim, rim_sigma = rim.radius / radius, float(np.hypot(rim.sigma, RIM_EDGE)) / radius
-    reach = REACH * radius if mark_distance is None else mark_distance
-    body = BODY * reach
+    if setup.scale is not None:
+        return Scale(setup.scale, 0.0, "given")
+    layout, radius = setup.layout, setup.radius
+    reach = layout.reach if not layout.standard else setup.distance or REACH * radius
+    body = layout.unit * reach
+    body = body - body.mean()
     away = places - places.mean()
-    factor = complex(np.vdot(body, away) / np.vdot(body, body).real)
+    square = float(np.vdot(body, body).real)
+    factor = complex(np.vdot(body, away)) / square
     rest = away - factor * body
-    # eight coordinates, of which a shift, a turn and a factor take four
-    glued = float(np.sqrt((np.abs(rest) ** 2).sum() / 4))
-    by_marks, marks_sigma = abs(factor), float(np.hypot(glued, PLACED) / 2 / reach)
-    if mark_distance is None and abs(by_marks / by_rim - 1) > UNLIKE:
+    # of 2 n coordinates a shift, a turn and a factor take four
+    spare = 2 * len(places) - 4
+    by_marks = abs(factor)
+    glued = float(np.sqrt((np.abs(rest) ** 2).sum() / spare)) if spare else BY_HAND * by_marks
+    marks_sigma = float(np.hypot(glued, PLACED) / np.sqrt(square))
+    if rim is None:
+        return Scale(by_marks, marks_sigma, "marks")
+    by_rim, rim_sigma = rim.radius / radius, float(np.hypot(rim.sigma, RIM_EDGE)) / radius
+    if layout.standard and setup.distance is None and abs(by_marks / by_rim - 1) > UNLIKE:
         return Scale(by_rim, rim_sigma, "rim")
     w_rim, w_marks = rim_sigma**-2, marks_sigma**-2
     value = (w_rim * by_rim + w_marks * by_marks) / (w_rim + w_marks)

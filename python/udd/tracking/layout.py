@@ -1,0 +1,265 @@
+"""Where the marks sit on the disk, and in which colours; the standard four, or any two or more by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Picture, TrackError
+from .find import BODY, LEAST_CHROMA, Blobs, Sight, agreeing, blobs
+
+NAMED = {
+    "red": (200, 38, 44),
+    "orange": (240, 134, 36),
+    "yellow": (238, 214, 40),
+    "green": (34, 138, 62),
+    "cyan": (30, 170, 190),
+    "blue": (30, 78, 186),
+    "purple": (112, 48, 160),
+    "magenta": (200, 40, 150),
+}
+PALEST = 12.0  # of 127: chroma of a mark below which it is grey
+SAME = 0.985  # cosine between two colours' directions above which they are one
+HUE = 0.87  # the same between a pixel and its mark
+SLACK = 0.12  # of the arm by which a mark may miss its place
+STILL = 0.7  # share of the survey in which a patch that stands still is none of the marks
+STANDS = 1.5  # pixels by which it may seem to move
+SMALLEST, LARGEST = 0.015, 0.6  # side of a mark against the marks' reach
+MOST = 40  # ways to see the disk in one picture that are kept
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Coloured marks on a disk.
+
+    Attributes
+    ----------
+    places : tuple of complex
+        Centres of the marks at beta = 0 [m from the disk's centre, u to the right, v down]. Of the standard
+        layout only the directions are meant.
+    colours : tuple of (int, int, int)
+        sRGB codes.
+    standard : bool
+        Whether these are the four marks of the paper's disk.
+    """
+
+    places: tuple[complex, ...]
+    colours: tuple[tuple[int, int, int], ...]
+    standard: bool = False
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance of the outermost mark [m]."""
+        return float(np.abs(self.places).max())
+
+    @cached_property
+    def unit(self) -> NDArray[np.complex128]:
+        """The places in units of `reach`."""
+        return np.array(self.places, dtype=np.complex128) / self.reach
+
+    @cached_property
+    def chroma(self) -> NDArray[np.float64]:
+        """Colour differences (U, V) of each mark, (n, 2), of 127 (BT.601)."""
+        red, green, blue = np.array(self.colours, dtype=float).T / 255
+        light = 0.299 * red + 0.587 * green + 0.114 * blue
+        return np.column_stack([0.564 * (blue - light), 0.713 * (red - light)]) * 224
+
+
+STANDARD = Layout(
+    tuple(complex(d) for d in BODY), tuple(NAMED[c] for c in ("red", "orange", "blue", "green")), True
+)
+
+
+def read_layout(said: Any) -> Layout:
+    """A layout from marks as ``{"at": [y, z], "colour": "red"}`` (m at beta = 0; or an sRGB triple).
+
+    Raises
+    ------
+    TrackError
+        Fewer than two marks, two in one place, no colour, or a layout that looks the same turned.
+    """
+    if isinstance(said, Layout):
+        return said
+    if isinstance(said, str | Mapping) or not isinstance(said, Sequence) or len(said) < 2:
+        raise TrackError("layout must be a list of two marks or more, each with at = [y, z] and colour")
+    places, colours = [], []
+    for number, mark in enumerate(said, start=1):
+        if not isinstance(mark, Mapping) or set(mark) != {"at", "colour"}:
+            raise TrackError(f"layout: mark {number} must say at = [y, z] and colour, and nothing else")
+        places.append(read_place(mark["at"], number))
+        colours.append(_colour(mark["colour"], number))
+    layout = Layout(tuple(places), tuple(colours))
+    _check(layout)
+    return layout
+
+
+def read_place(at: Any, number: int) -> complex:
+    """A place [m], u to the right and v down, from [y, z]."""
+    try:
+        y, z = (float(x) for x in at)
+        place = complex(y, -z)
+    except (TypeError, ValueError):
+        place = complex(np.nan, np.nan)
+    if not np.isfinite(place):
+        raise TrackError(f"layout: at of mark {number} must be two numbers of metres [y, z], not {at!r}")
+    return place
+
+
+def _colour(said: Any, number: int) -> tuple[int, int, int]:
+    if isinstance(said, str):
+        if said not in NAMED:
+            raise TrackError(
+                f"layout: colour of mark {number} must be one of {', '.join(NAMED)} "
+                f"or three codes [r, g, b], not {said!r}"
+            )
+        return NAMED[said]
+    try:
+        red, green, blue = (int(c) for c in said)
+    except (TypeError, ValueError):
+        raise TrackError(
+            f"layout: colour of mark {number} must be a name or [r, g, b], not {said!r}"
+        ) from None
+    if not all(0 <= c <= 255 for c in (red, green, blue)):
+        raise TrackError(f"layout: the codes of mark {number}'s colour must be from 0 to 255, not {said!r}")
+    return red, green, blue
+
+
+def read_bob(colour: Any) -> Layout:
+    """The one mark of a plain pendulum, by its colour's name or sRGB codes."""
+    layout = Layout((1 + 0j,), (_colour(colour, 1),))
+    if float(np.hypot(*layout.chroma[0])) < PALEST:
+        raise TrackError("bob must have a colour: grey, black and white cannot be told from the rest")
+    return layout
+
+
+def _check(layout: Layout) -> None:
+    places = np.array(layout.places)
+    apart = np.abs(places[:, None] - places[None, :]) + np.eye(len(places)) * 1e9
+    if apart.min() < 0.05 * layout.reach:
+        raise TrackError("layout: two marks are in the same place")
+    for number, chroma in enumerate(np.hypot(*layout.chroma.T), start=1):
+        if chroma < PALEST:
+            raise TrackError(
+                f"layout: mark {number} has no colour (grey, black and white cannot be told apart)"
+            )
+    alike = same_colour(layout.chroma)
+    middle = places - places.mean()
+    # turned about their mean, marks of like colours must not fall upon each other: the angle would be a guess
+    first = int(np.argmax(np.abs(middle)))
+    for k in np.flatnonzero(alike[first]):
+        if k == first or abs(abs(middle[k]) - abs(middle[first])) > 2 * SLACK * layout.reach:
+            continue
+        turned = middle * middle[k] / middle[first]
+        near = (np.abs(turned[:, None] - middle[None, :]) < SLACK * layout.reach) & alike
+        if near.any(axis=1).all():
+            raise TrackError("layout: the marks look the same when the disk is turned; use another colour")
+
+
+def same_colour(chroma: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which marks have one colour, (n, n)."""
+    unit = chroma / np.hypot(*chroma.T)[:, None]
+    return np.asarray(unit @ unit.T > SAME)
+
+
+def sightings(pictures: Sequence[Picture], layout: Layout, scale: float | None = None) -> list[Sight | None]:
+    """The disk in each picture that shows all its marks (or, of four and more, all but one).
+
+    `scale` [pixels per metre] helps where little else tells marks from patches of the same colours.
+    """
+    patches = [coloured(p, layout) for p in pictures]
+    moving = _without_still(patches)
+    n = len(layout.places)
+    best: list[Sight | None] = [None] * len(pictures)
+    for found in (moving, patches):
+        for least in range(n, max(n - 2, min(n, 3) - 1), -1):
+            sights = agreeing([matches(p, layout, least, scale) for p in found])
+            if sum(s is not None for s in sights) > 2 * sum(s is not None for s in best):
+                best = sights
+            if sum(s is not None for s in best) >= max(3, len(pictures) // 10):
+                return best
+    return best
+
+
+def coloured(picture: Picture, layout: Layout) -> list[Blobs]:
+    """Blobs of each mark's colour; marks of one colour have the same ones."""
+    u, v = picture.u.astype(np.float32) - 128, picture.v.astype(np.float32) - 128
+    unit = (layout.chroma / np.hypot(*layout.chroma.T)[:, None]).astype(np.float32)
+    along = np.stack([a * u + b * v for a, b in unit])
+    size, best = np.hypot(u, v), along.max(axis=0)
+    least = max(6, picture.u.size // 20000)
+    strong = (size > LEAST_CHROMA) & (best > HUE * size)
+    return [blobs(strong & (one >= best - 1e-3), least) for one in _merged(along, layout)]
+
+
+def _merged(along: NDArray[np.float32], layout: Layout) -> list[NDArray[np.float32]]:
+    """For each mark how far a pixel goes along its colour, or that of any mark with the same one."""
+    return [along[row].max(axis=0) for row in same_colour(layout.chroma)]
+
+
+def _without_still(patches: list[list[Blobs]]) -> list[list[Blobs]]:
+    """Without those that are in the same place in most pictures."""
+    out = [list(p) for p in patches]
+    for k in range(len(patches[0]) if patches else 0):
+        everywhere = [p[k].centre for p in patches]
+        for row, p in zip(out, patches, strict=True):
+            here = p[k].centre
+            count = np.zeros(len(here))
+            for other in everywhere:
+                if len(other) and len(here):
+                    count += np.abs(here[:, None] - other[None, :]).min(axis=1) < STANDS
+            keep = count < STILL * len(patches)
+            row[k] = Blobs(here[keep], p[k].area[keep])
+    return out
+
+
+def matches(
+    patches: list[Blobs], layout: Layout, least: int, scale: float | None = None
+) -> list[tuple[float, Sight]]:
+    """Ways in which blobs could be the marks of the disk, as (misfit, sight), the best first."""
+    body, n = layout.unit, len(layout.places)
+    found: list[tuple[int, float, Sight]] = []
+    for i in range(n):
+        for j in range(i + 1, n):
+            for a in patches[i].centre:
+                for b in patches[j].centre:
+                    if abs(b - a) < 4:
+                        continue
+                    turn = (b - a) / (body[j] - body[i])
+                    size = abs(turn) / layout.reach
+                    if scale is None or abs(np.log(size / scale)) < SLACK:
+                        match = _match(patches, body, complex(a - turn * body[i]), complex(turn))
+                        if match is not None and match[0] >= least:
+                            found.append(match)
+    found.sort(key=lambda m: (-m[0], m[1]))
+    return [(misfit, sight) for _, misfit, sight in found[:MOST]]
+
+
+def _match(
+    patches: list[Blobs], body: NDArray[np.complex128], centre: complex, turn: complex
+) -> tuple[int, float, Sight] | None:
+    """The rigid fit, at any scale, to all blobs near the places that two of them ask for."""
+    at, seen, areas = [], [], []
+    for k, patch in enumerate(patches):
+        if len(patch.centre):
+            away = np.abs(patch.centre - centre - turn * body[k])
+            m = int(np.argmin(away))
+            if away[m] < SLACK * abs(turn):
+                at.append(body[k])
+                seen.append(patch.centre[m])
+                areas.append(patch.area[m])
+    z, w, area = np.array(at), np.array(seen), np.array(areas)
+    if len(w) < 2 or np.abs(w[:, None] - w[None, :])[~np.eye(len(w), dtype=bool)].min() < 4:
+        return None  # one patch for two marks
+    spread = z - z.mean()
+    turn = complex(np.vdot(spread, w - w.mean()) / np.vdot(spread, spread).real)
+    centre = complex(w.mean() - turn * z.mean())
+    side = np.sqrt(area) / abs(turn)
+    if side.max() > LARGEST or side.min() < SMALLEST or area.max() > 6 * area.min():
+        return None
+    misfit = float(np.sqrt(np.mean(np.abs(w - centre - turn * z) ** 2)) / abs(turn))
+    return len(w), misfit, Sight(centre, float(np.angle(turn)), abs(turn), float(area.mean()))

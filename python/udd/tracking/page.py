@@ -1,0 +1,47 @@
+"""The page about a tracked film."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from udd.measurement import Measurement
+
+    from .run import Tracking
+
+
+def page(
+    video: str | os.PathLike[str],
+    found: Measurement | Tracking,
+    path: str | os.PathLike[str],
+    *,
+    command: str | None = None,
+) -> None:
+    """Write a page about a tracked film: its motion, its camera with uncertainties, and how each frame did.
+
+    Parameters
+    ----------
+    video : path
+        The film that was tracked.
+    found : Measurement or Tracking
+        What was made of it; a `Tracking` also shows how far each mark was off in each part of the picture.
+    path : path
+        Of the page (HTML); an older one is replaced once the new one is complete.
+    command : str, optional
+        How it was made.
+
+    Raises
+    ------
+    UddError
+        The page cannot be written there, or the measurement does not come from a film.
+
+    Examples
+    --------
+    >>> import udd
+    >>> m = udd.track("run.mp4")  # doctest: +SKIP
+    >>> udd.tracking.page("run.mp4", m, "run.html")  # doctest: +SKIP
+    """
+    from udd.report.tracked import write_tracked
+
+    write_tracked(video, found, path, command=command)

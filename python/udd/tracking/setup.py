@@ -1,0 +1,136 @@
+"""What is said by hand before a film is tracked, and which calibrations are left to the film."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Picture, TrackError
+from .layout import STANDARD, Layout, read_layout
+
+Region = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """What the film itself is asked for. True: find it; False: not there, or as given; a number: it is that.
+
+    Attributes
+    ----------
+    layout : bool
+        Where the marks sit on the disk; False: just where the layout says.
+    scale : bool
+        Pixels per metre; False needs `scale`.
+    lens : bool or float
+        Relative displacement at the picture's corner.
+    tilt : bool
+        How the camera stands to the disk's plane.
+    readout : bool or float
+        Time that a rolling shutter takes from the first row to the last [s].
+    exposure : bool or float
+        Time for which the shutter is open [s].
+    pivot : bool
+        Where the wheels hold the disk; False needs `pivot`.
+    """
+
+    layout: bool = True
+    scale: bool = True
+    lens: bool | float = True
+    tilt: bool = True
+    readout: bool | float = True
+    exposure: bool | float = True
+    pivot: bool = True
+
+    def given(self, name: str) -> float | None:
+        """The value to take where an item is not to be found; None where it is."""
+        value = getattr(self, name)
+        return None if value is True else float(value)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All that may be said by hand."""
+
+    radius: float = 0.08
+    distance: float | None = None
+    pivot: tuple[float, float] | None = None
+    layout: Layout = STANDARD
+    scale: float | None = None  # pixels per metre
+    region: Region | None = None  # u from, v from, u to, v to [pixels]
+    calibrate: Calibrate = Calibrate()
+
+    def __post_init__(self) -> None:
+        """Refuse what contradicts itself."""
+        if self.distance is not None and not self.layout.standard:
+            raise TrackError("mark_distance is of the standard marks: a layout says where its own are")
+        for name in ("scale", "pivot"):
+            if not getattr(self.calibrate, name) and getattr(self, name) is None:
+                raise TrackError(f"{name} is not to be found in the film, so it must be given")
+
+    def view(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Pixels inside the region, (height, width)."""
+        inside = np.zeros(shape, dtype=bool)
+        u0, v0, u1, v1 = self.region or (0, 0, shape[1], shape[0])
+        inside[max(0, math.floor(v0)) : math.ceil(v1), max(0, math.floor(u0)) : math.ceil(u1)] = True
+        if not inside.any():
+            raise TrackError(
+                f"region {self.region} lies outside the picture of {shape[1]} x {shape[0]} pixels"
+            )
+        return inside
+
+    def inside(self, picture: Picture) -> Picture:
+        """The picture without colours outside the region."""
+        if self.region is None:
+            return picture
+        here = self.view(picture.y.shape)[::2, ::2][: picture.u.shape[0], : picture.u.shape[1]]
+        grey = np.uint8(128)
+        return replace(picture, u=np.where(here, picture.u, grey), v=np.where(here, picture.v, grey))
+
+
+def read_calibrate(said: Any) -> Calibrate:
+    """From a mapping of names to true, false or numbers.
+
+    Raises
+    ------
+    TrackError
+        An item that there is not, or a value that it cannot have.
+    """
+    if isinstance(said, Calibrate):
+        return said
+    if not isinstance(said, Mapping):
+        raise TrackError(f"calibrate must be a table of {', '.join(_ITEMS)}, not {said!r}")
+    for name, value in said.items():
+        if name not in _ITEMS:
+            raise TrackError(f"calibrate: there is no item {name!r}; there are {', '.join(_ITEMS)}")
+        if isinstance(value, bool):
+            continue
+        low, high, unit = _RANGES.get(name, (math.nan, math.nan, ""))
+        if math.isnan(low):
+            raise TrackError(f"calibrate: {name} must be true or false, not {value!r}")
+        if not (isinstance(value, int | float) and low <= value <= high):
+            raise TrackError(
+                f"calibrate: {name} must be true, false or from {low:g} to {high:g}{unit}, not {value!r}"
+            )
+    return Calibrate(**said)
+
+
+def read_region(said: Any) -> Region:
+    """Four numbers: u and v of the upper left corner, and of the lower right [pixels]."""
+    try:
+        u0, v0, u1, v1 = (float(x) for x in said)
+    except (TypeError, ValueError):
+        u0 = v0 = u1 = v1 = math.nan
+    if not (math.isfinite(u0 + v0 + u1 + v1) and u0 < u1 and v0 < v1):
+        raise TrackError(f"region must be four numbers of pixels [u0, v0, u1, v1], growing, not {said!r}")
+    return u0, v0, u1, v1
+
+
+_ITEMS = tuple(f.name for f in fields(Calibrate))
+_RANGES = {"lens": (-0.3, 0.3, ""), "readout": (-0.1, 0.1, " s"), "exposure": (0.0, 0.1, " s")}
+
+__all__ = ["Calibrate", "Layout", "Region", "Setup", "read_calibrate", "read_layout", "read_region"]
