@@ -12,6 +12,7 @@ import simulated
 import udd
 from udd.discovery.candidates import ripples
 from udd.discovery.scan import scan, scan_ripples, strongest_ripple
+from udd.discovery.search import Search
 from udd.errors import FitError
 
 E = udd.effects
@@ -81,6 +82,13 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.effects == []
     assert found.alternatives == []
     assert found.ratio == (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(("ratio", "found"), [((0.99, 0.97, 1.01), True), ((1.01, 0.99, 1.03), False)])
+def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, found):
+    # With all parameters held, their errors may hide what the held-out frames gain; fitted too, they show it.
+    monkeypatch.setattr(Search, "_held_ratio", lambda *_: ratio)
+    assert bool(discovered(E.quadratic_drag(c=5e-4), seed=12, duration=20.0).effects) == found
 
 
 def test_a_shape_between_those_tried_is_found():

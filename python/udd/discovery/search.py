@@ -470,10 +470,12 @@ class Search:
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in trials if t.criterion(unit) + t.handicap - least <= 2 * NATS):
             ratio = self._held_ratio(current.part, trial.fit)
-            whole = self._again(current.whole, trial) if ratio[2] < 1.0 else None
+            whole = self._again(current.whole, trial) if ratio[0] < 1.0 else None
             if whole is None:
                 continue
             before, after = self._level(current.whole, whole.fit)
+            if ratio[2] >= 1.0 and not self._borne_out(current, trial.fit, before, after):
+                continue
             inflation = after.inflation(before)
             fall = (before.chi2 - after.chi2) / inflation
             # What a film's faults make up is no sum of squares of chance alone.
@@ -509,6 +511,15 @@ class Search:
         level = min(before.level, after.level)
         costs = self._level(held(before, record, level), held(after, record, level))
         return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), record, unit=self.unit)
+
+    def _borne_out(self, current: State, part: Fit, before: Fit, after: Fit) -> bool:
+        """Whether the held-out frames want the same effect: chi2 falls further once they are fitted too.
+
+        That tells more than their cost with all parameters held, in which those parameters' errors count.
+        """
+        one, other = at_level(current.part, after.level), at_level(part, after.level)
+        further = (before.chi2 - after.chi2) - (one.chi2 - other.chi2)
+        return bool(chi2.sf(further / after.inflation(before), 1) < ALPHA)
 
     def _worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
