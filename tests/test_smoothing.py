@@ -88,7 +88,7 @@ def test_the_command_smooths_what_it_tracked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     m, _ = noisy(n=60)
-    monkeypatch.setattr("udd.tracking.track", lambda *_, **__: m)
+    monkeypatch.setattr("udd.tracking.run.track_whole", lambda *_, **__: m)
     out = tmp_path / "m.csv"
     assert main(["track", "film.mp4", "--smooth", "--slip", "1e-3", "--out", str(out)]) == 0
     written = udd.read_measurement(out)
