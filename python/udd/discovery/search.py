@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -362,9 +363,16 @@ class Search:
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
         passing = look.passing()
-        singles = self._singles(current, passing)
-        if singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
-            singles += self._rivals(current, look, max(look.nats(s) for s in passing))
+        # Of curves over angles for which formulas have no word another is about as likely.
+        curve = next((c for c in look.curves if c.sayable and len(c.coordinates) == 1), None)
+        with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
+            sought = beside.submit(self._formulas, current, curve) if curve and passing else None
+            singles = self._singles(current, passing)
+        if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
+            # Formulas that may explain the data as well as what the library has.
+            known = max(look.nats(s) for s in passing)
+            rivals = [f for f in sought.result() if curve.evidence + f.nats > known - NATS]
+            singles += self._written(current, curve, rivals)
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
@@ -376,17 +384,6 @@ class Search:
         faults = look.fit.faults
         shown = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
         return self._accept(current, self._curves(current, _states_first(shown)[:_CURVES]), look)
-
-    def _rivals(self, current: State, look: Look, known: float) -> list[Trial]:
-        """Formulas that may explain the data as well as what the library has."""
-        trials: list[Trial] = []
-        # Of curves over angles for which formulas have no word another is about as likely.
-        for curve in [c for c in look.curves if c.sayable and len(c.coordinates) == 1][:1]:
-            written = self._formulas(current, curve)
-            trials += self._written(
-                current, curve, [f for f in written if curve.evidence + f.nats > known - NATS]
-            )
-        return trials
 
     def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
         """Formulas for a curve, fitted."""
