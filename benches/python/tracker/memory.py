@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 FRAMES = (500, 5000)
-ROW = 2_000  # bytes per frame that tables of Python's objects take: 10 lists, arrays of 4 marks
+ROW = 5_000  # bytes per frame that tables of Python objects may take (3 100 measured); a picture is a million
 SLACK = 20e6  # bytes: what the allocator keeps
 
 
