@@ -53,7 +53,7 @@ def _values(effect: Any) -> list[str]:
             f"{words.pretty(name)} = {words.with_error(value, effect.errors.get(name))} {units.get(name, '')}"
         )
         for name, value in effect.parameters.items()
-        if not words.is_curve(effect.effect)
+        if not words.is_spline(effect.effect)
     ]
 
 

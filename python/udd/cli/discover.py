@@ -59,12 +59,12 @@ def describe(found: Discovery) -> str:
     lines = [f"{found.verdict}: {words.verdict(found)}"]
     for effect in found.effects:
         unit = {p.name: p.unit for p in effect.effect.spec.parameters}
-        is_curve = words.is_curve(effect.effect)
+        is_spline = words.is_spline(effect.effect)
         values = ", ".join(
             " ".join(filter(None, [f"{name} = {_with_error(value, effect.errors.get(name))}", unit[name]]))
             for name, value in effect.parameters.items()
         )
-        lines.append(f"  {effect.title}: {effect.equation}" + ("" if is_curve else f", {values}"))
+        lines.append(f"  {effect.title}: {effect.equation}" + ("" if is_spline else f", {values}"))
     span = numbers.span.replace("\u00a0", " ")
     at = numbers.floor_at.replace("\u00a0", " ")
     if found.effects:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from udd._expressions import Expression
-from udd.effects.own import CurveSpec, SurfaceSpec
+from udd.effects.own import is_spline
 from udd.errors import FitError
 from udd.fitting import Fit, fit_record, record_of, refit
 from udd.measurement import Measurement
@@ -114,7 +114,7 @@ def discover(
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
     if found:
-        unnamed = any(isinstance(f.effect.spec, CurveSpec | SurfaceSpec) for f in found)
+        unnamed = any(is_spline(f.effect) for f in found)
         verdict = "effect present, form not identified" if doubtful or unnamed else "effect identified"
     else:
         unexplained = baseline.scatter > _UNEXPLAINED

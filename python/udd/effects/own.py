@@ -319,10 +319,8 @@ def curve(
     if values.ndim != 1 or len(values) < 4:
         raise ModelError("a curve needs a list of at least four coefficients")
     first, last = number("low", low), number("high", high, above=float(low))
-    _slot(slot)
-    x, unit = text_of("the coordinate", coordinate), _SLOTS[slot][1] if slot in _SLOTS else ""
-    names = [f"c{i}" for i in range(len(values))]
-    listed = tuple(_parameter(name, own, unit, True, UNLIMITED) for own in names)
+    listed = _coefficients(slot, name, len(values))
+    x, names = text_of("the coordinate", coordinate), [p.name for p in listed]
     text = f"{'periodic' if periodic else 'spline'}({x}, {first!r}, {last!r}, {', '.join(names)})"
     shown = f"s({x}), a {'periodic ' if periodic else ''}cubic spline from {first:g} to {last:g}"
     common = _described(slot, name, f"{slot} over {x}", shown, text, listed)
@@ -392,12 +390,9 @@ def surface(
         raise ModelError("a surface needs two coordinates, and where each begins and ends")
     first = tuple(number("low", v) for v in low)
     last = tuple(number("high", v, above=a) for v, a in zip(high, first, strict=True))
-    _slot(slot)
+    listed = _coefficients(slot, name, values.size)
     x, y = (text_of("the coordinate", c) for c in coordinates)
-    m, n = values.shape
-    unit = _SLOTS[slot][1] if slot in _SLOTS else ""
-    names = [f"c{i}" for i in range(m * n)]
-    listed = tuple(_parameter(name, own, unit, True, UNLIMITED) for own in names)
+    (m, n), names = values.shape, [p.name for p in listed]
     per = (m - 3) / (last[0] - first[0])
     kind = "periodic" if periodic else "spline"
     rows = (
@@ -414,6 +409,18 @@ def surface(
     )
     given = dict(zip(names, values.ravel().tolist(), strict=True))
     return spec.make(momentum=momentum, treatment=None, **given)
+
+
+def _coefficients(slot: str, name: str, count: int) -> tuple[Parameter, ...]:
+    """The parameters of a spline: its coefficients, all amplitudes, in the slot's unit."""
+    _slot(slot)
+    unit = _SLOTS[slot][1] if slot in _SLOTS else ""
+    return tuple(_parameter(name, f"c{i}", unit, True, UNLIMITED) for i in range(count))
+
+
+def is_spline(effect: Effect) -> bool:
+    """Whether an effect is a curve or a surface, whose many numbers say nothing to a reader."""
+    return isinstance(effect.spec, CurveSpec | SurfaceSpec)
 
 
 def _described(

@@ -24,7 +24,7 @@ def draw(discovery: Any, innovations: list[Any]) -> dict[str, Any]:
         "misfit": _misfits(discovery.fit),
         "whiteness": figures.whiteness(innovations),
         "evidence": [figures.evidence(discovery, stage) for stage in range(len(discovery.scans))],
-        "curves": [figures.curve(f.curve) for f in discovery.effects if words.is_curve(f.effect)],
+        "curves": [figures.curve(f.curve) for f in discovery.effects if words.is_spline(f.effect)],
     }
 
 

@@ -38,7 +38,7 @@ def _of_film(name: str) -> str:
 
 def _knots(discovery: Any) -> set[str]:
     """The parameters of curves, which a picture shows better."""
-    curves = [e for e in discovery.fit.model.effects if words.is_curve(e)]
+    curves = [e for e in discovery.fit.model.effects if words.is_spline(e)]
     return {f"{e.name}.{p}" for e in curves for p in e.parameters}
 
 

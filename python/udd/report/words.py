@@ -11,6 +11,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from udd.discovery.discover import SAME as IDENTICAL
+from udd.effects.own import is_spline as is_spline
 
 _SYMBOLS = (
     (r"\bOmega\b", "Ω"),
@@ -154,11 +155,6 @@ def values_of(found: Any, units: dict[str, str]) -> Markup:
         number = Markup("<b>{} = {}</b>").format(pretty(name), with_error(value, found.errors.get(name)))
         texts.append(number + Markup(" ") + unit if unit else number)
     return Markup(", ").join(texts)
-
-
-def is_curve(effect: Any) -> bool:
-    """Whether an effect is a curve, whose many numbers say nothing to a reader."""
-    return hasattr(effect.spec, "coordinate") or hasattr(effect.spec, "coordinates")
 
 
 def effect_sentence(effect: Any) -> str:
