@@ -74,6 +74,10 @@ class Look:
         """The marks as rows of six numbers, (n, 6)."""
         return np.array([m.row for m in self.marks])
 
+    def streak(self, motion: Motion) -> float:
+        """How far the outermost mark moves while the shutter is open, at most [pixels]."""
+        return abs(motion.shift) + abs(motion.turn) * self.reach
+
     @cached_property
     def reach(self) -> float:
         """Distance of the outermost mark [pixels]."""

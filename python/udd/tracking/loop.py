@@ -88,7 +88,7 @@ def follow(
     for picture in pictures:
         flag, fit, pose, motion = _one(picture, known, past, last)
         last = picture.y
-        append(tracks, picture.t, flag, fit, pose, _streak(motion, known.look), len(known.look.marks))
+        append(tracks, picture.t, flag, fit, pose, known.look.streak(motion), len(known.look.marks))
         if fit is not None:
             past = [*past[-2:], Held(picture.t, pose, motion.spin)]
         tick(picture, pose)
@@ -112,7 +112,7 @@ def _one(
         fit = hold(picture, known, pose, motion, CLOSE)
         if fit is not None:
             better = _motion(past, pose, picture.t, known)
-            if abs(_streak(better, known.look) - _streak(motion, known.look)) > 0.3:
+            if abs(known.look.streak(better) - known.look.streak(motion)) > 0.3:
                 motion = better
                 fit = hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
             return "", fit, pose, motion
@@ -125,7 +125,7 @@ def _one(
 
 def hold(picture: Picture, known: Known, pose: Pose, motion: Motion, rounds: list[float]) -> Fit | None:
     """Align and check; a mark that disagrees with three others is left out."""
-    most_off = MOST_OFF + STREAK_OFF * _streak(motion, known.look)
+    most_off = MOST_OFF + STREAK_OFF * known.look.streak(motion)
     start = Pose(pose.centre, pose.angle)
     fit = align(picture.y, known.view, known.look, pose, motion, rounds)
     if fit is not None and fit.used.sum() >= 4 and _worst(fit)[1] > most_off:
@@ -259,10 +259,6 @@ def along_contact(known: Known, pose: Pose, spin: float, change: float = 0.0) ->
     half = 0.5 * open_for**2
     shift, turn = rate * open_for, spin * open_for
     return Motion(shift, turn, bending * half, change * half, rate, spin, bending, change)
-
-
-def _streak(motion: Motion, look: Look) -> float:
-    return abs(motion.shift) + abs(motion.turn) * look.reach
 
 
 def repeats(y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before: Pose, look: Look) -> bool:

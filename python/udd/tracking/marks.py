@@ -140,7 +140,6 @@ def seen_at(look: Look, pose: Pose, motion: Motion, height: int) -> tuple[Array,
         at = pose.centre + places * turn
         return np.column_stack([centre.real, centre.imag, angle]), look.lens.locals(at)
     per_row = look.readout / height
-    late = np.zeros(len(places))
     at = pose.centre + places * turn
     for _ in range(3):
         late = per_row * (look.lens.picture(at).imag + 0.5 - height / 2)
@@ -149,8 +148,7 @@ def seen_at(look: Look, pose: Pose, motion: Motion, height: int) -> tuple[Array,
         at = centre + places * np.exp(1j * angle)
     locals_ = look.lens.locals(at)
     speed = motion.rate + motion.bending * late + 1j * (motion.spin + motion.twisting * late) * (at - centre)
-    if not locals_.flags.writeable or look.lens.plain:
-        locals_ = locals_.copy()
+    if look.lens.plain:
         locals_[:, 0], locals_[:, 1] = at.real, at.imag
         locals_[:, 2], locals_[:, 3] = at.real, at.imag
     locals_[:, 5] -= speed.real * per_row

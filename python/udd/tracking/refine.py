@@ -87,7 +87,7 @@ def _again(picture: Picture, k: int, known: Known, around: Around, tracks: Track
     pose = Pose(here.pose.centre, here.pose.angle)
     fit = hold(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
     reach = known.look.reach
-    streak = abs(motion.shift) + abs(motion.turn) * reach
+    streak = known.look.streak(motion)
     if fit is None:
         return
     away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
