@@ -13,8 +13,8 @@ from udd.film.light import Picture, to_light
 
 FINE = 2  # sprite pixels per picture pixel
 DISK = (232, 230, 222)
-# Clockwise from the red mark, which sits at the angle beta.
 INK = (24, 24, 26)  # of a printed tag
+# Clockwise from the red mark, which sits at the angle beta.
 MARKS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
 # In units of the disk's radius: 65 mm and 16 mm for R = 80 mm.
 MARK_CENTRE, MARK_SIDE = 65 / 80, 16 / 80

@@ -255,11 +255,16 @@ def _match(
     z, w, area = np.array(at), np.array(seen), np.array(areas)
     if len(w) < 2 or np.abs(w[:, None] - w[None, :])[~np.eye(len(w), dtype=bool)].min() < 4:
         return None  # one patch for two marks
-    spread = z - z.mean()
-    turn = complex(np.vdot(spread, w - w.mean()) / np.vdot(spread, spread).real)
-    centre = complex(w.mean() - turn * z.mean())
+    centre, turn = laid(z, w)
     side = np.sqrt(area) / abs(turn)
     if side.max() > LARGEST or side.min() < SMALLEST or area.max() > 6 * area.min():
         return None
     misfit = float(np.sqrt(np.mean(np.abs(w - centre - turn * z) ** 2)) / abs(turn))
     return len(w), misfit, Sight(centre, float(np.angle(turn)), abs(turn), float(area.mean()))
+
+
+def laid(body: NDArray[np.complex128], seen: NDArray[np.complex128]) -> tuple[complex, complex]:
+    """The centre and the factor, size and turn, that lay a body's points upon points that were seen."""
+    spread = body - body.mean()
+    turn = complex(np.vdot(spread, seen - seen.mean()) / np.vdot(spread, spread).real)
+    return complex(seen.mean() - turn * body.mean()), turn

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .corners import sharpened
 from .decode import Film, Picture, TrackError
-from .layout import Layout, read_place
+from .layout import Layout, laid, read_place
 from .lens import calibrate
 from .look import Look, Mark, Pose
 from .loop import FLAT, Held, Known, Tracks, append, predict, repeats
@@ -130,10 +130,13 @@ class Finder:
             y = np.ascontiguousarray(y[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
             away = complex(columns[0], rows[0])
         corners, numbers, _ = self.detector.detectMarkers(y)
-        for number, at in zip([] if numbers is None else np.ravel(numbers), corners, strict=False):
+        if not corners:
+            return out.ravel()
+        light = self.light[picture.y]
+        for number, at in zip(np.ravel(numbers), corners, strict=False):
             if int(number) in self.row:
                 u, v = np.reshape(at, (4, 2)).T
-                sharp = sharpened(self.light[picture.y], u + 1j * v + away, self.cells)
+                sharp = sharpened(light, u + 1j * v + away, self.cells)
                 if sharp is not None:
                     out[self.row[int(number)]] = sharp
         return out.ravel()
@@ -201,10 +204,8 @@ def _flag(picture: Picture) -> str:
 def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
     """The body laid through points at any size: pose and size."""
     ok = np.isfinite(at)
-    z, w = body[ok], at[ok]
-    spread = z - z.mean()
-    turn = complex(np.vdot(spread, w - w.mean()) / np.vdot(spread, spread).real)
-    return Pose(complex(w.mean() - turn * z.mean()), float(np.angle(turn))), abs(turn)
+    centre, turn = laid(body[ok], at[ok])
+    return Pose(centre, float(np.angle(turn))), abs(turn)
 
 
 def _rough_look(film: Film, setup: Setup) -> Look:
