@@ -121,7 +121,7 @@ def mark_coverage(
 def align_marks(
     codes: NDArray[np.uint8],
     view: NDArray[np.bool_],
-    light: _Floats,
+    lights: _Floats,
     look: Sequence[float],
     marks: _Floats,
     lens: Sequence[float],
@@ -130,6 +130,7 @@ def align_marks(
     rounds: Sequence[float],
     without: int | None = None,
     keep: bool = False,
+    even: NDArray[np.float32] | None = None,
 ) -> tuple[
     tuple[float, float, float],
     list[

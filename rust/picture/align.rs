@@ -22,6 +22,8 @@ pub struct Speed {
 /// The marked disk before its camera.
 pub struct Body<'a> {
     pub marks: &'a [Mark],
+    /// Amount of light of each code about each mark: a mix of its colour and the disk's has a code of its own.
+    pub lights: &'a [[f64; 256]],
     pub lens: Lens,
     /// Time between the exposures of neighbouring rows [s].
     pub per_row: f64,
@@ -76,17 +78,17 @@ pub fn align(
     let path = motion.shift[0].hypot(motion.shift[1]) + motion.turn.abs() * reach;
     let mut fit = Fit { pose, sightings: Vec::new(), used: Vec::new(), step: None, moved: f64::INFINITY };
     for &tolerance in rounds {
-        let look = Look {
+        let wide = Look {
             psf: look.psf.hypot(WIDE.0 * (tolerance - WIDE.1).max(0.0)),
             misfit: tolerance.hypot(STREAKY * path),
             ..*look
         };
-        let each = body.marks.iter().map(|mark| {
+        let each = body.marks.iter().zip(body.lights).map(|(mark, light)| {
             if mark.level.abs() < body.faint {
                 return None;
             }
             let (pose, local) = seen_at(mark, body, &fit.pose, speed, plane.height);
-            locate(plane, &look, mark, &pose, motion, &local, keep)
+            locate(plane, &Look { light, ..wide }, mark, &pose, motion, &local, keep)
         });
         fit.sightings = each.collect();
         fit.used = (fit.sightings.iter().enumerate())

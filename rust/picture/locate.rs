@@ -10,6 +10,8 @@ use crate::scalar::{Instructions, Isa, Work};
 pub struct Plane<'a> {
     pub codes: &'a [u8],
     pub view: &'a [bool],
+    /// What to multiply each pixel's light by so that the bare disk is equally bright everywhere; empty: it is.
+    pub even: &'a [f32],
     pub height: usize,
     pub width: usize,
 }
@@ -120,6 +122,11 @@ impl Work for Locate<'_> {
             let codes = &plane.codes[begin..begin + width];
             for (p, &code) in patch[i * width..].iter_mut().zip(codes) {
                 *p = light[usize::from(code)];
+            }
+            if !plane.even.is_empty() {
+                for (p, &even) in patch[i * width..].iter_mut().zip(&plane.even[begin..begin + width]) {
+                    *p *= even;
+                }
             }
             if left < right {
                 let view = &plane.view[begin + left..begin + right];
@@ -321,7 +328,7 @@ mod tests {
         let light: [f64; 256] = std::array::from_fn(|k| k as f64);
         let look = Look { light: &light, psf: 0.8, noise: 1.0, misfit: 0.12, gain_slack: 0.1, rim: 300.0 };
         let mut pose = Pose { centre: [60.0, 45.0], angle: 0.0 };
-        let plane = Plane { codes: &codes, view: &view, height, width };
+        let plane = Plane { codes: &codes, view: &view, even: &[], height, width };
         let mut complete = 1.0;
         for _ in 0..6 {
             let seen = locate(plane, &look, &mark, &pose, &motion, &plain, false).expect("it is seen");

@@ -62,18 +62,19 @@ type Aligned<'py> = ((f64, f64, f64), Vec<Option<Seen<'py>>>, Vec<bool>, Option<
 
 /// Moves a pose (u, v, angle) onto a picture by one Gauss-Newton step for each of `rounds` (tolerances, pixels).
 ///
+/// `lights` has a row of 256 for each mark: the light of each code; `even` multiplies the light of each pixel.
 /// `look` is psf, noise, gain_slack, rim, the least contrast of a mark, the time between rows; `lens` its
 /// middle, size, curve, tilts, aspect, shear; `motion` shift, turn, bend, twist, rate, spin, bending, twisting. Returns the pose,
 /// what the last round saw of each mark, which it used, the step that it made of them (None: the disk is not
 /// held; NaN: a mark not seen) and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
 #[pyfunction]
-#[pyo3(signature = (codes, view, light, look, marks, lens, pose, motion, rounds, without = None, keep = false))]
+#[pyo3(signature = (codes, view, lights, look, marks, lens, pose, motion, rounds, without = None, keep = false, even = None))]
 #[allow(clippy::too_many_arguments)]
 fn align_marks<'py>(
     py: Python<'py>,
     codes: PyReadonlyArray2<'py, u8>,
     view: PyReadonlyArray2<'py, bool>,
-    light: PyReadonlyArray1<'py, f64>,
+    lights: PyReadonlyArray2<'py, f64>,
     look: [f64; 6],
     marks: PyReadonlyArray2<'py, f64>,
     lens: [f64; 8],
@@ -82,12 +83,13 @@ fn align_marks<'py>(
     rounds: Vec<f64>,
     without: Option<usize>,
     keep: bool,
+    even: Option<PyReadonlyArray2<'py, f32>>,
 ) -> PyResult<Aligned<'py>> {
     let (height, width) = (codes.shape()[0], codes.shape()[1]);
     if view.shape() != codes.shape() {
         return Err(PyValueError::new_err("picture and view must have one shape"));
     }
-    let light: [f64; 256] = exactly(light.as_slice()?)?;
+    let lights = lights.as_slice()?.chunks(256).map(exactly).collect::<PyResult<Vec<[f64; 256]>>>()?;
     let [psf, noise, gain_slack, rim, faint, per_row] = look;
     let [u, v, size, curve, tilt_u, tilt_v, aspect, shear] = lens;
     let lens = Lens { middle: [u, v], size, curve, tilt: [tilt_u, tilt_v], aspect, shear };
@@ -95,11 +97,18 @@ fn align_marks<'py>(
     let speed = Speed { rate: [rate_u, rate_v], spin, bending: [bending_u, bending_v], twisting };
     let motion = motion_of(&motion[..6])?;
     let marks = marks.as_slice()?.chunks(6).map(mark_of).collect::<PyResult<Vec<_>>>()?;
-    let plane = Plane { codes: codes.as_slice()?, view: view.as_slice()?, height, width };
+    if lights.len() != marks.len() {
+        return Err(PyValueError::new_err("there must be one row of light for each mark"));
+    }
+    let even = even.as_ref().map_or(Ok(&[][..]), |even| even.as_slice())?;
+    if !even.is_empty() && even.len() != height * width {
+        return Err(PyValueError::new_err("picture and evenness must have one shape"));
+    }
+    let plane = Plane { codes: codes.as_slice()?, view: view.as_slice()?, even, height, width };
     let fit = py.detach(|| {
-        // the rounds say how far edges may be off
-        let look = Look { light: &light, psf, noise, misfit: 0.0, gain_slack, rim };
-        let body = Body { marks: &marks, lens, per_row, faint };
+        // the rounds say how far edges may be off, and each mark has its own light
+        let look = Look { light: &[0.0; 256], psf, noise, misfit: 0.0, gain_slack, rim };
+        let body = Body { marks: &marks, lights: &lights, lens, per_row, faint };
         let pose = Pose { centre: [pose[0], pose[1]], angle: pose[2] };
         align(plane, &look, &body, pose, &motion, &speed, &rounds, without, keep)
     });

@@ -245,13 +245,12 @@ def _patches(layout: Sequence[Mapping[str, Any]] | None, radius: float) -> list[
     from udd.tracking.tags import cells_of, is_tags, read_tags
 
     side = radius / 5
-    plain = [{key: value for key, value in mark.items() if key != "side"} for mark in layout]
     if is_tags(layout):
         tags = read_tags(layout)
         return [
             Patch((t.at.real / radius, -t.at.imag / radius), t.side / radius, tag=cells_of(t)) for t in tags
         ]
-    marks = read_layout(plain)
+    marks = read_layout([{key: value for key, value in mark.items() if key != "side"} for mark in layout])
     return [
         Patch((at.real / radius, -at.imag / radius), float(said.get("side", side)) / radius, colour)
         for at, colour, said in zip(marks.places, marks.colours, layout, strict=True)

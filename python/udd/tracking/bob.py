@@ -14,7 +14,7 @@ from udd.measurement import PENDULUM, Measurement, check_length
 from .decode import Film, Picture, TrackError
 from .exposure import at_middle
 from .find import blobs
-from .loop import FLAT
+from .flags import BLACK, BLANK, DAMAGED, REPEATED, lost
 from .quality import remarks
 from .setup import Setup
 from .survey import survey
@@ -70,9 +70,9 @@ def track_bob(
         blob, flag = None, _flag(picture, behind)
         if not flag:
             blob = locate_bob(picture, behind, setup, size, film.full_range)
-            flag = "" if blob is not None else "lost: the bob is not seen, or partly hidden"
+            flag = "" if blob is not None else lost("the bob is not seen, or partly hidden")
         if blob is not None and last is not None and _copy(picture.y, last, blob, path):
-            blob, flag = None, "dup: the frame repeats the one before"
+            blob, flag = None, REPEATED
         if blob is not None:
             path = [*path[-2:], blob.centre]
         rows.append((picture.t, flag, blob))
@@ -90,10 +90,10 @@ def _background(some: Sequence[Picture]) -> tuple[Picture, float]:
 
 def _flag(picture: Picture, behind: Picture) -> str:
     if picture.damaged:
-        return "damaged: the frame does not decode whole"
+        return DAMAGED
     some, usual = picture.y[::8, ::8], behind.y[::8, ::8].astype(np.int16)
-    black = float(some.std()) < FLAT and float(np.abs(some - usual).mean()) > FLAT
-    return "black: the frame shows nothing" if black else ""
+    black = float(some.std()) < BLANK and float(np.abs(some - usual).mean()) > BLANK
+    return BLACK if black else ""
 
 
 def _more(picture: Picture, behind: Picture, setup: Setup) -> NDArray[np.float32]:

@@ -74,7 +74,7 @@ def again(
 
     Gauss-Newton steps of its logarithm on the pixels about the marks, white, contrast and place left free.
     """
-    long = np.array([_path(motion(open_for), look) for _, _, motion in frames])
+    long = np.array([look.streak(motion(open_for)) for _, _, motion in frames])
     fast = [frames[k] for k in np.argsort(-long, kind="stable")[:MOST] if long[k] > STREAK]
     best = open_for
     for _ in range(ROUNDS):
@@ -118,10 +118,6 @@ def _pull(
     return pull, known
 
 
-def _path(motion: Motion, look: Look) -> float:
-    return abs(motion.shift) + abs(motion.turn * look.marks[0].place)
-
-
 def _misfit(m: Moving, share: float, look: Look, view: NDArray[np.bool_]) -> float:
     """Sum of squares over fixed windows around the marks, so that shares compare on the same pixels."""
     picture, whole = m.picture, Motion(m.rate * m.interval, m.turning * m.interval)
@@ -131,7 +127,8 @@ def _misfit(m: Moving, share: float, look: Look, view: NDArray[np.bool_]) -> flo
         return np.inf
     total = 0.0
     at = pose.centre + look.places * np.exp(1j * pose.angle)
-    for mark, local, point in zip(look.marks, look.lens.locals(at), look.lens.picture(at), strict=True):
+    where = zip(look.lens.locals(at), look.lens.picture(at), strict=True)
+    for mark, light, (local, point) in zip(look.marks, look.lights, where, strict=True):
         middle = complex(point)
         reach = np.hypot(*mark.half) + 0.3 * (abs(whole.shift) + abs(whole.turn * mark.place)) + 4
         r0, r1 = max(0, int(middle.imag - reach)), min(view.shape[0], int(middle.imag + reach))
@@ -140,7 +137,7 @@ def _misfit(m: Moving, share: float, look: Look, view: NDArray[np.bool_]) -> flo
             continue
         cover = coverage(mark, pose.centre, pose.angle, motion, look.psf, (r0, r1, c0, c1), local)
         ok = view[r0:r1, c0:c1]
-        rest = look.light[picture.y[r0:r1, c0:c1]] - mark.level * cover
+        rest = light[picture.y[r0:r1, c0:c1]] - mark.level * cover
         rest = rest[ok] - np.median(rest[ok]) if ok.any() else np.zeros(1)
         total += float((np.clip(rest, -60, 60) ** 2).sum())
     return total

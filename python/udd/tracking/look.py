@@ -64,15 +64,22 @@ class Look:
     marks: list[Mark]
     psf: float  # blur of lens and pixels, standard deviation [pixels]
     noise: float  # of the light on a flat part of the disk
-    light: NDArray[np.float64]  # amount of light for each code of the picture, (256,)
+    light: NDArray[np.float64]  # amount of light for each code of the picture, (256,), where it is grey
     rim: float  # distance from the centre up to which the picture shows the disk [pixels]
     lens: Lens = PLAIN  # from the picture to the plane of the disk
     readout: float = 0.0  # time from the exposure of the first row to that of the last [s]
+    mixed: NDArray[np.float64] | None = None  # (marks, 256) light about each mark, None: as where it is grey
+    even: NDArray[np.float32] | None = None  # (height, width) by which to multiply light, None: it is even
 
     @cached_property
     def table(self) -> NDArray[np.float64]:
         """The marks as rows of six numbers, (n, 6)."""
         return np.array([m.row for m in self.marks])
+
+    @cached_property
+    def lights(self) -> NDArray[np.float64]:
+        """Amount of light for each code about each mark, (n, 256)."""
+        return np.tile(self.light, (len(self.marks), 1)) if self.mixed is None else self.mixed
 
     def streak(self, motion: Motion) -> float:
         """How far the outermost mark moves while the shutter is open, at most [pixels]."""

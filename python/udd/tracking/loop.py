@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .acquire import candidates, classify
 from .decode import Picture
+from .flags import REPEATED, lost, unusable
 from .lens import Bent
 from .look import Look, Motion, Pose
 from .marks import MISFIT
@@ -30,7 +31,6 @@ BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j 
 SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
 COPIED = 10  # codes by which a copy may differ
 UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
-FLAT = 6.0  # brightness contrast of a black frame
 
 
 @dataclass
@@ -99,13 +99,12 @@ def _one(
     picture: Picture, known: Known, past: list[Held], last: NDArray[np.uint8] | None
 ) -> tuple[str, Fit | None, Pose, Motion]:
     nowhere = Pose(complex(np.nan, np.nan), np.nan)
-    if picture.damaged:
-        return "damaged: the frame does not decode whole", None, nowhere, Motion()
-    if float(picture.y[::8, ::8].std()) < FLAT:
-        return "black: the frame shows nothing", None, nowhere, Motion()
+    flag = unusable(picture)
+    if flag:
+        return flag, None, nowhere, Motion()
     guess = predict(past, picture.t, known.contact)
     if last is not None and guess is not None and repeats(picture.y, last, guess, past[-1].pose, known.look):
-        return "dup: the frame repeats the one before", None, nowhere, Motion()
+        return REPEATED, None, nowhere, Motion()
     if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
         motion = _motion(past, guess, picture.t, known)
@@ -118,7 +117,7 @@ def _one(
             return "", fit, pose, motion
     best = _anywhere(picture, known, guess, past)
     if best is None:
-        return "lost: fewer than two marks agree", None, nowhere, Motion()
+        return lost("fewer than two marks agree"), None, nowhere, Motion()
     fit, pose, motion = best
     return "", fit, pose, motion
 

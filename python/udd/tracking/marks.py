@@ -93,7 +93,7 @@ def locate(
     at, found, used, step, moved = _core.align_marks(
         y,
         view,
-        look.light,
+        look.lights,
         (*numbers, look.readout / y.shape[0]),
         look.table,
         look.lens.row,
@@ -102,6 +102,7 @@ def locate(
         rounds,
         without,
         keep,
+        look.even,
     )
     return at, [None if s is None else _sighting(*s) for s in found], used, step, moved
 

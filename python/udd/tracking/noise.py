@@ -9,7 +9,7 @@ from .loop import Tracks
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not speak for the others
-BELIEF = 5.0  # a frame is trusted as if the film had told this many coordinates about it
+ALIKE = 1000.0  # coordinates that stand for a usual frame where frames differ by no more than chance
 GROUP = 40  # frames with like streaks from which their usual disagreement is taken
 
 
@@ -25,9 +25,9 @@ def covariance(tracks: Tracks, centre_sigma: float = 0.0) -> Array:
     marks = np.isfinite(chi2).sum(axis=1)
     spare = np.maximum(2 * marks - 3, 0)
     total = np.nansum(chi2, axis=1)
-    usual = _usual(total, spare, np.array(tracks.streak))
-    # a frame's own disagreement counts too, beside the whole film's as if that were `BELIEF` more coordinates
-    inflation = (BELIEF * usual + total) / (BELIEF + spare)
+    usual, belief = _usual(total, spare, np.array(tracks.streak))
+    # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
+    inflation = (belief * usual + total) / (belief + spare)
     good = np.isfinite(info).all(axis=(1, 2))
     out = np.full(info.shape, np.nan)
     if good.any():
@@ -36,20 +36,36 @@ def covariance(tracks: Tracks, centre_sigma: float = 0.0) -> Array:
     return out
 
 
-def _usual(total: Array, spare: NDArray[np.int_], streak: Array) -> Array:
-    """Misfit per spare coordinate that frames with like streaks have, at least that of the assumed noise."""
-    out = np.ones(len(total))
+def _usual(total: Array, spare: NDArray[np.int_], streak: Array) -> tuple[Array, Array]:
+    """Misfit per spare coordinate that frames with like streaks have, and the coordinates that is worth.
+
+    Of a variance that itself is drawn anew for each frame, 1 / variance being gamma distributed, the mean
+    given a frame's misfit is that of both, and the less they scatter the more the usual one counts.
+    """
+    out, belief = np.ones(len(total)), np.full(len(total), ALIKE)
     known = np.flatnonzero(spare > 0)
     order = known[np.argsort(streak[known], kind="stable")]
     groups = np.array_split(order, max(1, min(6, len(order) // GROUP))) if len(order) else []
     for group in groups:
         each = total[group] / spare[group]
         most = OUTLIER * float(np.median(each))
-        level = float(np.sum(np.minimum(each, most) * spare[group]) / spare[group].sum())
-        out[group] = max(1.0, level)
+        each = np.minimum(each, most)
+        level = float(np.sum(each * spare[group]) / spare[group].sum())
+        out[group], belief[group] = level, _belief(each / level, spare[group])
     if groups:  # where two marks leave nothing over, the film as a whole has to do
         rest = np.setdiff1d(np.arange(len(total)), known)
         ends = np.array([streak[g].max() for g in groups])
-        levels = np.array([out[g[0]] for g in groups])
-        out[rest] = levels[np.minimum(np.searchsorted(ends, streak[rest]), len(groups) - 1)]
-    return out
+        first = np.array([g[0] for g in groups])
+        like = first[np.minimum(np.searchsorted(ends, streak[rest]), len(groups) - 1)]
+        out[rest], belief[rest] = out[like], belief[like]
+    return out, belief
+
+
+def _belief(each: Array, spare: NDArray[np.int_]) -> float:
+    """By moments, from misfits per spare coordinate with the mean 1: chance alone scatters them by 2 / spare.
+
+    A variance with relative scatter s has 1 / s more than 2 of its inverse's degrees of freedom in doubles.
+    """
+    chance = float(np.mean(2 / spare))
+    scatter = (float(np.mean((each - 1) ** 2)) - chance) / (1 + chance)
+    return min(2 + 2 / scatter, ALIKE) if scatter > 0 else ALIKE

@@ -26,14 +26,13 @@ def visible(
     import cv2
 
     height, width = seen[0][0].y.shape
-    bare = np.zeros((height, width), dtype=np.int32)
+    asked = np.zeros((height, width), dtype=np.int32)
     white = np.zeros((height, width), dtype=np.int32)
     brightest = np.zeros((height, width), dtype=np.uint8)
     levels = []
     for picture, sight in seen:
         np.maximum(brightest, picture.y, out=brightest)
-        box = _box(sight, height, width)
-        here = _should_be_bare(sight, box, body)
+        box, here = bare(sight, height, width, body)
         y = picture.y[box]
         level = _middle(y[here]) if here.any() else 255.0
         level = _middle(y[here & (y > 0.8 * level)]) if here.any() else level
@@ -44,17 +43,25 @@ def visible(
             tint = cv2.resize(plane[half], y.shape[::-1], interpolation=cv2.INTER_LINEAR)
             usual = _middle(tint[good]) if good.any() else 128
             good &= np.abs(tint - np.float32(usual)) < TINTED
-        bare[box] += here
+        asked[box] += here
         white[box] += good
-    hidden = (bare > 0) & (white < 0.5 * bare)
+    hidden = (asked > 0) & (white < 0.5 * asked)
     level = float(np.median(levels))
     # where the disk was never looked at, whatever is always dark and grown together with the mask
-    dark = hidden | ((bare == 0) & (brightest < 0.4 * level))
+    dark = hidden | ((asked == 0) & (brightest < 0.4 * level))
     _, labels = cv2.connectedComponents(dark.astype(np.uint8), connectivity=4)
     hidden = dark & np.isin(labels, np.unique(labels[hidden]))
     kernel = np.ones((2 * MARGIN + 1, 2 * MARGIN + 1), dtype=np.uint8)
     solid = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
     return cv2.dilate(solid, kernel) == 0, level
+
+
+def bare(
+    sight: Sight, height: int, width: int, body: NDArray[np.complex128]
+) -> tuple[tuple[slice, slice], NDArray[np.bool_]]:
+    """A box of rows and columns, and its pixels that should show the bare disk."""
+    box = _box(sight, height, width)
+    return box, _should_be_bare(sight, box, body)
 
 
 def _middle(codes: NDArray[np.uint8]) -> float:

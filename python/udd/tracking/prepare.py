@@ -17,11 +17,13 @@ from .lens import Lens, calibrate
 from .look import Look, Motion, Pose
 from .loop import Known
 from .marks import MISFIT
+from .mixing import mixed
 from .occluder import visible
 from .pivot import Contact, rough_contact
 from .pose import align
 from .readout import Readout, readout
 from .setup import Setup
+from .shade import evenness
 from .survey import Moving, Survey, moving, repeats_last
 
 FEWEST = 3  # frames in motion from which marks are learned a second time
@@ -52,6 +54,19 @@ def prepare(
     view, white = visible(seen, body)
     view = view & setup.view(view.shape)
     look = first_look(seen, view, white, film.light, body)
+    colours = colours_of([p for p, _ in seen], [Pose(s.centre, s.angle) for _, s in seen], look, view)
+    even = evenness(seen, view, body, film.light)
+    bright = float(film.light[round(white)])
+    look = replace(
+        look,
+        even=even,
+        mixed=np.stack(
+            [
+                mixed(film.light, bright, bright + m.level, colour, film.full_range)
+                for m, colour in zip(look.marks, colours, strict=True)
+            ]
+        ),
+    )
     look = refine(look, [(p.y, Pose(s.centre, s.angle), Motion()) for p, s in seen], view, fixed=fixed)
     # a second time with frames whose speed is known, hence their blur
     in_motion = moving(look_over.bursts, sights)
@@ -98,7 +113,6 @@ def prepare(
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
     rim = _rim(film, sharp, look, view, setup)
-    colours = colours_of([p for p, _, _ in sharp], [q for _, q, _ in sharp], look, view)
     if rim is not None:
         look = replace(look, rim=rim.radius - RIM_SMEAR)
     look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, setup)

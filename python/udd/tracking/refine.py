@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Picture
+from .flags import is_lost, lost
 from .look import Motion, Pose
 from .loop import Known, Tracks, hold, put
 from .marks import MISFIT
@@ -78,7 +79,7 @@ def refine(
 
 
 def _again(picture: Picture, k: int, known: Known, around: Around, tracks: Tracks) -> None:
-    if tracks.flag[k] and not tracks.flag[k].startswith("lost"):
+    if tracks.flag[k] and not is_lost(tracks.flag[k]):
         return
     here = around.at(k)
     if here is None:
@@ -111,7 +112,7 @@ def drop_weak(tracks: Tracks) -> None:
     """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
     for k in np.flatnonzero(weak(tracks)):
         if tracks.flag[k] == "":
-            tracks.flag[k], tracks.method[k] = "lost: too few marks in a long streak", ""
+            tracks.flag[k], tracks.method[k] = lost("too few marks in a long streak"), ""
             tracks.centre[k], tracks.angle[k] = complex(np.nan, np.nan), np.nan
             tracks.information[k] = np.full((3, 3), np.nan)
             tracks.chi2[k] = np.full_like(tracks.chi2[k], np.nan)

@@ -22,9 +22,12 @@ from .disk import Outline
 from .exposure import again as retimed
 from .exposure import at_middle
 from .find import COLOURS, FEWEST, sightings
+from .flags import GONE, VAGUE, is_lost
 from .glimpse import Glimpse
 from .layout import STANDARD, read_bob
 from .layout import sightings as matching
+from .learn import MOST
+from .learn import refine as learn
 from .look import Look, Pose
 from .loop import Known, Tracks, follow
 from .noise import covariance
@@ -40,9 +43,8 @@ from .setup import Calibrate, Layout, Region, Setup, read_calibrate, read_layout
 from .survey import Survey, slowest, survey
 from .tags import Tag, follow_tags, is_tags, layout_of, read_tags
 
-VAGUE = 0.005  # of the disk's radius: a position known no better is not given
-VAGUE_SAYS = "vague: too blurred or hidden to be placed"
-GONE_SAYS = "gone: the disk has left the wheels"
+AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known
+UNSURE = 0.005  # of the disk's radius: a position known no better is not given
 
 
 @dataclass(frozen=True)
@@ -239,11 +241,8 @@ def track_in_detail(
     look_over = survey(film)
     known, rim = _learn(film, look_over, setup)
     tracks = _follow(film, known, look_over.frames, progress, watch)
-    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
-    if known.contact is None:  # else the paths were curved, and poses stand in their middle
-        centre, angle = at_middle(np.array(tracks.t), centre, angle, known.exposure)
-    angle, doubtful = recount(np.array(tracks.t), angle)
-    tracks = replace(tracks, centre=list(centre), angle=list(angle))
+    # where the contact was known the paths were curved, and poses stand in their middle
+    tracks, doubtful = _settled(tracks, known.exposure if known.contact is None else 0.0)
     if refine:
         known = _timed(known, look_over, tracks, setup)
         tracks = _again(film, known, tracks, progress)
@@ -273,14 +272,19 @@ def _by_tags(
                 watch(Glimpse(picture, pose, look, frames, film.full_range))
 
         tracks, known = follow_tags(film, film.pictures(), tags, setup, tick)
-    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
-    if known.exposure:
-        centre, angle = at_middle(np.array(tracks.t), centre, angle, known.exposure)
-    angle, doubtful = recount(np.array(tracks.t), angle)
-    tracks = replace(tracks, centre=list(centre), angle=list(angle))
+    tracks, doubtful = _settled(tracks, known.exposure)
     camera = camera_of(tracks, known, size_of(known.look.places, None, setup), setup.pivot)
     measurement = tabulated(film, tracks, known, camera, setup, None, doubtful, False)
     return Tracking(measurement, tracks, known, camera, None)
+
+
+def _settled(tracks: Tracks, open_for: float) -> tuple[Tracks, int]:
+    """Means over the exposure taken to its middle, whole turns counted; how many of these are in doubt."""
+    t, centre, angle = np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle)
+    if open_for:
+        centre, angle = at_middle(t, centre, angle, open_for)
+    angle, doubtful = recount(t, angle)
+    return replace(tracks, centre=list(centre), angle=list(angle)), doubtful
 
 
 def _learn(film: Film, look_over: Survey, setup: Setup) -> tuple[Known, Outline | None]:
@@ -321,11 +325,11 @@ def tabulated(
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
-    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > VAGUE * setup.radius
+    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > UNSURE * setup.radius
     for table in (values, sigma, rho):
         table[vague] = np.nan
-    tracks.flag = [VAGUE_SAYS if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
-    tracks.flag = [GONE_SAYS if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
+    tracks.flag = [VAGUE if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
+    tracks.flag = [GONE if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
     meta = meta_of(film, tracks, known, camera, setup, doubtful)
     seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
     tracks.flag = remarks(np.array(tracks.t), tracks.flag, seen_how, twice)
@@ -364,7 +368,7 @@ def _follow(
 
 
 def _timed(known: Known, look_over: Survey, tracks: Tracks, setup: Setup) -> Known:
-    """Exposure and readout once more, now that every frame's motion is known from its neighbours."""
+    """Exposure, readout and marks once more, now that every frame's motion is known from its neighbours."""
     around = Around(tracks)
     frames = []
     for picture in look_over.pictures:
@@ -379,13 +383,16 @@ def _timed(known: Known, look_over: Survey, tracks: Tracks, setup: Setup) -> Kno
     if known.exposure and setup.calibrate.given("exposure") is None:
         paths = [(y, here.pose, here.motion) for y, here in frames]
         known = replace(known, exposure=retimed(paths, known.exposure, known.look, known.view))
-    return known
+    moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(known.exposure)) for y, here in frames]
+    moving.sort(key=lambda f: known.look.streak(f[2]))
+    slower = moving[: -(-len(moving) // 2)]
+    fixed = None if setup.calibrate.layout else setup.layout.unit
+    look = learn(known.look, slower[:: -(-len(slower) // MOST)], known.view, AGAIN, fixed)
+    return replace(known, look=look)
 
 
 def _again(film: Film, known: Known, tracks: Tracks, progress: bool) -> Tracks:
-    streaks = [
-        s > LONG or flag.startswith("lost") for s, flag in zip(tracks.streak, tracks.flag, strict=True)
-    ]
+    streaks = [s > LONG or is_lost(flag) for s, flag in zip(tracks.streak, tracks.flag, strict=True)]
     for streaks_only in (False, True) if any(streaks) else (False,):
         if not progress:
             tracks = second_pass(film.pictures(), known, tracks, streaks_only=streaks_only)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from .corners import sharpened
 from .decode import Film, Picture, TrackError
+from .flags import REPEATED, lost, unusable
 from .layout import Layout, laid, read_place
 from .lens import calibrate
 from .look import Look, Mark, Pose
-from .loop import FLAT, Held, Known, Tracks, append, predict, repeats
+from .loop import Held, Known, Tracks, append, predict, repeats
 from .marks import Sighting
 from .pose import Fit
 from .readout import Readout
@@ -165,11 +166,11 @@ def follow_tags(
     rough = _rough_look(film, setup)
     for picture in pictures:
         shape = (picture.y.shape[0], picture.y.shape[1])
-        at, flag = np.full(len(body), complex(np.nan, np.nan)), _flag(picture)
+        at, flag = np.full(len(body), complex(np.nan, np.nan)), unusable(picture)
         pose = Pose(complex(np.nan, np.nan), np.nan)
         if not flag:
             at = find(picture)
-            flag = "" if np.isfinite(at).any() else "lost: no tag is seen"
+            flag = "" if np.isfinite(at).any() else lost("no tag is seen")
         if not flag:
             pose, factor = _rough(at, body)
             rough = replace(
@@ -179,7 +180,7 @@ def follow_tags(
             if guess is not None and last is not None:
                 pose.angle += 2 * np.pi * round((guess.angle - pose.angle) / (2 * np.pi))
                 if repeats(picture.y, last, guess, past[-1].pose, rough):
-                    at[:], flag = complex(np.nan, np.nan), "dup: the frame repeats the one before"
+                    at[:], flag = complex(np.nan, np.nan), REPEATED
             if not flag:
                 past = [*past[-2:], Held(picture.t, pose, 0.0)]
         last = picture.y
@@ -193,12 +194,6 @@ def follow_tags(
             f"of {len(points)} frames; at least {FEWEST} are needed"
         )
     return _laid(points, notes, film, setup, shape)
-
-
-def _flag(picture: Picture) -> str:
-    if picture.damaged:
-        return "damaged: the frame does not decode whole"
-    return "black: the frame shows nothing" if float(picture.y[::8, ::8].std()) < FLAT else ""
 
 
 def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
@@ -235,7 +230,7 @@ def _laid(
         if not flag:
             pose = _rough(at, body)[0]
             fit = _fit(at, pose, look)
-            flag = "" if fit is not None else "lost: the tags disagree"
+            flag = "" if fit is not None else lost("the tags disagree")
         if fit is None:
             pose = Pose(complex(np.nan, np.nan), np.nan)
         else:

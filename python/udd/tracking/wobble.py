@@ -27,15 +27,13 @@ class Wobble:
     """Amplitude of the turning about an axis in the disk's plane [rad]; 0 where none is seen.
 
     `least` is the amplitude that would just be seen; `axis` the angle of the axis from the vertical,
-    clockwise [rad]; `t` and `strain` (n, 3) the stretching of the marks along u, across and along v.
+    clockwise [rad].
     """
 
     amplitude: float
     sigma: float
     axis: float
     least: float
-    t: Array
-    strain: Array
 
 
 def strains(tracks: Tracks, look: Look) -> tuple[Array, Array]:
@@ -73,7 +71,7 @@ def wobble(tracks: Tracks, look: Look) -> Wobble:
     """
     rows, strain = strains(tracks, look)
     t = np.array(tracks.t)[rows]
-    unseen = Wobble(0.0, math.inf, 0.0, math.inf, t, strain)
+    unseen = Wobble(0.0, math.inf, 0.0, math.inf)
     if len(rows) < FEWEST:
         return unseen
     strain = _tamed(strain)
@@ -89,10 +87,10 @@ def wobble(tracks: Tracks, look: Look) -> Wobble:
     floor = _floor(strain, axis)
     least = (SINE * max(CERTAIN * sigma, floor)) ** 0.25
     if value < max(CERTAIN * sigma, floor):
-        return Wobble(0.0, 0.5 * least, axis, least, t, strain)
+        return Wobble(0.0, 0.5 * least, axis, least)
     amplitude = (SINE * value) ** 0.25
     spread = amplitude * math.hypot(math.hypot(sigma, floor) / (4 * value), LINEAR)
-    return Wobble(amplitude, spread, axis, least, t, strain)
+    return Wobble(amplitude, spread, axis, least)
 
 
 def _tamed(strain: Array) -> Array:

@@ -1,0 +1,75 @@
+"""Uneven light: where in the picture the bare disk is brighter, and where darker."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .decode import Picture
+from .find import Sight
+from .occluder import bare
+
+Array = NDArray[np.float64]
+EVERY = 3  # pixels: neighbours tell the same
+FEWEST = 200  # pixels of a picture
+MOST = 60  # pictures
+FAR = 0.3  # relative difference from a picture's middle light that is no bare disk
+SIGMAS = 3.0  # beyond which a pixel shows something else
+LEAST = 0.01  # relative change of light over the disk's way that moves no mark by as much as noise does
+
+
+def evenness(
+    seen: Sequence[tuple[Picture, Sight]],
+    view: NDArray[np.bool_],
+    body: NDArray[np.complex128],
+    light: Array,
+) -> NDArray[np.float32] | None:
+    """By what to multiply each pixel's light, (height, width), so that the disk is as bright everywhere.
+
+    Under light that grows to one side both edges of a mark seem to lie on that side. The disk is white and
+    comes everywhere: the logarithm of its light is a parabola of the place and a constant for each picture,
+    as lamps may flicker. None where the light is even.
+    """
+    height, width = view.shape
+    terms, values = [], []
+    for picture, sight in seen[:MOST]:
+        box, here = bare(sight, height, width, body)
+        rows, columns = (np.arange(height)[box[0]], np.arange(width)[box[1]])
+        here &= view[box] & (rows[:, None] % EVERY == 0) & (columns[None, :] % EVERY == 0)
+        amount = light[picture.y[box][here]]
+        good = np.abs(amount - np.median(amount)) < FAR * np.median(amount) if len(amount) else here[here]
+        if good.sum() < FEWEST:
+            continue
+        v, u = (x[good] for x in np.nonzero(here))
+        design = _terms(u + columns[0], v + rows[0], view.shape)
+        value = np.log(amount[good])
+        terms.append(design - design.mean(axis=0))
+        values.append(value - value.mean())
+    if not terms:
+        return None
+    design, value = np.concatenate(terms), np.concatenate(values)
+    good = np.ones(len(value), dtype=bool)
+    found = np.zeros(design.shape[1])
+    for _ in range(3):
+        found = np.linalg.lstsq(design[good], value[good], rcond=None)[0]
+        rest = value - design @ found
+        good = np.abs(rest) < SIGMAS * 1.48 * np.median(np.abs(rest[good]))
+    # a parabola says nothing about where the disk does not come
+    centre = np.array([s.centre for _, s in seen])
+    reach = seen[0][1].reach
+    u, v = (
+        np.clip(np.arange(size), x.min() - reach, x.max() + reach)
+        for size, x in ((width, centre.real), (height, centre.imag))
+    )
+    shade = np.stack([_terms(u, np.full_like(u, row), view.shape) @ found for row in v])
+    here = shade[np.ix_((np.arange(height) == v), (np.arange(width) == u))]
+    if np.ptp(here) < LEAST:
+        return None
+    return np.asarray(np.exp(here.mean() - shade), dtype=np.float32)
+
+
+def _terms(u: Array, v: Array, shape: tuple[int, ...]) -> Array:
+    x, y = u / shape[1] - 0.5, v / shape[0] - 0.5
+    return np.column_stack([x, y, x * x, x * y, y * y])
