@@ -27,7 +27,7 @@ def tracks(amplitude: float, noise: float, axis: float = 0.0, n: int = 400) -> t
     short = np.cos(amplitude * np.sin(2 * np.pi * t / 1.3)) - 1
     normal = np.exp(1j * axis)  # across the axis
     places = 100 * np.array([-1j, 1, 1j, -1])
-    out = Tracks(*([] for _ in range(10)))
+    out = Tracks(*([] for _ in range(11)))
     for k in range(n):
         arm = places * np.exp(1j * angle[k])
         seen = arm + short[k] * normal * (arm * np.conj(normal)).real

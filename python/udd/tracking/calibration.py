@@ -17,7 +17,7 @@ from .pivot import support
 from .result import Camera
 from .scale import Scale
 from .setup import Setup
-from .wobble import Wobble, wobble
+from .wobble import Wobble
 
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 BLOCKS = 20  # stretches of the film whose means are the independent pieces
@@ -65,7 +65,7 @@ def camera_of(tracks: Tracks, known: Known, size: Scale, given: Given) -> Camera
 
 
 def meta_of(
-    film: Film, tracks: Tracks, known: Known, camera: Camera, setup: Setup, doubtful: int
+    film: Film, tracks: Tracks, known: Known, camera: Camera, setup: Setup, doubtful: int, turned: Wobble
 ) -> dict[str, Any]:
     """The header of the measurement."""
     missing = max(0, film.promised - len(tracks.t))
@@ -75,7 +75,7 @@ def meta_of(
             "the film may be cut off",
             stacklevel=5,
         )
-    look, turned = known.look, wobble(tracks, known.look)
+    look = known.look
     return {
         "source": film.path.name,
         "R": setup.radius,

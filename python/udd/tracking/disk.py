@@ -32,11 +32,14 @@ def outline(
     look: Look,
     view: NDArray[np.bool_],
     span: tuple[float, float] = SPAN,
+    short: Sequence[float] = (),
+    across: complex = 1.0,
 ) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
     Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
-    averages it out of the centre. The rim is looked for within `span` of the marks' reach.
+    averages it out of the centre. The rim is looked for within `span` of the marks' reach. `short` is by how
+    much each frame's disk is stretched (below 0: foreshortened) in the direction `across`.
     """
     angles = np.arange(RAYS) * (2 * np.pi / RAYS)
     rays = np.exp(1j * angles)
@@ -46,7 +49,10 @@ def outline(
         r = _rim(picture.y, view, np.asarray(pose.centre + motion.rate * late), rays, look, span)
         ok = np.isfinite(r)
         turn = pose.angle + motion.spin * late[ok]
-        points.append(r[ok] * rays[ok] * np.exp(-1j * turn))
+        seen = r[ok] * rays[ok]
+        if short:
+            seen = seen - short[number] / (1 + short[number]) * (seen * np.conj(across)).real * across
+        points.append(seen * np.exp(-1j * turn))
         group.append(np.full(int(ok.sum()), number))
     z = np.concatenate(points) if points else np.empty(0, dtype=complex)
     if len(z) < 60:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,7 @@ class Tracks:
     information: list[Array]  # (3, 3) of (u, v, beta) for the assumed pixel noise
     leftover: list[Array]  # (marks, 2) misfit of each [pixels], NaN where not used
     chi2: list[Array]  # (marks,)
+    marks: list[Array]  # (marks, 2, 2) information of (u, v) of each, of the pose's, 0 where not used
     complete: list[Array]  # (marks,) share of each mark's edges in view
     streak: list[float]  # blur length at the marks [pixels]
     flag: list[str]
@@ -82,7 +83,7 @@ def follow(
 
     After each picture `tick` is told where the disk is in it, NaN where it is not held.
     """
-    tracks = Tracks(*([] for _ in range(10)))
+    tracks = Tracks(*([] for _ in fields(Tracks)))
     past: list[Held] = []
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
@@ -287,6 +288,7 @@ def append(
     tracks.information.append(np.full((3, 3), np.nan))
     tracks.leftover.append(np.full((marks, 2), np.nan))
     tracks.chi2.append(np.full(marks, np.nan))
+    tracks.marks.append(np.zeros((marks, 2, 2), dtype=np.float32))
     tracks.complete.append(np.zeros(marks))
     tracks.method.append("" if fit is None else "fast")
     if fit is not None:
@@ -300,6 +302,13 @@ def put(tracks: Tracks, k: int, fit: Fit, pose: Pose, streak: float) -> None:
     tracks.information[k] = fit.step.information
     tracks.leftover[k] = np.where(used, fit.step.leftover, np.nan)
     tracks.chi2[k] = np.where(fit.used, fit.step.chi2, np.nan)
+    tracks.marks[k] = np.array(
+        [
+            s.information if s and u else np.zeros((2, 2))
+            for s, u in zip(fit.sightings, fit.used, strict=True)
+        ],
+        dtype=np.float32,
+    )
     tracks.complete[k] = np.array(
         [s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]
     )

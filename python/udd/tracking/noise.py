@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,13 +15,13 @@ ALIKE = 1000.0  # coordinates that stand for a usual frame where frames differ b
 GROUP = 40  # frames with like streaks from which their usual disagreement is taken
 
 
-def covariance(tracks: Tracks, centre_sigma: float = 0.0) -> Array:
+def covariance(tracks: Tracks, centre_sigma: float = 0.0, shared: Sequence[Array] = ()) -> Array:
     """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad, the centre known to so much.
 
     The fit's own covariance assumes independent pixels of known noise. Compression, lens and light
     are neither; the marks' disagreement shows by how much: a rigid disk leaves 2 m - 3 of the 2 m
     coordinates of m marks over. Where the centre is among them only the rim says; what it is off by turns
-    with the disk.
+    with the disk. `shared` are standard errors (n, 3), signed alike, of causes that move all marks together.
     """
     chi2, info = np.array(tracks.chi2), np.array(tracks.information)
     marks = np.isfinite(chi2).sum(axis=1)
@@ -33,6 +35,8 @@ def covariance(tracks: Tracks, centre_sigma: float = 0.0) -> Array:
     if good.any():
         out[good] = inflation[good, None, None] * np.linalg.inv(info[good])
         out[good] += np.diag([centre_sigma**2, centre_sigma**2, 0.0])
+        for cause in shared:
+            out[good] += cause[good, :, None] * cause[good, None, :]
     return out
 
 

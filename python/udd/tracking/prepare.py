@@ -125,17 +125,20 @@ def _rim(
     film: Film, sharp: list[tuple[Picture, Pose, Motion]], look: Look, view: NDArray[np.bool_], setup: Setup
 ) -> Outline | None:
     """The disk's outline; None where it does not show and the layout says where its centre is."""
-    layout = setup.layout
-    span = SPAN
-    if not layout.standard:
-        ratio = setup.radius / layout.reach
-        span = ((1 - NEAR_RIM) * ratio, (1 + NEAR_RIM) * ratio)
     try:
-        return outline(sharp, look, view, span)
+        return outline(sharp, look, view, rim_span(setup))
     except TrackError as error:
-        if not layout.standard:
+        if not setup.layout.standard:
             return None
         raise TrackError(f"{film.path}: {error}") from None
+
+
+def rim_span(setup: Setup) -> tuple[float, float]:
+    """Where to look for the rim, in units of the marks' reach."""
+    if setup.layout.standard:
+        return SPAN
+    ratio = setup.radius / setup.layout.reach
+    return (1 - NEAR_RIM) * ratio, (1 + NEAR_RIM) * ratio
 
 
 def _contact(in_motion: list[Moving], look: Look) -> Contact | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .decode import Picture
 from .flags import is_lost, lost
-from .look import Motion, Pose
+from .look import Look, Motion, Pose
 from .loop import Known, Tracks, hold, put
 from .marks import MISFIT
 
@@ -24,6 +24,9 @@ APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
 LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
 WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
 WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
+# where the slope of the second derivative changes: its error times interval^2 against the miss, rms over the
+# time at which it does, for the mean over a whole interval (of an instant: 0.45)
+KINK = 0.31
 FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
 
 
@@ -59,12 +62,13 @@ def refine(
     first: Tracks,
     tick: Callable[[int], object] = lambda _: None,
     streaks_only: bool = False,
+    look_at: Callable[[int], Look] | None = None,
 ) -> Tracks:
     """Fit every frame again from what the first pass says about it and its neighbours.
 
     A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
     the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
-    streaks stay as they are.
+    streaks stay as they are. `look_at` gives each frame's look where it is not always the same.
     """
     tracks = replace(
         first,
@@ -73,7 +77,8 @@ def refine(
     around = Around(first)
     for k, picture in enumerate(pictures):
         if k < len(first.t) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
-            _again(picture, k, known, around, tracks)
+            seen = known if look_at is None else replace(known, look=look_at(k))
+            _again(picture, k, seen, around, tracks)
         tick(picture.index)
     return tracks
 
@@ -119,6 +124,19 @@ def drop_weak(tracks: Tracks) -> None:
             tracks.leftover[k] = np.full_like(tracks.leftover[k], np.nan)
 
 
+def unforeseen(tracks: Tracks, variance: float) -> Array:
+    """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
+
+    A streak stands for the mean of its path, which is off its middle by half the second derivative times the
+    variance of the time [s^2] over which it is seen. The polynomials that tell this derivative do not know of
+    what happens between frames; how far they miss the frame itself when it is left out shows how much that is.
+    """
+    around = Around(tracks)
+    factor = 0.5 * KINK * variance / around.interval**2
+    missed = [around.surprise(k) for k in range(len(tracks.t))]
+    return factor * np.array([(centre.real, centre.imag, angle) for centre, angle in missed])
+
+
 class Around:
     """A first pass, to be looked at around each of its frames."""
 
@@ -128,14 +146,29 @@ class Around:
         self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
-    def at(self, k: int) -> Local | None:
-        """Polynomials through the nearest poses on both sides; None where too few are near."""
+    def _near(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
+        """The nearest frames on both sides, how many intervals off they are, whether k is held."""
         place = int(np.searchsorted(self.good, k))
-        held = place < len(self.good) and self.good[place] == k
+        held = place < len(self.good) and bool(self.good[place] == k)
         low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + held
         near = self.good[low:high]
         x = (self.t[near] - self.t[k]) / self.interval
-        near, x = near[np.abs(x) < NEAR], x[np.abs(x) < NEAR]
+        return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], held
+
+    def surprise(self, k: int) -> tuple[complex, float]:
+        """How far centre and angle are from what the neighbours alone foretell; 0 where these are too few."""
+        near, x, _ = self._near(k)
+        others = near != k
+        if others.all() or others.sum() < 2:
+            return 0j, 0.0
+        near, x = near[others], x[others]
+        weights = np.linalg.inv(np.vander(x, len(x), increasing=True))[0]
+        centre, angle = weights @ self.centre[near], weights @ self.angle[near]
+        return complex(self.centre[k] - centre), float(self.angle[k] - angle)
+
+    def at(self, k: int) -> Local | None:
+        """Polynomials through the nearest poses on both sides; None where too few are near."""
+        near, x, held = self._near(k)
         if len(near) < 3 or (not held and not (x.min() < 0 < x.max())):
             return None
         powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]

@@ -18,7 +18,7 @@ from .bob import track_bob
 from .calibration import camera_of, meta_of
 from .config import Config, settings
 from .decode import Film, Picture, TrackError
-from .disk import Outline
+from .disk import Outline, outline
 from .exposure import again as retimed
 from .exposure import at_middle
 from .find import COLOURS, FEWEST, sightings
@@ -31,10 +31,10 @@ from .learn import refine as learn
 from .look import Look, Pose
 from .loop import Known, Tracks, follow
 from .noise import covariance
-from .prepare import prepare
+from .prepare import SHARP, prepare, rim_span
 from .quality import quality, remarks
 from .readout import readout
-from .refine import LONG, Around, drop_weak
+from .refine import LONG, Around, drop_weak, unforeseen
 from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
@@ -42,6 +42,8 @@ from .scale import scale as size_of
 from .setup import Calibrate, Layout, Region, Setup, read_calibrate, read_layout, read_region
 from .survey import Survey, slowest, survey
 from .tags import Tag, follow_tags, is_tags, layout_of, read_tags
+from .upright import Upright, upright
+from .wobble import wobble
 
 AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known
 UNSURE = 0.005  # of the disk's radius: a position known no better is not given
@@ -247,9 +249,7 @@ def track_in_detail(
         known = _timed(known, look_over, tracks, setup)
         tracks = _again(film, known, tracks, progress)
     drop_weak(tracks)
-    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), pivot)
-    measurement = tabulated(film, tracks, known, camera, setup, rim, doubtful, refine)
-    return Tracking(measurement, tracks, known, camera, rim)
+    return _tracking(film, tracks, known, setup, rim, doubtful, refine, look_over)
 
 
 def _by_tags(
@@ -273,9 +273,7 @@ def _by_tags(
 
         tracks, known = follow_tags(film, film.pictures(), tags, setup, tick)
     tracks, doubtful = _settled(tracks, known.exposure)
-    camera = camera_of(tracks, known, size_of(known.look.places, None, setup), setup.pivot)
-    measurement = tabulated(film, tracks, known, camera, setup, None, doubtful, False)
-    return Tracking(measurement, tracks, known, camera, None)
+    return _tracking(film, tracks, known, setup, None, doubtful, False)
 
 
 def _settled(tracks: Tracks, open_for: float) -> tuple[Tracks, int]:
@@ -308,20 +306,36 @@ def _learn(film: Film, look_over: Survey, setup: Setup) -> tuple[Known, Outline 
     return prepare(film, look_over, sights, seen, setup)
 
 
-def tabulated(
+def _tracking(
     film: Film,
     tracks: Tracks,
     known: Known,
-    camera: Camera,
     setup: Setup,
     rim: Outline | None,
     doubtful: int,
     twice: bool,
-) -> Measurement:
+    look_over: Survey | None = None,
+) -> Tracking:
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
+    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup.pivot)
     # Where the layout is taken as said, so is the centre.
     centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else 0.0
-    values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma), camera)
+    shared = [unforeseen(tracks, known.exposure**2 / 12)]
+    turned = wobble(tracks, known.look)
+    stood = upright(tracks, known.look, turned) if turned.amplitude else None
+    if stood is not None:
+        if twice:  # a mark is placed best where it is looked for
+            known = replace(known, look=stood.look)
+            tracks = second_pass(film.pictures(), known, stood.tracks, look_at=stood.look_at)
+            stood = upright(tracks, known.look, turned, stood) or stood
+        if rim is not None and setup.calibrate.layout and look_over is not None:
+            rim = _rim_upright(look_over, stood, known, rim, setup)
+            stood = stood.centred(rim.centre)
+            centre_sigma = rim.centre_sigma
+        tracks, lean = stood.about(camera.pivot)
+        known, shared = replace(known, look=stood.look), [*shared, lean]
+        camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup.pivot)
+    values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma, shared), camera)
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
@@ -330,7 +344,7 @@ def tabulated(
         table[vague] = np.nan
     tracks.flag = [VAGUE if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
     tracks.flag = [GONE if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
-    meta = meta_of(film, tracks, known, camera, setup, doubtful)
+    meta = meta_of(film, tracks, known, camera, setup, doubtful, turned)
     seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
     tracks.flag = remarks(np.array(tracks.t), tracks.flag, seen_how, twice)
     flag = np.array(tracks.flag)
@@ -339,7 +353,24 @@ def tabulated(
         check_length(measurement)
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}") from None
-    return measurement
+    return Tracking(measurement, tracks, known, camera, rim)
+
+
+def _rim_upright(look_over: Survey, stood: Upright, known: Known, rim: Outline, setup: Setup) -> Outline:
+    """The rim again, from frames whose foreshortening is known; its centre from where it was."""
+    tracks, around = stood.tracks, Around(stood.tracks)
+    frames = []
+    for picture in look_over.pictures:
+        here = around.at(picture.index) if picture.index < len(tracks.t) else None
+        if here is not None and here.held:
+            frames.append((picture, here.pose, here.motion(known.exposure)))
+    frames.sort(key=lambda f: stood.look.streak(f[2]))
+    frames = frames[:SHARP]
+    short = [float(stood.short[picture.index]) for picture, _, _ in frames]
+    try:
+        return outline(frames, stood.look, known.view, rim_span(setup), short=short, across=stood.across)
+    except TrackError:  # it was seen once, but not now
+        return replace(rim, centre=0j)
 
 
 def _length(value: float, name: str, unit: str = "metres") -> float:

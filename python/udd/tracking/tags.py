@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -223,7 +223,7 @@ def _laid(
         places = places + _displaced(flat[good], places)
     marks = [Mark(complex(z), (0.0, 0.0), 0.0, 0.0) for z in places]
     look = Look(marks, 0.0, 1.0, film.light, np.inf, bent.lens)
-    tracks = Tracks(*([] for _ in range(10)))
+    tracks = Tracks(*([] for _ in fields(Tracks)))
     angle = 0.0
     for at, (t, flag) in zip(flat, notes, strict=True):
         pose, fit = Pose(complex(np.nan, np.nan), np.nan), None
