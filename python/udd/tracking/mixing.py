@@ -36,7 +36,7 @@ def mixed(light: Array, white: float, mark: float, colour: Array, full_range: bo
     order = 1 if seen[-1] > seen[0] else -1
     if not (np.diff(seen[::order]) > 0).all():
         return light
-    return light + np.interp(light, seen[::order], (straight - seen)[::order], 0.0, 0.0)
+    return np.asarray(light + np.interp(light, seen[::order], (straight - seen)[::order], 0.0, 0.0))
 
 
 def _codes(light: float, colour: Array) -> Array:

@@ -128,8 +128,8 @@ def unforeseen(tracks: Tracks, variance: float) -> Array:
     """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
 
     A streak stands for the mean of its path, which is off its middle by half the second derivative times the
-    variance of the time [s^2] over which it is seen. The polynomials that tell this derivative do not know of
-    what happens between frames; how far they miss the frame itself when it is left out shows how much that is.
+    variance of the time [s^2] over which it is seen. The polynomials that tell this derivative do not know
+    what happens between frames; how far they miss the frame itself when it is left out shows how much.
     """
     around = Around(tracks)
     factor = 0.5 * KINK * variance / around.interval**2
@@ -147,7 +147,7 @@ class Around:
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
     def _near(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
-        """The nearest frames on both sides, how many intervals off they are, whether k is held."""
+        """The nearest frames on both sides, how many intervals off, and whether k is held."""
         place = int(np.searchsorted(self.good, k))
         held = place < len(self.good) and bool(self.good[place] == k)
         low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + held

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,43 +34,43 @@ def evenness(
     as lamps may flicker. None where the light is even.
     """
     height, width = view.shape
+    sparse = np.zeros_like(view)
+    sparse[::EVERY, ::EVERY] = True
+    sparse &= view
     terms, values = [], []
     for picture, sight in seen[:MOST]:
         box, here = bare(sight, height, width, body)
-        rows, columns = (np.arange(height)[box[0]], np.arange(width)[box[1]])
-        here &= view[box] & (rows[:, None] % EVERY == 0) & (columns[None, :] % EVERY == 0)
-        amount = light[picture.y[box][here]]
-        good = np.abs(amount - np.median(amount)) < FAR * np.median(amount) if len(amount) else here[here]
+        v, u = np.nonzero(here & sparse[box])
+        amount = light[picture.y[box][v, u]]
+        usual = np.median(amount) if len(amount) else 0.0
+        good = np.abs(amount - usual) < FAR * usual
         if good.sum() < FEWEST:
             continue
-        v, u = (x[good] for x in np.nonzero(here))
-        design = _terms(u + columns[0], v + rows[0], view.shape)
+        design = _terms(u[good] + box[1].start, v[good] + box[0].start, view.shape)
         value = np.log(amount[good])
         terms.append(design - design.mean(axis=0))
         values.append(value - value.mean())
     if not terms:
         return None
-    design, value = np.concatenate(terms), np.concatenate(values)
-    good = np.ones(len(value), dtype=bool)
-    found = np.zeros(design.shape[1])
+    every, value = np.concatenate(terms), np.concatenate(values)
+    fair = np.ones(len(value), dtype=bool)
     for _ in range(3):
-        found = np.linalg.lstsq(design[good], value[good], rcond=None)[0]
-        rest = value - design @ found
-        good = np.abs(rest) < SIGMAS * 1.48 * np.median(np.abs(rest[good]))
+        found = np.linalg.lstsq(every[fair], value[fair], rcond=None)[0]
+        rest = np.abs(value - every @ found)
+        fair = rest <= SIGMAS * 1.48 * np.median(rest[fair])
     # a parabola says nothing about where the disk does not come
-    centre = np.array([s.centre for _, s in seen])
-    reach = seen[0][1].reach
-    u, v = (
+    centre, reach = np.array([s.centre for _, s in seen]), seen[0][1].reach
+    columns, rows = (
         np.clip(np.arange(size), x.min() - reach, x.max() + reach)
         for size, x in ((width, centre.real), (height, centre.imag))
     )
-    shade = np.stack([_terms(u, np.full_like(u, row), view.shape) @ found for row in v])
-    here = shade[np.ix_((np.arange(height) == v), (np.arange(width) == u))]
+    shade = np.stack([_terms(columns, np.full(width, row), view.shape) @ found for row in rows])
+    here = shade[np.ix_(rows == np.arange(height), columns == np.arange(width))]
     if np.ptp(here) < LEAST:
         return None
     return np.asarray(np.exp(here.mean() - shade), dtype=np.float32)
 
 
-def _terms(u: Array, v: Array, shape: tuple[int, ...]) -> Array:
+def _terms(u: NDArray[Any], v: NDArray[Any], shape: tuple[int, ...]) -> Array:
     x, y = u / shape[1] - 0.5, v / shape[0] - 0.5
     return np.column_stack([x, y, x * x, x * y, y * y])

@@ -69,7 +69,7 @@ def upright(tracks: Tracks, look: Look, found: Wobble, before: Upright | None = 
     which they were displaced. `before`: what the marks that the tracks come from were displaced for.
     """
     across = complex(np.exp(1j * found.axis))
-    held = np.isfinite(np.array(tracks.information)).all(axis=(1, 2))
+    held = np.asarray(np.isfinite(np.array(tracks.information)).all(axis=(1, 2)))
     frames = {int(k): _Frame.of(tracks, look, int(k)) for k in np.flatnonzero(held)}
     whole = [k for k in frames if np.isfinite(tracks.chi2[k]).all()]
     if not whole:
@@ -132,7 +132,7 @@ class _Frame:
         weight = np.zeros((len(design), len(design)))
         for j, information in enumerate(tracks.marks[k]):
             weight[2 * j : 2 * j + 2, 2 * j : 2 * j + 2] = information
-        solved = np.linalg.solve(design.T @ weight @ design, design.T @ weight)
+        solved = np.asarray(np.linalg.solve(design.T @ weight @ design, design.T @ weight), dtype=np.float64)
         return cls(turn, arms, np.nan_to_num(tracks.leftover[k]).ravel(), weight, design, solved)
 
     def across(self, direction: complex) -> Complexes:
