@@ -21,7 +21,8 @@ ROUNDS = 5
 SMALL = 0.02  # relative change over which slopes are taken
 WORSE = 5.0  # times the least misfit
 PARABOLA = 0.2  # of the step between shares, to which its vertex is good
-STREAK = 6.0  # pixels between frames below which a frame says nothing about the exposure
+APART = 6.0  # pixels between frames below which a frame says nothing about the exposure
+STREAK = 2.5  # pixels: shorter streaks look like the lens's blur
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ def exposure(moving: Sequence[Moving], look: Look, view: NDArray[np.bool_]) -> E
     reach = look.reach
     paths = [abs(m.rate) * m.interval + abs(m.turning) * m.interval * reach for m in moving]
     order = np.argsort(-np.array(paths), kind="stable")[:FASTEST]
-    fast = [moving[k] for k in order if paths[k] > STREAK]
+    fast = [moving[k] for k in order if paths[k] > APART]
     if not fast:
         return Exposure(0.0, np.inf)
     costs = []

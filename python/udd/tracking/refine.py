@@ -24,9 +24,9 @@ APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
 LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
 WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
 WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
-# where the slope of the second derivative changes: its error times interval^2 against the miss, rms over the
-# time at which it does, for the mean over a whole interval (of an instant: 0.45)
-KINK = 0.31
+# where the second derivative jumps, as friction makes it where a disk turns back: its error times interval^2
+# against the miss, rms over the times at which it may jump, for the mean over a whole interval
+JUMP = 1.10
 FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
 
 
@@ -132,7 +132,7 @@ def unforeseen(tracks: Tracks, variance: float) -> Array:
     what happens between frames; how far they miss the frame itself when it is left out shows how much.
     """
     around = Around(tracks)
-    factor = 0.5 * KINK * variance / around.interval**2
+    factor = 0.5 * JUMP * variance / around.interval**2
     missed = [around.surprise(k) for k in range(len(tracks.t))]
     return factor * np.array([(centre.real, centre.imag, angle) for centre, angle in missed])
 
