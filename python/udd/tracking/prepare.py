@@ -162,22 +162,26 @@ def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[c
 
 
 def _centred(look: Look, centre: complex, setup: Setup) -> Look:
-    """Marks as seen from the disk's own centre; of the standard ones red at beta.
-
-    Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
-    all the marks of any other layout.
-    """
-    places, body = look.places - centre, setup.layout.unit
-    if setup.layout.standard:
-        turns = places / np.abs(places) / body
-        off = np.angle(turns / turns.mean()) * np.abs(places)
-        turn = complex(turns[0])
-        if np.abs(off).max() < SQUARE:
-            turn = complex(turns.mean() / abs(turns.mean()))
-    else:
-        turn = complex(np.vdot(body - body.mean(), places - places.mean()))
-        turn /= abs(turn)
+    """Marks as seen from the disk's own centre, turned to beta = 0."""
+    turn = upward(look.places - centre, setup)
     marks = [
         replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
     ]
     return replace(look, marks=marks)
+
+
+def upward(places: NDArray[np.complex128], setup: Setup) -> complex:
+    """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
+
+    Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
+    all the marks of any other layout.
+    """
+    body = setup.layout.unit
+    if not setup.layout.standard:
+        turn = complex(np.vdot(body - body.mean(), places - places.mean()))
+        return turn / abs(turn)
+    turns = places / np.abs(places) / body
+    off = np.angle(turns / turns.mean()) * np.abs(places)
+    if np.abs(off).max() < SQUARE:
+        return complex(turns.mean() / abs(turns.mean()))
+    return complex(turns[0])

@@ -31,7 +31,7 @@ from .learn import refine as learn
 from .look import Look, Pose
 from .loop import Known, Tracks, follow
 from .noise import covariance
-from .prepare import SHARP, prepare, rim_span
+from .prepare import SHARP, prepare, rim_span, upward
 from .quality import quality, remarks
 from .readout import readout
 from .refine import LONG, Around, drop_weak, unforeseen
@@ -330,7 +330,7 @@ def _tracking(
             stood = upright(tracks, known.look, turned, stood) or stood
         if rim is not None and setup.calibrate.layout and look_over is not None:
             rim = _rim_upright(look_over, stood, known, rim, setup)
-            stood = stood.centred(rim.centre)
+            stood = stood.centred(rim.centre, upward(stood.look.places - rim.centre, setup))
             centre_sigma = rim.centre_sigma
         tracks, lean = stood.about(camera.pivot)
         known, shared = replace(known, look=stood.look), [*shared, lean]

@@ -29,13 +29,17 @@ class Upright:
     answer: Array  # (n, 3) change of the pose (u, v, beta) that a foreshortening of 1 made
     held: NDArray[np.bool_]
 
-    def centred(self, at: complex) -> Upright:
-        """With the marks' origin moved to a point among them."""
-        turn = np.exp(1j * np.array(self.tracks.angle))
-        seen = at * turn + self.short * (at * turn * np.conj(self.across)).real * self.across
-        centre = list(np.array(self.tracks.centre) + seen)
-        marks = [replace(m, place=m.place - at) for m in self.look.marks]
-        return replace(self, tracks=replace(self.tracks, centre=centre), look=replace(self.look, marks=marks))
+    def centred(self, at: complex, by: complex) -> Upright:
+        """With the marks' origin moved to a point among them, and they turned back by an angle."""
+        angle = np.array(self.tracks.angle)
+        arm = at * np.exp(1j * angle)
+        centre = (
+            np.array(self.tracks.centre) + arm + self.short * (arm * np.conj(self.across)).real * self.across
+        )
+        change = float(np.angle(by))
+        marks = [replace(m, place=(m.place - at) / by, turn=m.turn - change) for m in self.look.marks]
+        tracks = replace(self.tracks, centre=list(centre), angle=list(angle + change))
+        return replace(self, tracks=tracks, look=replace(self.look, marks=marks))
 
     def look_at(self, k: int) -> Look:
         """The marks as frame k shows them: foreshortened."""
