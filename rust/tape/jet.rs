@@ -205,28 +205,25 @@ fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize, const TO: usi
     x: &[S; D],
     sides: &Sides<S>,
 ) {
-    // Stays in registers, as far as they go: of what is not asked for later nothing is stored.
+    // Single numbers stay in registers.
     let mut room = [[S::zero(); N]; 24];
-    let work = &mut room[..P::SLOTS];
-    unroll!(n in 0..D => {
-        work[n][0] = x[n];
-        series[n][0] = x[n];
-    });
+    let single = const { size_of::<S>() == size_of::<f64>() };
+    let work = if single { &mut room[..P::SLOTS] } else { &mut *series };
+    unroll!(n in 0..D => { work[n][0] = x[n]; });
     every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
-    unroll!(n in 0..D => {
-        work[n][1] = work[usize::from(P::RATES[n])][0];
-        series[n][1] = work[n][1];
-    });
+    unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
     macro_rules! orders {
         ($($k:literal)+) => {
             $(if const { $k < TO && $k < N - 1 } {
                 every!(P, i => { P::STEPS[i].next(work, held, sides, $k); });
                 unroll!(n in 0..D => {
                     work[n][$k + 1] = work[usize::from(P::RATES[n])][$k].scale(INVERSE[$k + 1]);
-                    series[n][$k + 1] = work[n][$k + 1];
                 });
             })+
         };
     }
     orders!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
+    if single {
+        unroll!(n in 0..D => { series[n] = room[n]; });
+    }
 }
