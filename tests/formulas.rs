@@ -124,7 +124,11 @@ proptest! {
 fn splines_have_derivatives() {
     type N = Dual<f64, 1>;
     let own = ["a", "b", "c", "d", "e"];
-    for text in ["spline(Z, -0.03, 0.04, a, b, c, d, e)", "periodic(beta, 0, 6.5, a, b, c, d, e)"] {
+    for text in [
+        "spline(Z, -0.03, 0.04, a, b, c, d, e)",
+        "periodic(beta, 0, 6.5, a, b, c, d, e)",
+        "periodic(atan2(Y, Z), -3, 3.3, a, b, c, d, e)",
+    ] {
         let effect = Effect::formula(Arc::new(formula(Slot::Vertical, text, &own, &own).unwrap()));
         let disk = DiskFamily { effects: vec![effect], edge: false };
         let values: Vec<f64> = PLAIN.into_iter().chain([0.02, 0.07, -0.02, 0.04, 0.03]).collect();
@@ -161,7 +165,7 @@ fn splines_have_derivatives() {
 #[test]
 fn packets_have_the_bits_of_numbers() {
     type P = Packet<LANES, Plain>;
-    let text = "spline(Y, -0.01, 0.05, e, f, h, l, m) + periodic(beta, 0, 3, e, f, h, l) + c*(bspline(3*Omega) + bspline(Omega - 1) + abs(Z) + Omega^3*exp(-Y) - 1/(2 + cos(beta)))";
+    let text = "spline(Y, -0.01, 0.05, e, f, h, l, m) + periodic(beta, 0, 3, e, f, h, l) + c*(atan2(Y, Z - 0.02) + atan(beta) + bspline(3*Omega) + bspline(Omega - 1) + abs(Z) + Omega^3*exp(-Y) - 1/(2 + cos(beta)))";
     let own = Effect::formula(Arc::new(
         formula(Slot::Vertical, text, &["e", "f", "h", "l", "m", "c"], &[]).unwrap(),
     ));
@@ -191,6 +195,7 @@ fn smooth_formulas_have_series() {
     assert!(recorded(Slot::Vertical, "c*W*ln(2 + sin(beta))*tanh(t)"));
     assert!(!recorded(Slot::Torque, "c*abs(Z)"));
     assert!(!recorded(Slot::Torque, "c*bspline(Omega)"));
+    assert!(!recorded(Slot::Torque, "c*atan2(Y, Z)"));
     let own = ["a", "b", "c", "d"];
     let bent = formula(Slot::Torque, "spline(Z, 0, 1, a, b, c, d)", &own, &own).unwrap();
     let bent = DiskFamily { effects: vec![Effect::formula(Arc::new(bent))], edge: false };
@@ -204,6 +209,7 @@ fn what_is_no_effect_is_refused() {
     };
     for (text, own, linear, wanted) in [
         ("c*q", &["c"][..], &["c"][..], "unknown name q"),
+        ("c*atan2(Y)", &["c"][..], &["c"][..], "needs two numbers after atan2"),
         ("c*Omega'", &["c"], &["c"], "may not use rates"),
         ("sin(c*Z)", &["c"], &["c"], "not proportional to c"),
         ("a*b*Z", &["a", "b"], &["a", "b"], "not proportional to a, b"),

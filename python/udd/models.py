@@ -50,7 +50,8 @@ class Model:
     equations : mapping of str to formula, or sequence of formula
         The rate of each state: text or a SymPy expression of the states, the parameters, the time ``t``,
         numbers and ``pi``, with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``,
-        ``sinh``, ``cosh``, ``tanh``, ``abs`` and ``bspline``, the cardinal cubic B-spline.
+        ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs`` and ``bspline``, the cardinal cubic
+        B-spline.
     parameters : mapping of str to float, optional
         The parameters' values.
     angles : iterable of str

@@ -22,7 +22,7 @@ pub const HIGHEST: i32 = 1024;
 /// Whether a name means something in every formula, so that nothing else can be called so.
 pub fn is_reserved(name: &str) -> bool {
     let function = parse::FUNCTIONS.iter().any(|(function, _)| *function == name);
-    function || parse::SPLINES.contains(&name) || name == "t" || name == "pi"
+    function || name == parse::ATAN2 || parse::SPLINES.contains(&name) || name == "t" || name == "pi"
 }
 
 /// The names that a formula may use, beside the time `t`, the number `pi` and the functions.
@@ -65,6 +65,7 @@ pub enum Unary {
     Sinh,
     Cosh,
     Tanh,
+    Atan,
     /// The cardinal cubic B-spline: a bump over -2 to 2 whose second derivative is continuous.
     Bspline,
     /// A whole power.
@@ -80,6 +81,8 @@ pub enum Binary {
     Div,
     /// By `exp(b ln a)`.
     Power,
+    /// The angle of the point with the ordinate `a` and the abscissa `b`.
+    Atan2,
 }
 
 /// One operation on the stack.
@@ -236,6 +239,7 @@ impl Unary {
             Unary::Sinh => (a.exp() - (-a).exp()).scale(0.5),
             Unary::Cosh => (a.exp() + (-a).exp()).scale(0.5),
             Unary::Tanh => a.tanh(),
+            Unary::Atan => a.atan2(S::one()),
             Unary::Bspline => bspline(a),
             Unary::Power(n) => power(a, n),
         }
@@ -252,6 +256,7 @@ impl Binary {
             Binary::Mul => a * b,
             Binary::Div => a / b,
             Binary::Power => (b * a.ln()).exp(),
+            Binary::Atan2 => a.atan2(b),
         }
     }
 }

@@ -12,7 +12,7 @@
 use super::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Spline, Unary};
 
 /// The functions by their names.
-pub(super) const FUNCTIONS: [(&str, Unary); 12] = [
+pub(super) const FUNCTIONS: [(&str, Unary); 13] = [
     ("sqrt", Unary::Sqrt),
     ("exp", Unary::Exp),
     ("ln", Unary::Ln),
@@ -23,6 +23,7 @@ pub(super) const FUNCTIONS: [(&str, Unary); 12] = [
     ("sinh", Unary::Sinh),
     ("cosh", Unary::Cosh),
     ("tanh", Unary::Tanh),
+    ("atan", Unary::Atan),
     ("abs", Unary::Abs),
     ("bspline", Unary::Bspline),
 ];
@@ -224,6 +225,21 @@ impl Parser<'_> {
         if self.takes(")") { Ok(()) } else { mistake("lacks a closing bracket") }
     }
 
+    /// What follows the name of the function of two numbers: `(y, x)`.
+    fn atan2(&mut self) -> Parsed {
+        let usage = || mistake(format!("needs two numbers after {ATAN2}, as in {ATAN2}(y, x)"));
+        if !self.takes("(") {
+            return usage();
+        }
+        let left = self.sum()?;
+        if !self.takes(",") {
+            return usage();
+        }
+        let right = self.sum()?;
+        self.close()?;
+        Ok(binary(Binary::Atan2, left, right))
+    }
+
     /// What follows the name of a spline: `(x, low, high, c0, c1, ...)`.
     fn spline(&mut self, name: &str) -> Parsed {
         let usage = || {
@@ -278,6 +294,8 @@ impl Parser<'_> {
             let argument = self.sum()?;
             self.close()?;
             return Ok(unary(function, argument));
+        } else if name == ATAN2 {
+            return self.atan2();
         } else if SPLINES.contains(&name) {
             return self.spline(name);
         } else {
@@ -295,6 +313,9 @@ impl Parser<'_> {
     }
 }
 
+/// The function of two numbers.
+pub(super) const ATAN2: &str = "atan2";
+
 /// The functions that are given by coefficients.
 pub(super) const SPLINES: [&str; 2] = ["spline", "periodic"];
 
@@ -308,7 +329,7 @@ fn allowed(names: Names<'_>) -> String {
         ),
         false => String::new(),
     };
-    let functions = [&FUNCTIONS.map(|(name, _)| name)[..], &SPLINES].concat().join(", ");
+    let functions = [&FUNCTIONS.map(|(name, _)| name)[..], &[ATAN2], &SPLINES].concat().join(", ");
     let parameters = match names.parameters {
         [] => String::new(),
         list => format!(", the parameters {}", list.join(", ")),

@@ -178,4 +178,10 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         let value = self.re.tanh();
         self.chain(value, S::one() - value * value)
     }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        let inverse = S::one() / (self.re.square() + x.re.square());
+        let (along, across) = (x.re * inverse, self.re * inverse);
+        Self { re: self.re.atan2(x.re), d: vector!(S, N; i => self.d[i] * along - x.d[i] * across) }
+    }
 }

@@ -78,6 +78,8 @@ pub trait Scalar:
     fn sin(self) -> Self;
     fn cos(self) -> Self;
     fn tanh(self) -> Self;
+    /// The angle of the point with this ordinate and the abscissa `x`, from -pi to pi.
+    fn atan2(self, x: Self) -> Self;
     /// Sine and cosine at the cost of one.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {

@@ -240,6 +240,10 @@ impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
         elementary::tanh(self)
     }
     #[inline(never)]
+    fn atan2(self, x: Self) -> Self {
+        self.zip(x, f64::atan2)
+    }
+    #[inline(never)]
     fn sin_cos(self) -> (Self, Self) {
         elementary::sin_cos(self)
     }

@@ -71,6 +71,10 @@ impl Scalar for f64 {
         elementary::tanh(self)
     }
     #[inline(always)]
+    fn atan2(self, x: f64) -> f64 {
+        f64::atan2(self, x)
+    }
+    #[inline(always)]
     fn sin_cos(self) -> (f64, f64) {
         elementary::sin_cos(self)
     }

@@ -365,6 +365,10 @@ impl Scalar for Symbol {
     fn tanh(self) -> Symbol {
         apply(Function::Tanh, self)
     }
+    // Its series is not known: models that have it cannot be recorded.
+    fn atan2(self, x: Symbol) -> Symbol {
+        self.zip(x, f64::atan2)
+    }
 }
 
 /// A symbol stands for a number without derivatives, but has no value to look at: a model that does
