@@ -193,8 +193,8 @@ def formula(
         Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
         friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
         numbers, ``pi``, and the effect's own parameters; with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``,
-        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``, ``bspline`` (the
-        cardinal cubic B-spline) and the splines of :func:`curve`.
+        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``,
+        ``bspline`` (the cardinal cubic B-spline) and the splines of :func:`curve`.
     momentum : {"consistent", "constraint"}, optional
         How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
     name : str

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import struct
 import sys
 from collections.abc import Iterator
-from typing import IO, Any
+from typing import Any
 
 HEAD = struct.Struct(
     "<qdIIIII?"
@@ -26,6 +27,16 @@ MOST_BROKEN = 200  # consecutive undecodable packets after which a film is given
 MOST_PIXELS = 1 << 26  # of a picture
 
 
+class Whole:
+    """The standard output, every byte of it: a buffered one loses some where the process is paused."""
+
+    def write(self, data: Any) -> None:
+        """Write all of it."""
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(1, rest) :]
+
+
 class Refused(Exception):
     """Why the file is no film."""
 
@@ -34,10 +45,10 @@ def main(path: str, memory: int) -> None:
     """Do what the standard input says, until it ends."""
     limit(memory)
     for line in sys.stdin:
-        answer(path, line.strip(), sys.stdout.buffer)
+        answer(path, line.strip(), Whole())
 
 
-def answer(path: str, request: str, out: IO[bytes]) -> None:
+def answer(path: str, request: str, out: Whole) -> None:
     """Look at the film, or decode it."""
     try:
         with opened(path) as container:
@@ -46,12 +57,10 @@ def answer(path: str, request: str, out: IO[bytes]) -> None:
             if request == LOOK:
                 said["packets"] = packets(container, stream)
             out.write(json.dumps(said).encode() + b"\n")
-            out.flush()
             if request != LOOK:
                 send(container, stream, float(request), out)
     except Refused as error:
         out.write(json.dumps({"error": str(error)}).encode() + b"\n")
-    out.flush()
 
 
 def limit(memory: int) -> None:
@@ -108,7 +117,7 @@ def packets(container: Any, stream: Any) -> int:
     return count
 
 
-def send(container: Any, stream: Any, since: float, out: IO[bytes]) -> None:
+def send(container: Any, stream: Any, since: float, out: Whole) -> None:
     """Write all pictures, then the end with the number of packets that did not decode."""
     broken = [0]
     for index, t, frame, damaged in pictures(container, stream, since, broken):
