@@ -18,7 +18,7 @@ from udd.discovery.curves import refined, scan_curves
 from udd.discovery.expressions import evaluate, read, sensible, simplify, write
 from udd.discovery.forcing import Score, responses, score_forcings
 from udd.discovery.formulas import Formula, formulas_for
-from udd.discovery.located import fit_curve, fit_formula
+from udd.discovery.located import curve_effect, fit_curve, fit_formula
 from udd.discovery.smoothing import chance, smooth
 from udd.discovery.splines import Spline, along, product, rough_product
 from udd.errors import FitError, UddError
@@ -380,27 +380,10 @@ def test_a_broken_power_can_be_fitted():
     assert fitted.parameters["k0"] == pytest.approx(unmodelled.K0, abs=4 * fitted.errors["k0"])
 
 
-def test_a_curve_over_the_direction_of_the_centre_is_added():
-    """It goes round: past half a turn it begins anew."""
-
-    def contact(t, o, y, z, b):
-        return 0.0, 0.0, 0.004 * np.exp(np.cos(np.arctan2(y, z) - 0.5) - 1)
-
-    base = udd.fit(unmodelled.record(contact, 1), udd.Disk(W))
-    found = scan_curves(base, only=lambda slot, own: slot.name == "vertical" and own[0].name == "theta")
-    located = fit_curve(base, found.curves[0])
-    assert located.fit.converged
-    x = np.quantile(located.curve.places[0], np.linspace(0.01, 0.99, 99))
-    law = 0.004 * np.exp(np.cos(x - 0.5) - 1)
-    off = located.curve.values(x) - located.curve.beside(law, x)
-    assert np.mean(np.abs(off) < 1.96 * located.curve.errors(x)) > 0.8
-    effect = located.fit.model.effects[0]
-    assert effect.spec.coordinate == "atan2(Y, Z)"
-    assert effect.spec.periodic
-    turned = np.linspace(-3.0, 3.0, 50)
-    y, z = 0.03 * np.sin(turned), 0.03 * np.cos(turned)
-    made = located.fit.model.rates(0.0, np.column_stack([0 * y, y, z, 0 * y]))[:, 2] - located.fit.model.W
-    np.testing.assert_allclose(made, located.curve.values(turned), atol=1e-12)
+def test_what_cannot_be_added_is_said(null):
+    only = scan_curves(null, only=lambda slot, own: slot.name == "torque" and own[0].name == "theta")
+    with pytest.raises(FitError, match="no word for theta"):
+        curve_effect(only.curves[0])
 
 
 def test_a_surface_is_added_and_refitted():

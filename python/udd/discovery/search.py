@@ -363,7 +363,8 @@ class Search:
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
         passing = look.passing()
-        curve = next((c for c in look.curves if len(c.coordinates) == 1), None)
+        # Of curves over angles for which formulas have no word another is about as likely.
+        curve = next((c for c in look.curves if c.sayable and len(c.coordinates) == 1), None)
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
