@@ -318,9 +318,7 @@ where
                 }));
             }
         }
-        if rejected.any() {
-            self.work.rejected = tick(rejected, self.work.rejected, 1.0);
-        }
+        self.work.rejected = tick(rejected, self.work.rejected, 1.0);
 
         let mut progress =
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
@@ -437,10 +435,8 @@ where
     #[inline(always)]
     fn commit(&mut self, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
         let t = S::Real::select(last, end, self.at.t + trial.size);
-        if const { !M::SMOOTH } {
-            let elapsed = lanes.and(is_zero(t - self.at.t).not());
-            self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
-        }
+        let elapsed = lanes.and(is_zero(t - self.at.t).not());
+        self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
         self.from = S::Real::select(lanes, self.at.t, self.from);
         self.size = S::Real::select(lanes, trial.size, self.size);
         self.at.t = S::Real::select(lanes, t, self.at.t);

@@ -83,28 +83,21 @@ fn log_length<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: u
     0.5 * square.ln()
 }
 
-/// Several tangents are made orthonormal after so many steps: they lean towards each other, but a step is short
-/// beside the time in which they come close.
-const STEPS: f64 = 4.0;
-
 /// How much tangents had grown when they were last made orthonormal: `ln(product) + sum`, so that a step
 /// costs a multiplication.
 #[derive(Clone, Copy, Debug)]
 pub struct Growth<R, const N: usize> {
     product: [R; N],
     sum: [R; N],
-    /// Steps since then.
-    steps: R,
 }
 
 impl<R: Real, const N: usize> Growth<R, N> {
     pub fn none() -> Self {
-        Self { product: [R::one(); N], sum: [R::zero(); N], steps: R::zero() }
+        Self { product: [R::one(); N], sum: [R::zero(); N] }
     }
 
     /// Counts a lane's from now on, where its state is `x`.
     pub fn restart<const D: usize>(&mut self, x: &[Dual<R, N>; D], lane: usize) {
-        self.steps.set_lane(lane, 0.0);
         for i in 0..N {
             self.product[i].set_lane(lane, 1.0);
             self.sum[i].set_lane(lane, -log_length(x, i, lane));
@@ -119,27 +112,25 @@ impl<R: Real, const N: usize> Growth<R, N> {
 
     /// Makes the tangents in the lanes that moved orthonormal again, where that has to be, and adds what they
     /// had grown: several tangents lean towards each other with every step, a single one only must not leave
-    /// the range of numbers. Of lanes at the end of a block, which are `told`, all lengths are wanted.
+    /// the range of numbers.
     #[inline(always)]
     pub fn keep<M, const D: usize, E, K>(
         &mut self,
         isa: Isa,
         driver: &mut Driver<M, Dual<R, N>, D, E, K>,
-        (moved, told): (R::Mask, R::Mask),
+        moved: R::Mask,
     ) where
         M: System<Dual<R, N>, D>,
         E: ErrorNorm<Dual<R, N>, D> + Copy,
         K: Method<Dual<R, N>, D>,
     {
-        let near = if const { N == 1 } {
+        let mut lanes = moved;
+        if const { N == 1 } {
             let mut square = R::zero();
             unroll!(n in 0..D => { square += driver.x()[n].d[0] * driver.x()[n].d[0]; });
-            R::constant(1e-40).less(square).and(square.less(R::constant(1e40)))
-        } else {
-            self.steps = R::select(moved, self.steps + R::one(), self.steps);
-            self.steps.less(R::constant(STEPS)).and(told.not())
-        };
-        let lanes = moved.and(near.not());
+            let near = R::constant(1e-40).less(square).and(square.less(R::constant(1e40)));
+            lanes = moved.and(near.not());
+        }
         if lanes.any() {
             work::<R, _>(isa, Renewal { growth: self, driver, lanes });
         }
@@ -179,6 +170,5 @@ where
         let (x, lengths) = orthonormalise(self.driver.x());
         self.driver.set_state(self.lanes, x);
         self.growth.add(lengths, self.lanes);
-        self.growth.steps = R::select(self.lanes, R::zero(), self.growth.steps);
     }
 }

@@ -124,11 +124,11 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             if const { N == D } {
                 moments.add(self.isa, &ship.driver, moved.and(counting));
             }
+            growth.keep(self.isa, &mut ship.driver, moved);
             steps = R::select(moved, steps + R::one(), steps);
             let t = ship.driver.t();
             let full = moved.and(t.less(full_at).or(steps.less(R::constant(LEAST_STEPS))).not());
             let over = ship.arrived().or(progress.walled()).or(progress.failed);
-            growth.keep(self.isa, &mut ship.driver, (moved, full.or(over)));
             if !full.or(over).any() {
                 continue;
             }

@@ -1,9 +1,8 @@
 //! How far a Taylor polynomial reaches, and its values.
 
 use super::Jets;
-use super::node::INVERSE;
 use crate::integrate::ErrorNorm;
-use crate::scalar::elementary::power_rough;
+use crate::scalar::elementary::{exp2_rough, log2_rough};
 use crate::scalar::{Instructions, Packet, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
@@ -79,15 +78,15 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         unroll!(n in 0..D => { sum += series[n][order].real() + series[n][order - 1].real(); });
         // Zero, or not a number.
         let reach = self.reach(order, norm, weights).min(self.reach(order - 1, norm, weights));
-        reach + (sum - sum)
+        exp2_rough(reach) + (sum - sum)
     }
 
-    /// The distance at which term `k` is as small as allowed, roughly.
+    /// Binary logarithm of the distance at which term `k` is as small as allowed.
     #[inline(always)]
     fn reach<E: ErrorNorm<S, D>>(&self, k: usize, norm: &E, weights: &E::Weights) -> S::Real {
         let series = self.coefficients();
         let term = vector!(S, D; n => series[n][k]);
-        power_rough(norm.of_term(&term, weights), -0.5 * INVERSE[k])
+        log2_rough(norm.of_term(&term, weights)).scale(-0.5 / k as f64)
     }
 }
 
