@@ -17,6 +17,7 @@ from .find import blobs
 from .flags import BLACK, BLANK, DAMAGED, REPEATED, lost
 from .quality import remarks
 from .setup import Setup
+from .srgb import light_of
 from .survey import survey
 
 Array = NDArray[np.float64]
@@ -169,7 +170,7 @@ def _light(picture: Picture, box: tuple[int, int, int, int], full_range: bool) -
         y, u, v = (y - 16) * (255 / 219), u * (255 / 224), v * (255 / 224)
     codes = np.stack([y + 1.402 * v, y - 0.344 * u - 0.714 * v, y + 1.772 * u], axis=-1) / 255
     codes = np.clip(codes, 0, 1)
-    light = np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
+    light = light_of(codes)
     return np.asarray(light, dtype=np.float32)
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from udd.errors import UddError
 
 from .decoder import HEAD, LOOK, NO_FILM
+from .srgb import light_of
 
 Plane = NDArray[np.uint8]
 PATIENCE = 60.0  # s for which the decoder may be silent
@@ -51,7 +52,7 @@ def light_of_codes(full_range: bool) -> NDArray[np.float64]:
     A shutter adds up light, not codes; a streak is only symmetric about its middle in light.
     """
     x = np.arange(256) / 255 if full_range else np.clip((np.arange(256) - 16) / 219, 0, 1.08)
-    return np.asarray(255 * np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4))
+    return np.asarray(255 * light_of(x))
 
 
 class Film:

@@ -27,16 +27,6 @@ MOST_BROKEN = 200  # consecutive undecodable packets after which a film is given
 MOST_PIXELS = 1 << 26  # of a picture
 
 
-class Whole:
-    """The standard output, every byte of it: a buffered one loses some where the process is paused."""
-
-    def write(self, data: Any) -> None:
-        """Write all of it."""
-        rest = memoryview(data)
-        while rest:
-            rest = rest[os.write(1, rest) :]
-
-
 class Refused(Exception):
     """Why the file is no film."""
 
@@ -45,10 +35,10 @@ def main(path: str, memory: int) -> None:
     """Do what the standard input says, until it ends."""
     limit(memory)
     for line in sys.stdin:
-        answer(path, line.strip(), Whole())
+        answer(path, line.strip())
 
 
-def answer(path: str, request: str, out: Whole) -> None:
+def answer(path: str, request: str) -> None:
     """Look at the film, or decode it."""
     try:
         with opened(path) as container:
@@ -56,11 +46,18 @@ def answer(path: str, request: str, out: Whole) -> None:
             said = facts(stream)
             if request == LOOK:
                 said["packets"] = packets(container, stream)
-            out.write(json.dumps(said).encode() + b"\n")
+            put(json.dumps(said).encode() + b"\n")
             if request != LOOK:
-                send(container, stream, float(request), out)
+                send(container, stream, float(request))
     except Refused as error:
-        out.write(json.dumps({"error": str(error)}).encode() + b"\n")
+        put(json.dumps({"error": str(error)}).encode() + b"\n")
+
+
+def put(data: Any) -> None:
+    """Every byte to the standard output: a buffered one loses some where the process is paused."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(1, rest) :]
 
 
 def limit(memory: int) -> None:
@@ -117,7 +114,7 @@ def packets(container: Any, stream: Any) -> int:
     return count
 
 
-def send(container: Any, stream: Any, since: float, out: Whole) -> None:
+def send(container: Any, stream: Any, since: float) -> None:
     """Write all pictures, then the end with the number of packets that did not decode."""
     broken = [0]
     for index, t, frame, damaged in pictures(container, stream, since, broken):
@@ -125,10 +122,10 @@ def send(container: Any, stream: Any, since: float, out: Whole) -> None:
             frame = frame.reformat(format="yuv420p")
         y, u, v = frame.planes[:3]
         turns = round((frame.rotation or 0) / 90) % 4  # phones note how they were held
-        out.write(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
+        put(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
         for plane in (y, u, v):
-            out.write(pixels(plane))
-    out.write(HEAD.pack(-1, 0.0, broken[0], 0, 0, 0, 0, False))
+            put(pixels(plane))
+    put(HEAD.pack(-1, 0.0, broken[0], 0, 0, 0, 0, False))
 
 
 def pixels(plane: Any) -> memoryview | bytearray:

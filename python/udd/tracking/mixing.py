@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .srgb import code_of, light_of
+
 Array = NDArray[np.float64]
 # BT.601: red, green and blue codes from brightness, U and V
 TO_RGB = np.array([[1, 0, 1.402], [1, -0.344136, -0.714136], [1, 1.772, 0]])
@@ -29,9 +31,9 @@ def mixed(light: Array, white: float, mark: float, colour: Array, full_range: bo
     """
     # amounts of light of red, green and blue; what lies outside is a colour that no picture shows
     ends = [_codes(white, np.zeros(2)), _codes(mark, colour / (255 if full_range else 224))]
-    one, other = (_light(np.clip(c, 0, 1)) for c in ends)
+    one, other = (light_of(np.clip(c, 0, 1)) for c in ends)
     weight = np.linalg.inv(TO_RGB)[0]
-    seen = 255 * _light(_code(one + SHARES[:, None] * (other - one)) @ weight)
+    seen = 255 * light_of(code_of(one + SHARES[:, None] * (other - one)) @ weight)
     straight = seen[0] + SHARES * (seen[-1] - seen[0])
     order = 1 if seen[-1] > seen[0] else -1
     if not (np.diff(seen[::order]) > 0).all():
@@ -41,12 +43,4 @@ def mixed(light: Array, white: float, mark: float, colour: Array, full_range: bo
 
 def _codes(light: float, colour: Array) -> Array:
     """Red, green and blue codes, 0 to 1, of that brightness and colour."""
-    return np.asarray(TO_RGB @ np.array([float(_code(np.array(light / 255))), *colour]))
-
-
-def _light(code: Array) -> Array:
-    return np.asarray(np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4))
-
-
-def _code(light: Array) -> Array:
-    return np.asarray(np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055))
+    return np.asarray(TO_RGB @ np.array([float(code_of(np.array(light / 255))), *colour]))
