@@ -9,7 +9,7 @@ use udd::model::{
     DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, Parameter, PendulumFamily, Sides, System, sides_of,
 };
 use udd::scalar::{Dual, Instructions, Isa, LANES, Mask, Packet, Plain, Real, Scalar, Work};
-use udd::tape::{Jets, Tape};
+use udd::tape::{HIGH, Jets, Tape};
 
 const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 
@@ -187,26 +187,28 @@ fn series_of_closed_forms() {
     }
 }
 
-/// Over one step every disk agrees with its own equation: the polynomial's slope is the rates.
+/// Over one step every disk agrees with its own equation, on both sides of the friction's kink: the polynomial's
+/// slope is the rates.
 #[test]
 fn polynomials_solve_the_equations() {
     const N: usize = 25;
-    let x0 = [1.0, 0.01, 0.03, 0.4];
     for (family, p) in disks() {
         let tape = Tape::record(&family, &[]).unwrap();
         let system = family.build(&p);
-        let sides = sides_of(&system, 0.3, &x0);
         let mut jets = Jets::<f64, 4, N>::new(&tape, Isa::best());
-        jets.expand(&tape, &p, 0.3, &x0, &sides);
-        // The poles of tanh(Omega/eps) are near for the smoothed dry friction.
-        let h = 1e-3;
-        for dt in [0.0, 0.5 * h, h] {
-            let x = jets.at(dt);
-            let rates = system.rates(0.3 + dt, &x, &sides);
-            for (n, (series, rate)) in jets.coefficients().iter().zip(rates).enumerate() {
-                let slope: f64 = (1..N).rev().map(|k| k as f64 * series[k] * dt.powi(k as i32 - 1)).sum();
-                let allowed = 1e-12 * (1.0 + rate.abs());
-                assert!(close(slope, rate, allowed), "{:?} {n}: {slope} {rate}", family.effects);
+        for x0 in [[1.0, 0.01, 0.03, 0.4], [-4.0, 0.01, 0.03, 0.4]] {
+            let sides = sides_of(&system, 0.3, &x0);
+            jets.expand(&tape, &p, 0.3, &x0, &sides);
+            // The poles of tanh(Omega/eps) are near for the smoothed dry friction.
+            let h = 1e-3;
+            for dt in [0.0, 0.5 * h, h] {
+                let x = jets.at(dt);
+                let rates = system.rates(0.3 + dt, &x, &sides);
+                for (n, (series, rate)) in jets.coefficients().iter().zip(rates).enumerate() {
+                    let slope: f64 = (1..N).rev().map(|k| k as f64 * series[k] * dt.powi(k as i32 - 1)).sum();
+                    let allowed = 1e-12 * (1.0 + rate.abs());
+                    assert!(close(slope, rate, allowed), "{:?} {n}: {slope} {rate}", family.effects);
+                }
             }
         }
     }
@@ -226,7 +228,7 @@ fn run<S: Scalar, const D: usize, const N: usize>(
         let sides = sides_of(system, S::lift(t), &x);
         jets.expand(tape, p, S::lift(t), &x, &sides);
         let norm = Tolerance { rtol, atol: rtol * 1e-3 };
-        let h = jets.radius(&norm, &norm.weights(&x)).min(end - t);
+        let h = jets.radius(jets.order(), &norm, &norm.weights(&x)).min(end - t);
         x = jets.at(h);
         t += h;
     }
@@ -382,6 +384,22 @@ fn same_bits_for_every_width_and_instruction_set() {
     }
 }
 
+/// Tangents side by side in lanes, where the machine has them, are those computed one by one.
+#[test]
+fn tangents_in_lanes_have_the_same_bits() {
+    type T = Dual<f64, 3>;
+    let tape = Tape::record(&DleFamily, &[None, Some(0.0)]).unwrap();
+    let p = [T::variable(1.3, 2), T::constant(0.0)];
+    let system = DleFamily.build(&p);
+    let x0 = from_fn(|n| T::variable([1.0, 1.0, 0.01][n], n));
+    let ends = Isa::available().into_iter().map(|isa| {
+        let x = run::<T, 3, { HIGH + 1 }>(&tape, &system, (&p, x0, 5.0), (1e-9, isa));
+        x.map(|v| (v.re.to_bits(), v.d.map(f64::to_bits)))
+    });
+    let ends: Vec<_> = ends.collect();
+    assert!(ends.iter().all(|end| *end == ends[0]));
+}
+
 /// A law with a comparison of its own.
 #[derive(Clone, Copy)]
 struct Compares;
@@ -415,10 +433,10 @@ fn a_radius_that_is_no_number() {
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         let x = [bad, 1.0, 1.0];
         jets.expand(&tape, &[1.0, 0.0], 0.0, &x, &[true; MAX_SURFACES]);
-        assert!(jets.radius(&norm, &norm.weights(&x)).is_nan(), "{bad}");
+        assert!(jets.radius(jets.order(), &norm, &norm.weights(&x)).is_nan(), "{bad}");
     }
     // At rest every step is good.
     let x = [1.0, 1.0, 0.0];
     jets.expand(&tape, &[1.0, 0.0], 0.0, &x, &[true; MAX_SURFACES]);
-    assert!(jets.radius(&norm, &norm.weights(&x)) > 1e6);
+    assert!(jets.radius(jets.order(), &norm, &norm.weights(&x)) > 1e6);
 }

@@ -52,6 +52,12 @@ pub struct Progress<M> {
 }
 
 impl<M: Mask> Progress<M> {
+    /// Lanes that ended on a switching surface or on the wall.
+    #[inline(always)]
+    pub fn switched(&self) -> M {
+        union(&self.crossed)
+    }
+
     /// Lanes that ended on the wall.
     pub fn walled(&self) -> M {
         self.crossed[WALL]
@@ -318,7 +324,9 @@ where
                 }));
             }
         }
-        self.work.rejected = tick(rejected, self.work.rejected, 1.0);
+        if rejected.any() {
+            self.work.rejected = tick(rejected, self.work.rejected, 1.0);
+        }
 
         let mut progress =
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
@@ -435,8 +443,10 @@ where
     #[inline(always)]
     fn commit(&mut self, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
         let t = S::Real::select(last, end, self.at.t + trial.size);
-        let elapsed = lanes.and(is_zero(t - self.at.t).not());
-        self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
+        if const { !M::SMOOTH } {
+            let elapsed = lanes.and(is_zero(t - self.at.t).not());
+            self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
+        }
         self.from = S::Real::select(lanes, self.at.t, self.from);
         self.size = S::Real::select(lanes, trial.size, self.size);
         self.at.t = S::Real::select(lanes, t, self.at.t);

@@ -149,12 +149,30 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
         let Self { method, at, h, norm } = self;
         // Divisions: beside the series they cost little.
         let weights = norm.weights(&at.x);
-        method.jets.expand_here(method.tape, S::lift(at.t), &at.x, &at.sides);
-        let radius = method.jets.radius(norm, &weights);
-        let short = radius.less(h.abs());
-        let size = S::Real::select(short, radius.zip(h, f64::copysign), h);
-        let known = S::Real::zero().less(radius);
-        let error = S::Real::select(known, S::Real::zero(), S::Real::constant(f64::NAN));
-        Trial { x: method.jets.at_here(size), size, error }
+        let jets = &mut method.jets;
+        jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);
+        // The usual orders known to the compiler.
+        match jets.order() {
+            LOW => followed(jets, LOW, h, norm, &weights),
+            HIGH => followed(jets, HIGH, h, norm, &weights),
+            order => followed(jets, order, h, norm, &weights),
+        }
     }
+}
+
+/// The solution as far as its series up to this order goes, at most to `h`.
+#[inline(always)]
+fn followed<S: Scalar, const D: usize, E: ErrorNorm<S, D>>(
+    jets: &Jets<S, D, COEFFICIENTS>,
+    order: usize,
+    h: S::Real,
+    norm: &E,
+    weights: &E::Weights,
+) -> Trial<S, D> {
+    let radius = jets.radius(order, norm, weights);
+    let short = radius.less(h.abs());
+    let size = S::Real::select(short, radius.zip(h, f64::copysign), h);
+    let known = S::Real::zero().less(radius);
+    let error = S::Real::select(known, S::Real::zero(), S::Real::constant(f64::NAN));
+    Trial { x: jets.at_here(order, size), size, error }
 }

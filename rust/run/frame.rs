@@ -89,11 +89,23 @@ fn log_length<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: u
 pub struct Growth<R, const N: usize> {
     product: [R; N],
     sum: [R; N],
+    /// Steps since the tangents were made orthonormal by turn.
+    steps: R,
 }
+
+/// Several tangents are made orthonormal after so many steps: they lean towards each other by no more than
+/// a few digits meanwhile.
+const TURN: f64 = 4.0;
 
 impl<R: Real, const N: usize> Growth<R, N> {
     pub fn none() -> Self {
-        Self { product: [R::one(); N], sum: [R::zero(); N] }
+        Self { product: [R::one(); N], sum: [R::zero(); N], steps: R::zero() }
+    }
+
+    /// Begins with another orbit in a lane, where its state is `x`.
+    pub fn begin<const D: usize>(&mut self, x: &[Dual<R, N>; D], lane: usize) {
+        self.steps.set_lane(lane, 0.0);
+        self.restart(x, lane);
     }
 
     /// Counts a lane's from now on, where its state is `x`.
@@ -111,25 +123,30 @@ impl<R: Real, const N: usize> Growth<R, N> {
     }
 
     /// Makes the tangents in the lanes that moved orthonormal again, where that has to be, and adds what they
-    /// had grown: several tangents lean towards each other with every step, a single one only must not leave
-    /// the range of numbers.
+    /// had grown: several tangents lean towards each other with every step, and have to be orthonormal where
+    /// asked for in `told`; a single one only must not leave the range of numbers.
     #[inline(always)]
     pub fn keep<M, const D: usize, E, K>(
         &mut self,
         isa: Isa,
         driver: &mut Driver<M, Dual<R, N>, D, E, K>,
-        moved: R::Mask,
+        (moved, told): (R::Mask, R::Mask),
     ) where
         M: System<Dual<R, N>, D>,
         E: ErrorNorm<Dual<R, N>, D> + Copy,
         K: Method<Dual<R, N>, D>,
     {
-        let mut lanes = moved;
+        let lanes;
         if const { N == 1 } {
             let mut square = R::zero();
             unroll!(n in 0..D => { square += driver.x()[n].d[0] * driver.x()[n].d[0]; });
             let near = R::constant(1e-40).less(square).and(square.less(R::constant(1e40)));
             lanes = moved.and(near.not());
+        } else {
+            let steps = R::select(moved, self.steps + R::one(), self.steps);
+            let due = steps.less(R::constant(TURN)).not();
+            self.steps = R::select(due, R::zero(), steps);
+            lanes = moved.and(due.or(told));
         }
         if lanes.any() {
             work::<R, _>(isa, Renewal { growth: self, driver, lanes });

@@ -124,11 +124,13 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             if const { N == D } {
                 moments.add(self.isa, &ship.driver, moved.and(counting));
             }
-            growth.keep(self.isa, &mut ship.driver, moved);
             steps = R::select(moved, steps + R::one(), steps);
             let t = ship.driver.t();
             let full = moved.and(t.less(full_at).or(steps.less(R::constant(LEAST_STEPS))).not());
             let over = ship.arrived().or(progress.walled()).or(progress.failed);
+            // What vanishes where a contact sticks is seen at once or never.
+            let told = full.or(over).or(progress.switched());
+            growth.keep(self.isa, &mut ship.driver, (moved, told));
             if !full.or(over).any() {
                 continue;
             }
@@ -177,7 +179,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                 if let Some(orbit) = queue.take() {
                     ship.load(lane, orbit, start(orbit));
                     blocks[lane].clear(span);
-                    growth.restart(ship.driver.x(), lane);
+                    growth.begin(ship.driver.x(), lane);
                     since.set_lane(lane, 0.0);
                     steps.set_lane(lane, 0.0);
                     full_at.set_lane(lane, if transient > 0.0 { f64::INFINITY } else { span });

@@ -19,6 +19,10 @@ pub use packet::{LaneMask, Packet};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+/// One number with up to four derivatives, each in a lane beside a copy of the number: the operations that the
+/// derivatives have in common are vector instructions, and no bit changes.
+pub type Fan<V> = Dual<Packet<4, V>, 1>;
+
 /// A number that a model can be evaluated over.
 pub trait Scalar:
     Copy
@@ -55,6 +59,19 @@ pub trait Scalar:
     fn fused(self, a: Self, b: Self) -> Self;
     /// The same for a factor without derivatives.
     fn fused_times(self, a: Self, b: Self::Real) -> Self;
+
+    /// Whether this is a number with a few derivatives, faster as a [`Fan`].
+    const FANS: bool = false;
+    /// The number as a fan.
+    #[inline(always)]
+    fn fan<V: Instructions>(self) -> Fan<V> {
+        Dual::fixed(Packet::constant(self.real().lane(0)))
+    }
+    /// The number that a fan stands for.
+    #[inline(always)]
+    fn from_fan<V: Instructions>(fan: Fan<V>) -> Self {
+        Self::constant(fan.re.lane(0))
+    }
 
     #[inline(always)]
     fn zero() -> Self {

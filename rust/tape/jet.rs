@@ -1,11 +1,13 @@
 //! The Taylor coefficients of a solution.
 
-use super::known::{Disk, Dle, Known, Program};
+use std::array::from_fn;
+
+use super::known::{Disk, Dle, FastDisk, KINK, Known, MOST_HELD, Program};
 use super::node::{INVERSE, hold};
 use super::{Step, Tape};
 use crate::model::Sides;
-use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
-use crate::unroll::unroll;
+use crate::scalar::{Fan, Instructions, Isa, Mask, Packet, Real, Scalar, Work};
+use crate::unroll::{unroll, vector};
 
 /// The orders whose programs are unrolled, which takes long to compile.
 pub const LOW: usize = 12;
@@ -64,14 +66,20 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
 
     /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
-    pub fn expand_here(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
+    pub fn expand_here<V: Instructions>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
         let Self { work, held, order, .. } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
         if const { D == 3 } && tape.known == Known::Dle {
+            if const { S::FANS && N == HIGH + 1 && !matches!(V::ISA, Isa::Baseline) } {
+                return fanned::<Dle, V, S, D, N>(work, order, held, t, x, sides);
+            }
             return known::<Dle, S, D, N>(work, order, held, t, x, sides);
         }
         if const { D == 4 } && tape.known == Known::Disk {
+            if const { S::Real::LANES == 1 } && !sides[KINK].lane(0) {
+                return known::<FastDisk, S, D, N>(work, order, held, t, x, sides);
+            }
             return known::<Disk, S, D, N>(work, order, held, t, x, sides);
         }
         interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], order, held, t, x, sides);
@@ -98,7 +106,7 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
 
     #[inline(always)]
     fn run<V: Instructions>(self) {
-        self.jets.expand_here(self.tape, self.t, self.x, self.sides);
+        self.jets.expand_here::<V>(self.tape, self.t, self.x, self.sides);
     }
 }
 
@@ -137,9 +145,30 @@ fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
         return rolled::<P, S, D, N>(work, order, held, t, x, sides);
     }
     match order {
-        LOW => unrolled::<P, S, D, N, LOW>(work, held, t, x, sides),
-        HIGH => unrolled::<P, S, D, N, HIGH>(work, held, t, x, sides),
+        LOW => unrolled::<P, S, D, N, LOW>(held, t, x, sides, |n, k, c| work[n][k] = c),
+        HIGH => unrolled::<P, S, D, N, HIGH>(held, t, x, sides, |n, k, c| work[n][k] = c),
         _ => rolled::<P, S, D, N>(work, order, held, t, x, sides),
+    }
+}
+
+/// The same for a number with a few derivatives, computed with as a [`Fan`] where orders are unrolled.
+#[inline(always)]
+fn fanned<P: Program, V: Instructions, S: Scalar, const D: usize, const N: usize>(
+    work: &mut [[S; N]],
+    order: usize,
+    held: &[S],
+    t: S,
+    x: &[S; D],
+    sides: &Sides<S>,
+) {
+    let fans: [Fan<V>; MOST_HELD] = from_fn(|i| held.get(i).map_or(Fan::zero(), |&value| value.fan()));
+    let (time, from) = (t.fan(), vector!(Fan<V>, D; n => x[n].fan()));
+    let on = sides.map(|side| Packet::mask(side.lane(0)));
+    let keep = |n: usize, k: usize, c: Fan<V>| work[n][k] = S::from_fan(c);
+    match order {
+        LOW => unrolled::<P, Fan<V>, D, N, LOW>(&fans, time, &from, &on, keep),
+        HIGH => unrolled::<P, Fan<V>, D, N, HIGH>(&fans, time, &from, &on, keep),
+        _ => known::<P, S, D, N>(work, order, held, t, x, sides),
     }
 }
 
@@ -196,34 +225,37 @@ fn rolled<P: Program, S: Scalar, const D: usize, const N: usize>(
     }
 }
 
-/// With everything unrolled, up to the order `TO` or all.
+/// With everything unrolled, up to the order `TO` or all; `keep` is given each component's coefficients.
 #[inline(always)]
 fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize, const TO: usize>(
-    series: &mut [[S; N]],
     held: &[S],
     t: S,
     x: &[S; D],
     sides: &Sides<S>,
+    mut keep: impl FnMut(usize, usize, S),
 ) {
-    // Single numbers stay in registers.
+    // Room whose places are all known, for what the compiler may keep in registers or forget.
     let mut room = [[S::zero(); N]; 24];
-    let single = const { size_of::<S>() == size_of::<f64>() };
-    let work = if single { &mut room[..P::SLOTS] } else { &mut *series };
-    unroll!(n in 0..D => { work[n][0] = x[n]; });
+    let work = &mut room[..P::SLOTS];
+    unroll!(n in 0..D => {
+        work[n][0] = x[n];
+        keep(n, 0, x[n]);
+    });
     every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
-    unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
+    unroll!(n in 0..D => {
+        work[n][1] = work[usize::from(P::RATES[n])][0];
+        keep(n, 1, work[n][1]);
+    });
     macro_rules! orders {
         ($($k:literal)+) => {
             $(if const { $k < TO && $k < N - 1 } {
                 every!(P, i => { P::STEPS[i].next(work, held, sides, $k); });
                 unroll!(n in 0..D => {
                     work[n][$k + 1] = work[usize::from(P::RATES[n])][$k].scale(INVERSE[$k + 1]);
+                    keep(n, $k + 1, work[n][$k + 1]);
                 });
             })+
         };
     }
     orders!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
-    if single {
-        unroll!(n in 0..D => { series[n] = room[n]; });
-    }
 }

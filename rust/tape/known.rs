@@ -23,6 +23,9 @@ impl Known {
     }
 }
 
+/// Known tapes hold no more values than this.
+pub(super) const MOST_HELD: usize = 8;
+
 /// A tape as constants; see [`Tape`] for what they mean.
 pub(super) trait Program {
     const STEPS: &'static [Step];
@@ -46,6 +49,9 @@ impl Program for Dle {
 
 /// The disk without effects.
 pub(super) struct Disk;
+
+/// The surface on whose negative side the friction is k0.
+pub(super) const KINK: usize = 1;
 
 impl Program for Disk {
     const STEPS: &'static [Step] = &[
@@ -75,4 +81,28 @@ impl Program for Disk {
     ];
     const RATES: &'static [u16] = &[20, 13, 23, 0];
     const SLOTS: usize = 24;
+}
+
+/// The same beyond the kink, where the friction is k0 and its product with Omega is no product of series.
+pub(super) struct FastDisk;
+
+impl Program for FastDisk {
+    const STEPS: &'static [Step] = &[
+        // g Y - k0 Omega
+        Step { node: Node::Scale(1, 0), to: 4 },
+        Step { node: Node::Scale(0, 3), to: 11 },
+        Step { node: Node::Sub(4, 11), to: 12 },
+        Disk::STEPS[9],
+        Disk::STEPS[10],
+        Disk::STEPS[11],
+        Disk::STEPS[12],
+        Disk::STEPS[13],
+        Disk::STEPS[14],
+        Disk::STEPS[15],
+        Disk::STEPS[16],
+        Disk::STEPS[17],
+        Disk::STEPS[18],
+    ];
+    const RATES: &'static [u16] = Disk::RATES;
+    const SLOTS: usize = Disk::SLOTS;
 }

@@ -2,7 +2,7 @@
 
 use super::Jets;
 use crate::integrate::ErrorNorm;
-use crate::scalar::elementary::{exp2_rough, log2_rough};
+use crate::scalar::elementary::power_rough;
 use crate::scalar::{Instructions, Packet, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
@@ -31,21 +31,22 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         })
     }
 
-    /// As [`at`](Jets::at), with the caller's instructions.
+    /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
     #[inline(always)]
-    pub fn at_here(&self, dt: S::Real) -> [S; D] {
-        vector!(S, D; n => self.value(n, dt, |c| c))
+    pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
+        vector!(S, D; n => self.value(n, order, dt, |c| c))
     }
 
     #[inline(always)]
     fn real_values(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
-        vector!(S::Real, D; n => if of[n] { self.value(n, dt, S::real) } else { S::Real::zero() })
+        let order = self.order();
+        vector!(S::Real, D; n => if of[n] { self.value(n, order, dt, S::real) } else { S::Real::zero() })
     }
 
     /// A component's value at `dt`; `lift` makes coefficients what the value is to be.
     #[inline(always)]
-    fn value<T: Scalar>(&self, n: usize, dt: T::Real, lift: impl Fn(S) -> T) -> T {
-        let order = self.order().min(N - 1);
+    fn value<T: Scalar>(&self, n: usize, order: usize, dt: T::Real, lift: impl Fn(S) -> T) -> T {
+        let order = order.min(N - 1);
         let c = |k: usize| lift(self.coefficients()[n][k]);
         let dt2 = dt * dt;
         let dt4 = dt2 * dt2;
@@ -66,27 +67,27 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         c(0).fused_times(low.fused_times(high, dt2), dt)
     }
 
-    /// How far the solution may be followed: the last two terms are then as small as allowed. Not a number
-    /// where one of these terms is none.
+    /// How far the solution may be followed by the series up to this order: the last two terms are then as small
+    /// as allowed. Not a number where one of these terms is none.
     ///
     /// À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99, section 3.2.
     #[inline(always)]
     #[allow(clippy::eq_op, reason = "infinite or no number minus itself is no number")]
-    pub fn radius<E: ErrorNorm<S, D>>(&self, norm: &E, weights: &E::Weights) -> S::Real {
-        let (series, order) = (self.coefficients(), self.order().clamp(4, N - 1));
+    pub fn radius<E: ErrorNorm<S, D>>(&self, order: usize, norm: &E, weights: &E::Weights) -> S::Real {
+        let (series, order) = (self.coefficients(), order.clamp(4, N - 1));
         let mut sum = S::Real::zero();
         unroll!(n in 0..D => { sum += series[n][order].real() + series[n][order - 1].real(); });
         // Zero, or not a number.
         let reach = self.reach(order, norm, weights).min(self.reach(order - 1, norm, weights));
-        exp2_rough(reach) + (sum - sum)
+        reach + (sum - sum)
     }
 
-    /// Binary logarithm of the distance at which term `k` is as small as allowed.
+    /// The distance at which term `k` is as small as allowed.
     #[inline(always)]
     fn reach<E: ErrorNorm<S, D>>(&self, k: usize, norm: &E, weights: &E::Weights) -> S::Real {
         let series = self.coefficients();
         let term = vector!(S, D; n => series[n][k]);
-        log2_rough(norm.of_term(&term, weights)).scale(-0.5 / k as f64)
+        power_rough(norm.of_term(&term, weights), -0.5 / k as f64)
     }
 }
 
@@ -97,7 +98,7 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> [S; D] {
-        self.0.at_here(self.1)
+        self.0.at_here(self.0.order(), self.1)
     }
 }
 
@@ -133,7 +134,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
                 if of[n] {
-                    let found = jets.value(n, places, |c| Packet::<P, V>::new([c.real().lane(0); P]));
+                    let found = jets.value(n, jets.order(), places, |c| Packet::<P, V>::new([c.real().lane(0); P]));
                     for (i, state) in states.iter_mut().enumerate() {
                         state[n] = S::Real::constant(found.lane(i));
                     }

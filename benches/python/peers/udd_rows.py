@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 
-def trajectory(rtol: float = 1.3e-9) -> tuple[str, Any]:
+def trajectory(rtol: float = 1.9e-9) -> tuple[str, Any]:
     """The setting, and ``final(start, t)``."""
     import udd
 
@@ -20,7 +20,7 @@ def trajectory(rtol: float = 1.3e-9) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", final
 
 
-def starts(rtol: float = 4.5e-6) -> tuple[str, Any]:
+def starts(rtol: float = 3.9e-6) -> tuple[str, Any]:
     """The setting, and ``finals(starts, t)``."""
     import udd
 
@@ -32,7 +32,7 @@ def starts(rtol: float = 4.5e-6) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", finals
 
 
-def spectrum(rtol: float = 4e-8) -> tuple[str, Any]:
+def spectrum(rtol: float = 2.8e-8) -> tuple[str, Any]:
     """The setting, and ``run(start, t)``: the exponents and the state at t."""
     import udd
     from udd import _core
@@ -47,7 +47,7 @@ def spectrum(rtol: float = 4e-8) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", run
 
 
-def sweep(rtol: float = 3.6e-5) -> tuple[str, Any]:
+def sweep(rtol: float = 3.4e-5) -> tuple[str, Any]:
     """The setting, and ``run(w, starts, transient, t)``: the exponents and the states at t."""
     import udd
     from udd import _core
@@ -63,7 +63,7 @@ def sweep(rtol: float = 3.6e-5) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", run
 
 
-def section(rtol: float = 3.3e-9) -> tuple[str, Any]:
+def section(rtol: float = 2.8e-9) -> tuple[str, Any]:
     """The setting, and ``points(start, n)``."""
     import udd
 
@@ -77,7 +77,7 @@ def section(rtol: float = 3.3e-9) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", points
 
 
-def bifurcation(rtol: float = 3.3e-9) -> tuple[str, Any]:
+def bifurcation(rtol: float = 2.8e-9) -> tuple[str, Any]:
     """The setting, and ``run(w, starts, transient, kept)``: points, shape (len(w), kept, 3)."""
     import udd
 
@@ -99,7 +99,7 @@ def bifurcation(rtol: float = 3.3e-9) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", run
 
 
-def disk(rtol: float = 2.6e-9) -> tuple[str, Any]:
+def disk(rtol: float = 2.0e-9) -> tuple[str, Any]:
     """The setting, and ``final(start, t)``."""
     import udd
     from peers import problems

@@ -16,7 +16,7 @@ const LN: [f64; 7] = [
 ];
 
 const ROOT_HALF: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
-const ONE: u64 = 1f64.to_bits();
+pub(super) const ONE: u64 = 1f64.to_bits();
 
 /// A positive normal number as `2^k m`, with `m` from sqrt(1/2) to sqrt(2). Returns `m` and `k` beyond
 /// -1023 as the last bits of `2^52`.

@@ -25,7 +25,7 @@ mod tangent;
 pub use angle::sin_cos;
 pub use exponential::exp;
 pub use logarithm::ln;
-pub use rough::{exp2_rough, log2_rough};
+pub use rough::{exp2_rough, inverse_rough, log2_rough, power_rough};
 pub use tangent::tanh;
 
 use super::Real;

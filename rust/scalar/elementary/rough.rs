@@ -1,7 +1,7 @@
-//! Logarithm and exponential to six digits, for the size of steps: they are on the way from each step
-//! to the next, where nothing else can be done meanwhile.
+//! Powers, logarithm and exponential to a few digits, for the size of steps: they are on the way from each
+//! step to the next, where nothing else can be done meanwhile.
 
-use super::logarithm::{TWO_52, split};
+use super::logarithm::{ONE, TWO_52, split};
 use super::{Real, cubic, linear, round, two_to};
 
 /// `log2(1 + f) / f` on sqrt(1/2) <= 1 + f <= sqrt(2); the logarithm is off by 3e-7.
@@ -48,3 +48,34 @@ pub fn exp2_rough<R: Real>(x: R) -> R {
         cubic(r, r2, [EXP2[0], EXP2[1], EXP2[2], EXP2[3]]) + (r2 * r2) * linear(r, [EXP2[4], EXP2[5]]);
     series * two_to(k)
 }
+
+/// Where a power lies beside the line through the powers of two, halved, in units of the exponent: with it
+/// the error is as large upwards as downwards.
+const CENTRE: f64 = 0.0573;
+
+/// `x` to a power from -1/4 to 0, within 4 %, for an `x` that is not negative; of zero a large number.
+///
+/// Read as a whole number, a float's bits are nearly a straight line over its logarithm (the line that
+/// J. F. Blinn, IEEE Computer Graphics and Applications 17 (1997) 80, draws roots with), so that a power is a
+/// multiplication of the bits.
+#[inline(always)]
+pub fn power_rough<R: Real>(x: R, power: f64) -> R {
+    // All but the last twelve bits, as the last bits of 2^52.
+    let bits = x.each(|x| f64::from_bits((x.to_bits() >> 12) | TWO_52.to_bits()));
+    let start = (1023.0 * (1.0 - power) - CENTRE) * TWO_40 + TWO_52 * (1.0 - power);
+    let root = bits.scale(power) + R::constant(start);
+    root.each(|bits| f64::from_bits(bits.to_bits() << 12))
+}
+
+/// `1/x` within 0.3 %, for an `x` above zero: the line through the powers of two (see [`power_rough`]) and a step
+/// of Newton's, where a division would be waited for.
+#[inline(always)]
+pub fn inverse_rough<R: Real>(x: R) -> R {
+    /// Twice the bits of 1, less what makes the error of the step's result smallest.
+    const TURNED: u64 = 2 * ONE - (0.101 * TWO_52) as u64;
+    let first = x.each(|x| f64::from_bits(TURNED.wrapping_sub(x.to_bits())));
+    first * (R::constant(2.0) - x * first)
+}
+
+/// 2^40.
+const TWO_40: f64 = 1099511627776.0;
