@@ -22,7 +22,7 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-peers bench-discovery bench-tracker bench-page test-browser
+.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-discovery bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -79,6 +79,9 @@ bench-count: .venv/.made ## count their instructions; fails where one takes over
 bench-startup: .venv/.udd ## what importing udd takes in seconds, and a long sweep in memory
 	$(PY) benches/python/startup.py
 	$(PY) benches/python/memory.py
+
+bench-fit: .venv/.udd ## what fits of simulated films take on one core (ARGS="--frames 3000 --turns 9")
+	$(PY) benches/python/fit.py $(ARGS)
 
 bench-discovery: .venv/.udd ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(PY) benches/python/discovery $(ARGS)

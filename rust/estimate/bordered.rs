@@ -1,8 +1,10 @@
 //! Block-tridiagonal normal equations with borders.
 
+use std::array::from_fn;
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::rows::{Rows, add, dot};
+use super::rows::{Rows, Squares, add, combine, dot, padded};
 use super::{Columns, EstimateError, Linear, Record};
 use crate::scalar::{Instructions, Isa, Work};
 
@@ -14,10 +16,10 @@ pub struct Bordered<const D: usize> {
     pub diagonal: Vec<SMatrix<f64, D, D>>,
     /// Couples frame `i + 1` (rows) with frame `i` (columns).
     pub below: Vec<SMatrix<f64, D, D>>,
-    /// `D` rows for each frame: its coupling with the parameters, and its right-hand side.
+    /// `D` rows for each frame: its coupling with the parameters, and its right-hand side. What follows is idle.
     pub border: Rows,
-    /// The parameters' coupling with themselves, their right-hand side, and the sum of squares; from the diagonal
-    /// on to the right.
+    /// The parameters' coupling with themselves, their right-hand side, and the sum of squares: a row for each,
+    /// as wide as the border's, in which the numbers from the diagonal on to the right count.
     pub corner: Rows,
 }
 
@@ -30,12 +32,28 @@ impl<const D: usize> Bordered<D> {
         record: &Record<M>,
         precision: &[SVector<f64, D>],
     ) -> Self {
-        Isa::best().run(Assembly { linear, columns, record, precision })
+        Self::empty().anew(linear, columns, record, precision)
+    }
+
+    fn empty() -> Self {
+        let none = || Rows::zeros(0, 0);
+        Self { diagonal: Vec::new(), below: Vec::new(), border: none(), corner: none() }
+    }
+
+    /// As [`new`](Self::new), in the room of these equations: fresh memory costs as much as what is done in it.
+    pub(super) fn anew<const M: usize>(
+        self,
+        linear: &Linear<D, M>,
+        columns: &Columns,
+        record: &Record<M>,
+        precision: &[SVector<f64, D>],
+    ) -> Self {
+        Isa::best().run(Assembly { linear, columns, record, precision, room: self })
     }
 
     /// The number of parameters.
     pub fn parameters(&self) -> usize {
-        self.corner.width() - 1
+        self.corner.count() - 1
     }
 
     /// Adds a Gaussian prior on parameter `j`, now at `value`.
@@ -44,14 +62,6 @@ impl<const D: usize> Bordered<D> {
         let row = self.corner.row_mut(j);
         row[j] += precision;
         row[p] += precision * (mean - value);
-    }
-
-    /// By how much the linear model says that a step lowers the cost.
-    pub fn promise(&self, states: &[SVector<f64, D>], parameters: &DVector<f64>) -> f64 {
-        let p = self.parameters();
-        let own = |i: usize| (0..D).map(|k| self.border.at(D * i + k, p) * states[i][k]).sum::<f64>();
-        let states: f64 = (0..states.len()).map(own).sum();
-        states + (0..p).map(|j| self.corner.at(j, p) * parameters[j]).sum::<f64>()
     }
 
     /// Eliminates the states.
@@ -65,6 +75,7 @@ struct Assembly<'a, const D: usize, const M: usize> {
     columns: &'a Columns,
     record: &'a Record<M>,
     precision: &'a [SVector<f64, D>],
+    room: Bordered<D>,
 }
 
 impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
@@ -72,65 +83,96 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Bordered<D> {
-        let Self { linear, columns, record, precision } = self;
+        let Self { linear, columns, record, precision, room: mut system } = self;
         let (n, p) = (record.t.len(), columns.seen.width());
-        let mut system = Bordered {
-            diagonal: vec![SMatrix::zeros(); n],
-            below: vec![SMatrix::zeros(); n - 1],
-            border: Rows::zeros(n * D, p + 1),
-            corner: Rows::zeros(p + 1, p + 1),
-        };
+        let width = padded(p + 1);
+        for (matrices, count) in [(&mut system.diagonal, n), (&mut system.below, n - 1)] {
+            matrices.clear();
+            matrices.resize(count, SMatrix::zeros());
+        }
+        system.border.become_zeros(n * D, width);
+        system.corner.become_zeros(p + 1, width);
+        let mut squares = Squares::new(width, 1.0);
         // Misfits in units of their noise, of this frame and of the one before.
-        let (mut now, mut before) = (Whitened::<D, M>::new(p), Whitened::<D, M>::new(p));
-        let mut row = vec![0.0; p + 1];
+        let (mut now, mut before) = (Whitened::<D, M>::new(width), Whitened::<D, M>::new(width));
+        let mut rows = Rows::zeros(M.max(D), width);
         for i in 0..n {
             std::mem::swap(&mut now, &mut before);
             now.fill(linear, columns, record, i);
-            for m in (0..M).filter(|&m| now.there[m]) {
+            // By how much this frame and the one before take part in each row.
+            let (mut h, mut h_back) = ([[0.0; M]; D], [[0.0; M]; D]);
+            let mut remembered = false;
+            for m in 0..M {
+                let row = rows.row_mut(m);
+                row.fill(0.0);
+                if !now.there[m] {
+                    continue;
+                }
                 let memory = record.remembered(i, m, before.there[m]);
                 let scale = (1.0 - memory * memory).sqrt().recip();
-                for (to, &value) in row.iter_mut().zip(now.columns.row(m)) {
-                    *to = scale * value;
-                }
-                let h = now.h[m] * scale;
+                add(row, scale, now.columns.row(m));
+                (0..D).for_each(|k| h[k][m] = now.h[m][k] * scale);
                 if memory != 0.0 {
+                    remembered = true;
                     let back = -memory * scale;
-                    add(&mut row, back, before.columns.row(m));
-                    let h_back = before.h[m] * back;
-                    system.diagonal[i - 1] += h_back * h_back.transpose();
-                    system.below[i - 1] += h * h_back.transpose();
-                    for k in 0..D {
-                        add(system.border.row_mut(D * (i - 1) + k), h_back[k], &row);
-                    }
+                    add(row, back, before.columns.row(m));
+                    (0..D).for_each(|k| h_back[k][m] = before.h[m][k] * back);
                 }
-                system.diagonal[i] += h * h.transpose();
+                squares.push(row, &mut system.corner);
+            }
+            let rows = &rows.numbers()[..M * width];
+            add_products(&mut system.diagonal[i], &h, &h);
+            for k in 0..D {
+                combine(system.border.row_mut(D * i + k), &h[k], rows);
+            }
+            if remembered {
+                add_products(&mut system.diagonal[i - 1], &h_back, &h_back);
+                add_products(&mut system.below[i - 1], &h, &h_back);
                 for k in 0..D {
-                    add(system.border.row_mut(D * i + k), h[k], &row);
+                    combine(system.border.row_mut(D * (i - 1) + k), &h_back[k], rows);
                 }
-                system.corner.add_square(&row, 1.0);
             }
         }
         for i in (0..n - 1).filter(|&i| record.linked[i]) {
             let link = &linear.flow[i];
+            let mut a = [[0.0; D]; D];
             for k in 0..D {
                 // w (x_{i+1} - a x_i - b theta) = -w defect
-                let w = precision[i][k].sqrt();
+                let (w, row) = (precision[i][k].sqrt(), rows.row_mut(k));
                 for (to, &value) in row.iter_mut().zip(columns.state.row(D * i + k)) {
                     *to = -w * value;
                 }
                 row[p] = -w * link.defect[k];
-                let a: SVector<f64, D> = SVector::from_fn(|j, _| -w * link.a[(k, j)]);
-                system.diagonal[i] += a * a.transpose();
+                row[p + 1..].fill(0.0);
                 system.diagonal[i + 1][(k, k)] += w * w;
                 for j in 0..D {
-                    system.below[i][(k, j)] += w * a[j];
-                    add(system.border.row_mut(D * i + j), a[j], &row);
+                    a[j][k] = -w * link.slopes[k][j];
+                    system.below[i][(k, j)] += w * a[j][k];
                 }
-                add(system.border.row_mut(D * (i + 1) + k), w, &row);
-                system.corner.add_square(&row, 1.0);
+                add(system.border.row_mut(D * (i + 1) + k), w, row);
+                squares.push(row, &mut system.corner);
+            }
+            add_products(&mut system.diagonal[i], &a, &a);
+            for j in 0..D {
+                combine(system.border.row_mut(D * i + j), &a[j], &rows.numbers()[..D * width]);
             }
         }
+        squares.flush(&mut system.corner);
         system
+    }
+}
+
+/// Adds the products of all lists `a` with all lists `b` to a matrix.
+#[inline(always)]
+fn add_products<const D: usize, const K: usize>(
+    to: &mut SMatrix<f64, D, D>,
+    a: &[[f64; K]; D],
+    b: &[[f64; K]; D],
+) {
+    for c in 0..D {
+        for r in 0..D {
+            to[(r, c)] += (0..K).map(|k| a[r][k] * b[c][k]).sum::<f64>();
+        }
     }
 }
 
@@ -138,19 +180,19 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
 struct Whitened<const D: usize, const M: usize> {
     there: [bool; M],
     h: [SVector<f64, D>; M],
-    /// By the parameters, and the misfits themselves as the last column.
+    /// By the parameters, and the misfits themselves behind them.
     columns: Rows,
 }
 
 impl<const D: usize, const M: usize> Whitened<D, M> {
-    fn new(parameters: usize) -> Self {
-        Self { there: [false; M], h: [SVector::zeros(); M], columns: Rows::zeros(M, parameters + 1) }
+    fn new(width: usize) -> Self {
+        Self { there: [false; M], h: [SVector::zeros(); M], columns: Rows::zeros(M, width) }
     }
 
     #[inline(always)]
     fn fill(&mut self, linear: &Linear<D, M>, columns: &Columns, record: &Record<M>, i: usize) {
         let root = root(&record.information[i]);
-        let (sight, p) = (&linear.sights[i], self.columns.width() - 1);
+        let (sight, p) = (&linear.sights[i], columns.seen.width());
         for m in 0..M {
             self.there[m] = root[(m, m)] != 0.0;
             let row = self.columns.row_mut(m);
@@ -158,8 +200,11 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
             let mut h = SVector::zeros();
             for c in m..M {
                 let weight = root[(m, c)];
-                h += sight.h.row(c).transpose() * weight;
-                add(row, weight, columns.seen.row(M * i + c));
+                if weight == 0.0 {
+                    continue;
+                }
+                (0..D).for_each(|k| h[k] += sight.h[(c, k)] * weight);
+                add(&mut row[..p], weight, columns.seen.row(M * i + c));
                 row[p] += weight * sight.misfit[c];
             }
             self.h[m] = h;
@@ -197,66 +242,63 @@ impl<const D: usize> Work for Elimination<'_, D> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Self::Output {
-        let Bordered { diagonal, below, border: mut solved, mut corner } = self.system;
-        let (n, p) = (diagonal.len(), corner.width() - 1);
-        let (mut pivots, mut links) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let (mut log_determinant, mut own) = (0.0, vec![0.0; D * (p + 1)]);
-        let width = p + 1;
+        // Frame by frame, what is eliminated takes the place of what it was.
+        let Bordered { diagonal: mut pivots, below: mut links, border: mut solved, mut corner } = self.system;
+        let (n, p, width) = (pivots.len(), corner.count() - 1, solved.width());
+        let (mut log_determinant, all) = (0.0, corner.at(p, p));
+        let mut squares = Squares::new(width, -1.0);
+        let mut rest = vec![0.0; D * width];
         for i in 0..n {
-            let mut pivot = diagonal[i];
+            let mut pivot = pivots[i];
             if i > 0 {
-                let link: &SMatrix<f64, D, D> = &links[i - 1];
-                pivot -= link * link.transpose();
+                let link = &links[i - 1];
+                for (r, c) in (0..D).flat_map(|r| (r..D).map(move |c| (r, c))) {
+                    pivot[(r, c)] -= (0..D).map(|k| link[(r, k)] * link[(c, k)]).sum::<f64>();
+                }
             }
-            let singular = || EstimateError::Singular { t: self.t[i] };
             let pivot = root(&pivot).transpose();
             if (0..D).any(|k| pivot[(k, k)].is_nan() || pivot[(k, k)] <= 0.0) {
-                return Err(singular());
+                return Err(EstimateError::Singular { t: self.t[i] });
             }
-            log_determinant += 2.0 * (0..D).map(|k| pivot[(k, k)].ln()).sum::<f64>();
+            log_determinant += 2.0 * (0..D).map(|k| pivot[(k, k)]).product::<f64>().ln();
+            let inverse = lower_inverse(&pivot);
             // The border less what the frame before says of it, in units of the pivot.
-            for k in 0..D {
-                let (done, rest) = own.split_at_mut(k * width);
-                let row = &mut rest[..width];
-                row.copy_from_slice(solved.row(D * i + k));
-                if i > 0 {
-                    for j in 0..D {
-                        add(row, -links[i - 1][(k, j)], solved.row(D * (i - 1) + j));
-                    }
+            let (before, own) = solved.numbers_mut().split_at_mut(D * i * width);
+            let (before, own) = (&before[before.len().saturating_sub(D * width)..], &mut own[..D * width]);
+            if i > 0 {
+                for (k, row) in own.chunks_exact_mut(width).enumerate() {
+                    let factors: [f64; D] = from_fn(|j| -links[i - 1][(k, j)]);
+                    combine(row, &factors, before);
                 }
-                for j in 0..k {
-                    add(row, -pivot[(k, j)], &done[j * width..(j + 1) * width]);
-                }
-                let inverse = pivot[(k, k)].recip();
-                row.iter_mut().for_each(|value| *value *= inverse);
             }
-            for k in 0..D {
-                let row = &own[k * width..(k + 1) * width];
-                solved.row_mut(D * i + k).copy_from_slice(row);
-                corner.add_square(row, -1.0);
+            rest.copy_from_slice(own);
+            for (k, row) in own.chunks_exact_mut(width).enumerate() {
+                let factors: [f64; D] = from_fn(|j| inverse[(k, j)]);
+                row.fill(0.0);
+                combine(row, &factors[..=k], &rest);
+                squares.push(row, &mut corner);
             }
             if i + 1 < n {
-                links.push(behind(&below[i], &pivot));
+                links[i] = times_transposed(&links[i], &inverse);
             }
-            pivots.push(pivot);
+            pivots[i] = pivot;
         }
+        squares.flush(&mut corner);
+        let explained = all - corner.at(p, p);
         let schur = DMatrix::from_fn(p, p, |i, j| corner.at(i.min(j), i.max(j)));
         let gradient = DVector::from_fn(p, |j, _| corner.at(j, p));
-        Ok(Eliminated { pivots, links, solved, schur, gradient, log_determinant })
+        Ok(Eliminated { pivots, links, solved, corner, schur, gradient, log_determinant, explained })
     }
 }
 
-/// `below lower^-T` for a lower triangular matrix.
+/// `a b^T`
 #[inline(always)]
-fn behind<const D: usize>(below: &SMatrix<f64, D, D>, lower: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let mut link = SMatrix::zeros();
-    for r in 0..D {
-        for c in 0..D {
-            let known: f64 = (0..c).map(|j| link[(r, j)] * lower[(c, j)]).sum();
-            link[(r, c)] = (below[(r, c)] - known) / lower[(c, c)];
-        }
+fn times_transposed<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let mut product = SMatrix::zeros();
+    for (r, c) in (0..D).flat_map(|r| (0..D).map(move |c| (r, c))) {
+        product[(r, c)] = (0..D).map(|k| a[(r, k)] * b[(c, k)]).sum();
     }
-    link
+    product
 }
 
 /// The normal equations after the states were eliminated.
@@ -268,14 +310,27 @@ pub struct Eliminated<const D: usize> {
     links: Vec<SMatrix<f64, D, D>>,
     /// The borders in units of the pivots.
     solved: Rows,
+    corner: Rows,
     /// The parameters' matrix and right-hand side with the states optimal: `schur dtheta = gradient`.
     pub schur: DMatrix<f64>,
     pub gradient: DVector<f64>,
     /// Logarithm of the determinant of the states' part.
     pub log_determinant: f64,
+    /// By how much the states alone can lower the sum of squares.
+    explained: f64,
 }
 
 impl<const D: usize> Eliminated<D> {
+    /// Room for other equations.
+    pub(super) fn into_room(self) -> Bordered<D> {
+        Bordered { diagonal: self.pivots, below: self.links, border: self.solved, corner: self.corner }
+    }
+
+    /// By how much the linear model says that a change of the parameters lowers the cost, the states optimal.
+    pub fn promise(&self, parameters: &DVector<f64>) -> f64 {
+        self.explained + self.gradient.dot(parameters)
+    }
+
     /// The change of the states that goes with a change of the parameters.
     pub fn states(&self, parameters: &DVector<f64>) -> Vec<SVector<f64, D>> {
         let (n, p) = (self.pivots.len(), parameters.len());
@@ -295,15 +350,21 @@ impl<const D: usize> Eliminated<D> {
 
     /// How uncertain the states are, given the parameters' covariance.
     pub fn uncertain(&self, parameters: &DMatrix<f64>) -> Uncertain<D> {
-        Isa::best().run(StateCovariance { of: self, root: lower_root(parameters) })
+        let (n, width) = (parameters.nrows(), padded(parameters.nrows()));
+        let mut root = Rows::zeros(n, width);
+        if let Some(lower) = nalgebra::Cholesky::new(parameters.clone()) {
+            let lower = lower.l();
+            (0..n).for_each(|j| (0..=j).for_each(|c| root.row_mut(j)[c] = lower[(j, c)]));
+        }
+        Isa::best().run(StateCovariance { of: self, root })
     }
 }
 
 /// The states' uncertainty, frame by frame.
 #[derive(Clone, Debug)]
 pub struct Uncertain<const D: usize> {
-    /// A root of the parameters' covariance: its columns are independent changes.
-    pub root: DMatrix<f64>,
+    /// A root of the parameters' covariance: its columns are independent changes. What follows them is zero.
+    pub root: Rows,
     /// Their covariance were the parameters known.
     pub conditional: Vec<SMatrix<f64, D, D>>,
     /// `D` rows for each frame: by how much they move with each of those changes.
@@ -313,20 +374,67 @@ pub struct Uncertain<const D: usize> {
 impl<const D: usize> Uncertain<D> {
     /// The covariance of each frame's state, the parameters' uncertainty included.
     pub fn covariance(&self) -> Vec<SMatrix<f64, D, D>> {
-        let moved =
-            |i: usize| SMatrix::from_fn(|r, c| dot(self.shifts.row(D * i + r), self.shifts.row(D * i + c)));
-        self.conditional.iter().enumerate().map(|(i, own)| own + moved(i)).collect()
+        Isa::best().run(FullCovariance(self))
+    }
+
+    /// The variance of what is seen, given how it changes with each frame's state and with the parameters.
+    pub fn seen<const M: usize>(&self, linear: &Linear<D, M>) -> Vec<SVector<f64, M>> {
+        Isa::best().run(SeenVariance { of: self, linear })
     }
 }
 
-fn lower_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = covariance.nrows();
-    nalgebra::Cholesky::new(covariance.clone()).map_or_else(|| DMatrix::zeros(n, n), |lower| lower.l())
+struct FullCovariance<'a, const D: usize>(&'a Uncertain<D>);
+
+impl<const D: usize> Work for FullCovariance<'_, D> {
+    type Output = Vec<SMatrix<f64, D, D>>;
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> Self::Output {
+        let Uncertain { conditional, shifts, .. } = self.0;
+        let one = |(i, own): (usize, &SMatrix<f64, D, D>)| {
+            let mut all = *own;
+            for (r, c) in (0..D).flat_map(|r| (r..D).map(move |c| (r, c))) {
+                all[(r, c)] += dot(shifts.row(D * i + r), shifts.row(D * i + c));
+                all[(c, r)] = all[(r, c)];
+            }
+            all
+        };
+        conditional.iter().enumerate().map(one).collect()
+    }
+}
+
+struct SeenVariance<'a, const D: usize, const M: usize> {
+    of: &'a Uncertain<D>,
+    linear: &'a Linear<D, M>,
+}
+
+impl<const D: usize, const M: usize> Work for SeenVariance<'_, D, M> {
+    type Output = Vec<SVector<f64, M>>;
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> Self::Output {
+        let Uncertain { root, conditional, shifts } = self.of;
+        let mut moved = vec![0.0; root.width()];
+        let mut variances = vec![SVector::zeros(); conditional.len()];
+        for (i, variance) in variances.iter_mut().enumerate() {
+            let h = &self.linear.sights[i].h;
+            for m in 0..M {
+                moved.fill(0.0);
+                let by_state: [f64; D] = from_fn(|k| h[(m, k)]);
+                combine(&mut moved, &by_state, &shifts.numbers()[D * i * shifts.width()..]);
+                combine(&mut moved, self.linear.columns.seen.row(M * i + m), root.numbers());
+                let known = (0..D)
+                    .map(|k| by_state[k] * (0..D).map(|j| conditional[i][(k, j)] * by_state[j]).sum::<f64>());
+                variance[m] = known.sum::<f64>() + dot(&moved, &moved);
+            }
+        }
+        variances
+    }
 }
 
 struct StateCovariance<'a, const D: usize> {
     of: &'a Eliminated<D>,
-    root: DMatrix<f64>,
+    root: Rows,
 }
 
 impl<const D: usize> Work for StateCovariance<'_, D> {
@@ -335,40 +443,45 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
     #[inline(always)]
     fn run<V: Instructions>(self) -> Self::Output {
         let Eliminated { pivots, links, solved, .. } = self.of;
-        let (n, p) = (pivots.len(), self.root.nrows());
-        let (mut states, mut shifts) = (vec![SMatrix::zeros(); n], Rows::zeros(n * D, p));
+        let (n, width) = (pivots.len(), self.root.width());
+        let (mut states, mut shifts) = (vec![SMatrix::zeros(); n], Rows::zeros(n * D, width));
         let mut conditional: SMatrix<f64, D, D> = SMatrix::zeros();
-        let (mut response, mut own) = (Rows::zeros(D, p), Rows::zeros(D, p));
+        let (mut alone, mut factors) = (Rows::zeros(D, width), vec![0.0; self.root.count()]);
         for i in (0..n).rev() {
-            let back = pivots[i].transpose().try_inverse().unwrap_or_else(SMatrix::zeros);
-            let link = if i + 1 < n { links[i].transpose() } else { SMatrix::zeros() };
-            conditional =
-                back * (SMatrix::identity() + link * conditional * link.transpose()) * back.transpose();
-            for k in 0..D {
-                let row = own.row_mut(k);
-                row.copy_from_slice(&solved.row(D * i + k)[..p]);
-                for j in 0..D {
-                    add(row, -link[(k, j)], response.row(j));
-                }
-            }
-            for k in 0..D {
-                let row = response.row_mut(k);
+            // The inverse of the pivot, and with it what this frame takes from the next.
+            let inverse = lower_inverse(&pivots[i]);
+            let linked = i + 1 < n;
+            let taken = if linked { links[i] * inverse } else { SMatrix::zeros() };
+            conditional = inverse.tr_mul(&inverse) + taken.tr_mul(&(conditional * taken));
+            let (own, next) = shifts.numbers_mut()[D * i * width..].split_at_mut(D * width);
+            for j in 0..D {
+                // More of a parameter takes from the state what it explains.
+                factors.iter_mut().zip(solved.row(D * i + j)).for_each(|(to, value)| *to = -value);
+                let row = alone.row_mut(j);
                 row.fill(0.0);
-                for j in k..D {
-                    add(row, back[(k, j)], own.row(j));
-                }
+                combine(row, &factors, self.root.numbers());
             }
-            for k in 0..D {
-                let shift = shifts.row_mut(D * i + k);
-                for (j, &value) in response.row(k).iter().enumerate() {
-                    for (c, to) in shift.iter_mut().enumerate().take(j + 1) {
-                        // More of a parameter takes from the state what it explains.
-                        *to -= value * self.root[(j, c)];
-                    }
+            for (k, row) in own.chunks_exact_mut(width).enumerate() {
+                combine(row, &from_fn::<_, D, _>(|j| inverse[(j, k)]), alone.numbers());
+                if linked {
+                    combine(row, &from_fn::<_, D, _>(|j| -taken[(j, k)]), next);
                 }
             }
             states[i] = conditional;
         }
         Uncertain { root: self.root, conditional: states, shifts }
     }
+}
+
+/// The inverse of a lower triangular matrix.
+#[inline(always)]
+fn lower_inverse<const D: usize>(lower: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let mut inverse = SMatrix::zeros();
+    for c in 0..D {
+        for r in c..D {
+            let known: f64 = (c..r).map(|k| lower[(r, k)] * inverse[(k, c)]).sum();
+            inverse[(r, c)] = (if r == c { 1.0 } else { 0.0 } - known) / lower[(r, r)];
+        }
+    }
+    inverse
 }

@@ -2,16 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::flow::Link;
+use super::flow::{Link, Places};
+use super::follow::{Law, Way};
 use super::rows::Rows;
-use super::{Estimator, Free, Point, Role, Sensor};
+use super::{EstimateError, Estimator, Free, Point, Role, Sensor};
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 use crate::scalar::{Dual, Scalar};
 
-/// In how many parameters one evaluation differentiates.
-const WIDTH: usize = 8;
-type Wide = Dual<f64, WIDTH>;
+/// In how many directions one evaluation differentiates.
+pub const WIDTH: usize = 8;
+pub(super) type Wide = Dual<f64, WIDTH>;
 
 /// One column per parameter: `M` rows for each frame, of what is seen, and `D` for each link, of the state at
 /// its end.
@@ -37,6 +38,19 @@ pub(super) enum TimeOrigin {
     Frame,
 }
 
+/// Laws that are differentiated by some parameters, and the columns of these, film by film.
+pub(super) struct Beyond<B> {
+    pub columns: Vec<Vec<usize>>,
+    pub laws: Vec<Law<B, Wide>>,
+}
+
+/// Values of which those with these numbers are differentiated by, from direction `first` on.
+pub(super) fn tagged(values: &[f64], numbers: impl Iterator<Item = usize>, first: usize) -> Vec<Wide> {
+    let mut wide: Vec<Wide> = values.iter().map(|&v| Wide::constant(v)).collect();
+    numbers.enumerate().for_each(|(k, number)| wide[number] = Wide::variable(values[number], first + k));
+    wide
+}
+
 /// A system whose numbers know their derivatives by some parameters, and those parameters' columns.
 struct Actor<B> {
     system: B,
@@ -48,12 +62,81 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The columns of parameters at a point. They may belong to another family, to which each film's model
-    /// values are given.
+    /// The rows of the free parameters at the links' ends.
+    pub(super) fn own_state_rows(&self, point: &Point<D>, flow: &[Link<D>]) -> Result<Rows, EstimateError> {
+        let p = self.free.len();
+        let mut rows = Rows::zeros(flow.len() * D, p);
+        if p == 0 {
+            return Ok(rows);
+        }
+        let films = 0..point.sets.len();
+        let models: Vec<_> = films.clone().map(|film| acting(&self.free, film, model)).collect();
+        let clocks: Vec<_> = films.map(|film| acting(&self.free, film, clock)).collect();
+        let blocks: Vec<&mut [f64]> = rows.blocks_mut(D).collect();
+        blocks.into_par_iter().zip(flow).enumerate().filter(|(i, _)| self.record.linked[*i]).for_each(
+            |(i, (rows, link))| {
+                let film = self.record.film[i];
+                let dt = self.record.t[i + 1] - self.record.t[i];
+                for n in 0..D {
+                    let row = &mut rows[n * p..(n + 1) * p];
+                    for (&(column, _), slope) in models[film].iter().zip(&link.slopes[n][D..]) {
+                        row[column] = *slope;
+                    }
+                    // A slower clock lets the flow run on for longer.
+                    clocks[film].iter().for_each(|&(column, _)| row[column] = link.arrival[n] * dt);
+                }
+            },
+        );
+        // Those that found no room beside the state go the way again.
+        for Beyond { columns, laws } in self.beyond(point) {
+            let slopes = self.each_link(
+                point,
+                &laws,
+                |follower, i, (_, start, end)| {
+                    let x = point.states[i].map(Wide::constant);
+                    let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
+                    Ok(last.map(|x| x.d))
+                },
+                || [[0.0; WIDTH]; D],
+            )?;
+            for (i, slopes) in slopes.iter().enumerate() {
+                for (k, &column) in columns[self.record.film[i]].iter().enumerate() {
+                    (0..D).for_each(|n| rows.row_mut(D * i + n)[column] = slopes[n][k]);
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    /// The laws of all films over numbers that are differentiated by the state and, behind it, by the first of
+    /// the film's free parameters.
+    pub(super) fn own_laws(&self, point: &Point<D>) -> Vec<Law<F::Built<Wide>, Wide>> {
+        const { assert!(D < WIDTH) };
+        let first = |film| acting(&self.free, film, model).into_iter().take(WIDTH - D);
+        self.laws(point, |film, values| tagged(values, first(film).map(|(_, number)| number), D))
+    }
+
+    /// The laws over numbers that are differentiated by the free parameters that find no room there.
+    pub(super) fn beyond(&self, point: &Point<D>) -> Vec<Beyond<F::Built<Wide>>> {
+        let films = 0..point.sets.len();
+        let models: Vec<_> = films.map(|film| acting(&self.free, film, model)).collect();
+        let most = models.iter().map(Vec::len).max().unwrap_or(0);
+        let chunk = |first: usize| {
+            let own = |film: usize| models[film].iter().skip(first).take(WIDTH);
+            let columns = (0..models.len()).map(|film| own(film).map(|&(column, _)| column).collect());
+            let numbers = |film| own(film).map(|&(_, number)| number);
+            let laws = self.laws(point, |film, values| tagged(values, numbers(film), 0));
+            Beyond { columns: columns.collect(), laws }
+        };
+        (WIDTH - D..most).step_by(WIDTH).map(chunk).collect()
+    }
+
+    /// The columns of parameters that may belong to another family of models, to which each film's values are
+    /// given.
     pub(super) fn columns(
         &self,
         point: &Point<D>,
-        flow: &[Link<D>],
+        places: &[Places<D>],
         (family, values): (&F, &[Vec<f64>]),
         free: &[Free],
         origin: TimeOrigin,
@@ -66,7 +149,6 @@ where
         let actors: Vec<Vec<Actor<F::Built<Wide>>>> =
             values.iter().enumerate().map(|(film, values)| actors(family, film, values, free)).collect();
         let systems: Vec<F::Built<f64>> = values.iter().map(|values| family.build(values)).collect();
-        let cameras: Vec<_> = (0..values.len()).map(|film| acting(free, film, camera)).collect();
 
         let seen: Vec<&mut [f64]> = columns.seen.blocks_mut(M).collect();
         seen.into_par_iter().enumerate().for_each(|(i, rows)| {
@@ -78,14 +160,13 @@ where
             };
             let x = &point.states[i];
             let rate = systems[film].rates(t, x, &sides_of(&systems[film], t, x));
-            self.camera_columns(set, x, &rate, &cameras[film], rows);
             // The parameters of the model are seen through the rate, by a camera that looks at it.
             let by_rate = self.seen_by_rate(&set.camera, x, &rate);
             if by_rate.iter().flatten().all(|&v| v == 0.0) {
                 return;
             }
             for actor in &actors[film] {
-                let rates = rates(&actor.system, t, x);
+                let rates = rates(&actor.system, Wide::constant(t), &x.map(Wide::constant));
                 for (k, &column) in actor.columns.iter().enumerate() {
                     for m in 0..M {
                         rows[m * p + column] += (0..D).map(|n| by_rate[m][n] * rates[n].d[k]).sum::<f64>();
@@ -94,10 +175,9 @@ where
             }
         });
 
-        let clocks: Vec<usize> = (0..p).filter(|&j| free[j].role == Role::Clock).collect();
         let state: Vec<&mut [f64]> = columns.state.blocks_mut(D).collect();
         state.into_par_iter().enumerate().filter(|(i, _)| self.record.linked[*i]).for_each(|(i, rows)| {
-            let (film, link) = (self.record.film[i], &flow[i]);
+            let (film, link) = (self.record.film[i], &places[i]);
             let exact = link.switched && origin == TimeOrigin::Record;
             if exact {
                 for actor in &actors[film] {
@@ -111,20 +191,13 @@ where
             for place in link.places.iter().filter(|_| !exact) {
                 let t = if origin == TimeOrigin::Record { place.t } else { place.since };
                 for actor in &actors[film] {
-                    let rates = rates(&actor.system, t, &place.state);
+                    let rates = rates(&actor.system, Wide::constant(t), &place.state.map(Wide::constant));
                     for (k, &column) in actor.columns.iter().enumerate() {
                         for n in 0..D {
                             let moved: f64 = (0..D).map(|m| place.response[(n, m)] * rates[m].d[k]).sum();
                             rows[n * p + column] += moved;
                         }
                     }
-                }
-            }
-            let dt = self.record.t[i + 1] - self.record.t[i];
-            for &column in clocks.iter().filter(|&&j| free[j].acts_on(film)) {
-                for n in 0..D {
-                    // A slower clock lets the flow run on for longer.
-                    rows[n * p + column] = link.arrival[n] * dt;
                 }
             }
         });
@@ -147,31 +220,6 @@ where
         }
     }
 
-    /// The columns of the camera's parameters in one frame.
-    fn camera_columns(
-        &self,
-        set: &super::Set,
-        x: &[f64; D],
-        rate: &[f64; D],
-        own: &[(usize, usize)],
-        rows: &mut [f64],
-    ) {
-        let width = rows.len() / M;
-        let (x, rate) = (x.map(Wide::constant), rate.map(Wide::constant));
-        for chunk in own.chunks(WIDTH) {
-            let mut camera: Vec<Wide> = set.camera.iter().map(|&v| Wide::constant(v)).collect();
-            for (k, &(_, number)) in chunk.iter().enumerate() {
-                camera[number] = Wide::variable(set.camera[number], k);
-            }
-            let seen = self.sensor.observe(&camera, &x, &rate);
-            for (k, &(column, _)) in chunk.iter().enumerate() {
-                for m in 0..M {
-                    rows[m * width + column] = seen[m].d[k];
-                }
-            }
-        }
-    }
-
     /// The derivatives of what is seen by the state's rate.
     fn seen_by_rate(&self, camera: &[f64], x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
         let camera: Vec<Dual<f64, D>> = camera.iter().map(|&v| Dual::constant(v)).collect();
@@ -185,16 +233,20 @@ where
     }
 }
 
-fn model(role: Role) -> Option<usize> {
+pub(super) fn model(role: Role) -> Option<usize> {
     if let Role::Model(number) = role { Some(number) } else { None }
 }
 
-fn camera(role: Role) -> Option<usize> {
+pub(super) fn camera(role: Role) -> Option<usize> {
     if let Role::Camera(number) = role { Some(number) } else { None }
 }
 
+fn clock(role: Role) -> Option<usize> {
+    (role == Role::Clock).then_some(0)
+}
+
 /// The columns of those free parameters of one film that play a part, with their numbers in it.
-fn acting(free: &[Free], film: usize, part: fn(Role) -> Option<usize>) -> Vec<(usize, usize)> {
+pub(super) fn acting(free: &[Free], film: usize, part: fn(Role) -> Option<usize>) -> Vec<(usize, usize)> {
     let own = free.iter().enumerate().filter(|(_, free)| free.acts_on(film));
     own.filter_map(|(column, free)| Some((column, part(free.role)?))).collect()
 }
@@ -209,16 +261,13 @@ fn actors<F: Family<D>, const D: usize>(
     acting(free, film, model)
         .chunks(WIDTH)
         .map(|chunk| {
-            let mut wide: Vec<Wide> = values.iter().map(|&v| Wide::constant(v)).collect();
-            for (k, &(_, number)) in chunk.iter().enumerate() {
-                wide[number] = Wide::variable(values[number], k);
-            }
+            let wide = tagged(values, chunk.iter().map(|&(_, number)| number), 0);
             Actor { system: family.build(&wide), columns: chunk.iter().map(|&(column, _)| column).collect() }
         })
         .collect()
 }
 
-fn rates<const D: usize>(system: &impl System<Wide, D>, t: f64, x: &[f64; D]) -> [Wide; D] {
-    let (t, x) = (Wide::constant(t), x.map(Wide::constant));
-    system.rates(t, &x, &sides_of(system, t, &x))
+#[inline(always)]
+pub(super) fn rates<const D: usize>(system: &impl System<Wide, D>, t: Wide, x: &[Wide; D]) -> [Wide; D] {
+    system.rates(t, x, &sides_of(system, t, x))
 }

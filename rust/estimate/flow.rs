@@ -3,21 +3,17 @@
 use std::array::from_fn;
 
 use nalgebra::{SMatrix, SVector};
-use rayon::prelude::*;
 
+use super::columns::{WIDTH, Wide};
+use super::follow::{Follower, Law, Span, Way, variable};
 use super::{EstimateError, Estimator, Point, Sensor};
-use crate::integrate::{Driver, Failure, MOST_STEPS, Tolerance, propagate};
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Dual, Scalar};
 
-/// Places within a link with their weights, as parts of its time (Gauss-Legendre).
-const PLACES: [(f64, f64); PLACES_PER_LINK] =
-    [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+/// Places within a link, as parts of its time, and their weights (Gauss-Legendre).
+const PLACES: [f64; PLACES_PER_LINK] = [0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7];
+const WEIGHTS: [f64; PLACES_PER_LINK] = [5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0];
 /// How many of them there are.
 pub const PLACES_PER_LINK: usize = 3;
-
-/// A state with its derivatives by the state at the frame before.
-type Tangent<const D: usize> = [Dual<f64, D>; D];
 
 /// A place within a link, and what acts there.
 #[derive(Clone, Copy, Debug)]
@@ -32,26 +28,31 @@ pub struct Place<const D: usize> {
     pub response: SMatrix<f64, D, D>,
 }
 
+/// What acts on a link.
+#[derive(Clone, Copy, Debug)]
+pub struct Places<const D: usize> {
+    /// Whether the law switched on the way: derivatives by its parameters then jump between the places.
+    pub switched: bool,
+    pub places: [Place<D>; PLACES_PER_LINK],
+}
+
 /// What becomes of a frame's state until the next frame.
 #[derive(Clone, Debug)]
 pub struct Link<const D: usize> {
     /// The next frame's state less what the model makes of this one.
     pub defect: SVector<f64, D>,
-    /// The derivative of what the model makes by this frame's state.
-    pub a: SMatrix<f64, D, D>,
-    /// Whether the law switched on the way: derivatives by its parameters then jump between the places.
-    pub switched: bool,
+    /// The derivatives of what the model makes: by this frame's state, then by those of the model's free
+    /// parameters that find room.
+    pub slopes: [[f64; WIDTH]; D],
     /// The rate at the end.
     pub arrival: SVector<f64, D>,
-    pub places: [Place<D>; PLACES_PER_LINK],
 }
 
 impl<const D: usize> Link<D> {
-    fn none() -> Self {
-        let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
-        let zero = SVector::zeros();
-        let places = [place; PLACES_PER_LINK];
-        Self { defect: zero, a: SMatrix::zeros(), switched: false, arrival: zero, places }
+    /// The derivative by this frame's state.
+    #[inline(always)]
+    pub fn a(&self) -> SMatrix<f64, D, D> {
+        SMatrix::from_fn(|m, k| self.slopes[m][k])
     }
 }
 
@@ -60,97 +61,66 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The systems of all films over any number.
-    pub(super) fn systems<S: Scalar>(&self, point: &Point<D>) -> Vec<F::Built<S>> {
-        let lifted = |values: &[f64]| values.iter().map(|&v| S::constant(v)).collect::<Vec<_>>();
-        point.sets.iter().map(|set| self.family.build(&lifted(&set.model))).collect()
-    }
-
-    /// The film, start and end of link `i` in the model's time, where its frames are linked.
-    pub(super) fn link(&self, point: &Point<D>, i: usize) -> Option<(usize, f64, f64)> {
-        let film = self.record.film[i];
-        let pace = point.sets[film].pace();
-        self.record.linked[i].then(|| (film, self.record.t[i] * pace, self.record.t[i + 1] * pace))
-    }
-
-    fn lost(&self, i: usize) -> impl Fn(Failure) -> EstimateError {
-        let t = self.record.t[i];
-        move |source| EstimateError::Integration { t, source }
-    }
-
     /// Every link; those of frames that are not linked are all zero.
-    pub fn flow(&self, point: &Point<D>) -> Result<Vec<Link<D>>, EstimateError> {
-        let systems: Vec<F::Built<Dual<f64, D>>> = self.systems(point);
-        let one = |i: usize| {
-            let Some((film, start, end)) = self.link(point, i) else { return Ok(Link::none()) };
-            let x: Tangent<D> = from_fn(|k| Dual::variable(point.states[i][k], k));
-            follow(&systems[film], (start, end), x, &point.states[i + 1], &self.tolerance)
-                .map_err(self.lost(i))
+    pub(super) fn flow(
+        &self,
+        point: &Point<D>,
+        laws: &[Law<F::Built<Wide>, Wide>],
+    ) -> Result<Vec<Link<D>>, EstimateError> {
+        let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
+        let zero = SVector::zeros();
+        let none = || Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
+        let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (film, start, end): Span| {
+            let x = variable(&point.states[i]);
+            let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
+            let (system, there) = (&plain[film].system, last.map(|x| x.re));
+            let arrival = system.rates(end, &there, &sides_of(system, end, &there));
+            Ok(Link {
+                defect: SVector::from_fn(|k, _| point.states[i + 1][k] - there[k]),
+                slopes: last.map(|x| x.d),
+                arrival: SVector::from(arrival),
+            })
         };
-        (0..self.record.linked.len()).into_par_iter().map(one).collect()
+        self.each_link(point, laws, one, none)
+    }
+
+    /// What acts on every link; all zero where frames are not linked.
+    pub fn places(&self, point: &Point<D>) -> Result<Vec<Places<D>>, EstimateError> {
+        let laws = self.own_laws(point);
+        let none = || {
+            let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
+            Places { switched: false, places: [place; PLACES_PER_LINK] }
+        };
+        let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (_, start, end): Span| {
+            let x: [Wide; D] = variable(&point.states[i]);
+            let mut met = [x; PLACES_PER_LINK];
+            let (last, switched) = follower.follow(Way { start, end, x, places: &PLACES, met: &mut met })?;
+            let a = by_state(&last);
+            let places = from_fn(|q| {
+                let since = PLACES[q] * (end - start);
+                // From here to the end: all the way, less the way up to here.
+                let here = by_state(&met[q]).try_inverse().unwrap_or_else(SMatrix::zeros);
+                let response = a * here * (WEIGHTS[q] * (end - start));
+                Place { since, t: start + since, state: met[q].map(|x| x.re), response }
+            });
+            Ok(Places { switched, places })
+        };
+        self.each_link(point, &laws, one, none)
     }
 
     /// The links' defects alone.
     pub(super) fn defects(&self, point: &Point<D>) -> Result<Vec<SVector<f64, D>>, EstimateError> {
-        let systems: Vec<F::Built<f64>> = self.systems(point);
-        let one = |i: usize| {
-            let Some((film, start, end)) = self.link(point, i) else { return Ok(SVector::zeros()) };
-            let there = propagate(&systems[film], start, end, point.states[i], &self.tolerance)
-                .map_err(self.lost(i))?;
+        let laws: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
+        let one = |follower: &mut Follower<'_, _, f64, D>, i: usize, (_, start, end): Span| {
+            let x = point.states[i];
+            let (there, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
             Ok(SVector::from_fn(|k, _| point.states[i + 1][k] - there[k]))
         };
-        (0..self.record.linked.len()).into_par_iter().map(one).collect()
+        self.each_link(point, &laws, one, SVector::zeros)
     }
 }
 
-fn follow<const D: usize>(
-    system: &impl System<Dual<f64, D>, D>,
-    (start, end): (f64, f64),
-    x: Tangent<D>,
-    next: &[f64; D],
-    tolerance: &Tolerance,
-) -> Result<Link<D>, Failure> {
-    let mut driver: Driver<_, Dual<f64, D>, D> = Driver::new(system, start, x, Some(end - start), tolerance);
-    let mut met = [x; PLACES_PER_LINK];
-    let mut ahead = 0;
-    let (sides, mut switched) = (*driver.sides(), false);
-    while driver.t() != end {
-        driver.advance(end)?;
-        switched |= *driver.sides() != sides;
-        if driver.counts().accepted > MOST_STEPS {
-            return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
-        }
-        while ahead < PLACES_PER_LINK {
-            let since = start + PLACES[ahead].0 * (end - start) - driver.from();
-            if since > driver.size() {
-                break;
-            }
-            met[ahead] = if since < driver.size() { driver.dense(since) } else { *driver.x() };
-            ahead += 1;
-        }
-    }
-    let last = *driver.x();
-    let a = tangent(&last);
-    let time = Dual::constant(end);
-    let arrival = system.rates(time, &last, &sides_of(system, time, &last));
-    let places = from_fn(|q| {
-        let (place, weight) = PLACES[q];
-        let since = place * (end - start);
-        // From here to the end: all the way, less the way up to here.
-        let here = tangent(&met[q]).try_inverse().unwrap_or_else(SMatrix::zeros);
-        let response = a * here * (weight * (end - start));
-        Place { since, t: start + since, state: met[q].map(|x| x.re), response }
-    });
-    Ok(Link {
-        defect: SVector::from_fn(|k, _| next[k] - last[k].re),
-        a,
-        switched,
-        arrival: SVector::from_fn(|k, _| arrival[k].re),
-        places,
-    })
-}
-
-/// The derivatives of a state as a matrix.
-fn tangent<const D: usize>(x: &Tangent<D>) -> SMatrix<f64, D, D> {
+/// The derivatives of a state by the one it started from, as a matrix.
+fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
     SMatrix::from_fn(|m, k| x[m].d[k])
 }

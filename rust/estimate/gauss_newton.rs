@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::bordered::Uncertain;
 use super::linearise::invert;
 use super::{Bordered, Eliminated, EstimateError, Estimator, Free, Linear, Point, Sensor};
 use crate::model::Family;
@@ -105,8 +104,17 @@ where
 
     fn look(&self, point: Point<D>) -> Result<Look<D, M>, EstimateError> {
         let (misfit, defect) = self.residuals(&point)?;
+        Ok(self.looked(point, misfit, defect))
+    }
+
+    fn looked(
+        &self,
+        point: Point<D>,
+        misfit: Vec<SVector<f64, M>>,
+        defect: Vec<SVector<f64, D>>,
+    ) -> Look<D, M> {
         let cost = self.cost(&point, &misfit, &defect);
-        Ok(Look { point, misfit, defect, cost })
+        Look { point, misfit, defect, cost }
     }
 
     /// Adds the free parameters' priors to normal equations at a point.
@@ -116,12 +124,6 @@ where
         }
     }
 
-    fn equations(&self, point: &Point<D>, linear: &Linear<D, M>) -> Bordered<D> {
-        let mut system = Bordered::new(linear, &linear.columns, &self.record, &self.precision());
-        self.add_priors(point, &mut system);
-        system
-    }
-
     /// Minimises the cost from a start.
     pub fn solve(
         &self,
@@ -129,23 +131,27 @@ where
         options: &Options,
         stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
-        let mut here = self.look(start)?;
+        let mut linear = self.linearise(&start)?;
+        let mut here = self.looked(start, linear.misfits(), linear.defects());
+        let (precision, mut room) = (self.precision(), None);
         let mut damping = 0.0;
         let mut still = 0;
         let mut iteration = 0;
         loop {
             iteration += 1;
             stop.check().map_err(|_| EstimateError::Cancelled)?;
-            let linear = self.linearise(&here.point)?;
-            let system = self.equations(&here.point, &linear);
-            let reduced = system.clone().eliminate(&self.record.t)?;
+            let mut system = match room.take() {
+                Some(room) => Bordered::anew(room, &linear, &linear.columns, &self.record, &precision),
+                None => Bordered::new(&linear, &linear.columns, &self.record, &precision),
+            };
+            self.add_priors(&here.point, &mut system);
+            let reduced = system.eliminate(&self.record.t)?;
             let mut gained = 0.0;
             let mut easy = false;
             // A step that does not lower the cost is damped more strongly and tried again.
             for shorter in 0..MOST_TRIALS {
                 let (states, parameters) = self.step(&reduced, damping)?;
-                let promised = system.promise(&states, &parameters);
-                if promised < options.decrease {
+                if reduced.promise(&parameters) < options.decrease {
                     easy = true;
                 }
                 // Where damped parameters do not help it is the states that go too far.
@@ -170,6 +176,8 @@ where
             if converged || iteration >= options.iterations {
                 return self.finish(here, &linear, &reduced, (iteration, converged));
             }
+            room = Some(reduced.into_room());
+            linear = self.linearise(&here.point)?;
         }
     }
 
@@ -227,29 +235,11 @@ where
             evidence: self.evidence(&cost, reduced.log_determinant, &reduced.schur),
             covariance,
             state_covariance: uncertain.covariance(),
-            seen_variance: (0..misfit.len()).map(|i| seen_variance(i, linear, &uncertain)).collect(),
+            seen_variance: uncertain.seen(linear),
             misfit,
             defect,
         })
     }
-}
-
-/// The variance of what is fitted to frame `i`: of its state, and of the camera that sees it.
-fn seen_variance<const D: usize, const M: usize>(
-    i: usize,
-    linear: &Linear<D, M>,
-    uncertain: &Uncertain<D>,
-) -> SVector<f64, M> {
-    let (h, root) = (&linear.sights[i].h, &uncertain.root);
-    SVector::from_fn(|m, _| {
-        let camera = linear.columns.seen.row(M * i + m);
-        let moved = (0..root.ncols()).map(|c| {
-            let by_state: f64 = (0..D).map(|k| h[(m, k)] * uncertain.shifts.at(D * i + k, c)).sum();
-            by_state + camera.iter().enumerate().map(|(j, g)| g * root[(j, c)]).sum::<f64>()
-        });
-        let known = (h.row(m) * uncertain.conditional[i] * h.row(m).transpose())[(0, 0)];
-        known + moved.map(|v| v * v).sum::<f64>()
-    })
 }
 
 /// Where a matrix of information has no inverse: the parameters that can change together.

@@ -38,7 +38,7 @@ where
             }
             if i > 0 && record.linked[i - 1] {
                 let link = &linear.flow[i - 1];
-                ahead.view_mut((0, 0), (D, D)).copy_from(&link.a);
+                ahead.view_mut((0, 0), (D, D)).copy_from(&link.a());
                 at = &ahead * at;
                 spread = &ahead * spread * ahead.transpose();
                 for k in 0..D {

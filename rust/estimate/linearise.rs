@@ -1,15 +1,15 @@
 //! The record linearised around a point: residuals and their derivatives, from duals.
 
-use std::array::from_fn;
-
 use nalgebra::{DMatrix, SMatrix, SVector};
 use rayon::prelude::*;
 
-use super::columns::{Columns, TimeOrigin};
+use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, model, rates, tagged};
 use super::flow::Link;
+use super::follow::{Law, variable};
+use super::rows::Rows;
 use super::{EstimateError, Estimator, Point, Sensor};
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::{Instructions, Isa, Scalar, Work};
 
 /// A frame's residual `misfit = seen - h`, and `dh/dx`.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +26,18 @@ pub struct Linear<const D: usize, const M: usize> {
     pub columns: Columns,
 }
 
+impl<const D: usize, const M: usize> Linear<D, M> {
+    /// The residuals of what was seen.
+    pub(super) fn misfits(&self) -> Vec<SVector<f64, M>> {
+        self.sights.iter().map(|sight| sight.misfit).collect()
+    }
+
+    /// The residuals of the links.
+    pub(super) fn defects(&self) -> Vec<SVector<f64, D>> {
+        self.flow.iter().map(|link| link.defect).collect()
+    }
+}
+
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
 where
     F: Family<D>,
@@ -33,28 +45,47 @@ where
 {
     /// Linearises the record around a point with respect to the states and to the free parameters.
     pub fn linearise(&self, point: &Point<D>) -> Result<Linear<D, M>, EstimateError> {
-        let flow = self.flow(point)?;
-        let values: Vec<Vec<f64>> = point.sets.iter().map(|set| set.model.clone()).collect();
-        let columns = self.columns(point, &flow, (&self.family, &values), &self.free, TimeOrigin::Record);
-        Ok(Linear { sights: self.sights(point), flow, columns })
+        let laws = self.own_laws(point);
+        let flow = self.flow(point, &laws)?;
+        let state = self.own_state_rows(point, &flow)?;
+        let (sights, seen) = self.sights(point, &laws);
+        Ok(Linear { sights, flow, columns: Columns { seen, state } })
     }
 
-    fn sights(&self, point: &Point<D>) -> Vec<Sight<D, M>> {
-        let systems: Vec<F::Built<Dual<f64, D>>> = self.systems(point);
-        let one = |i: usize| {
-            let film = self.record.film[i];
-            let set = &point.sets[film];
-            let camera: Vec<Dual<f64, D>> = set.camera.iter().map(|&v| Dual::constant(v)).collect();
-            let t = Dual::constant(self.record.t[i] * set.pace());
-            let x: [Dual<f64, D>; D] = from_fn(|k| Dual::variable(point.states[i][k], k));
-            let rate = systems[film].rates(t, &x, &sides_of(&systems[film], t, &x));
-            let seen = self.sensor.observe(&camera, &x, &rate);
-            Sight { misfit: self.misfit(i, &seen.map(|s| s.re)), h: SMatrix::from_fn(|m, k| seen[m].d[k]) }
+    /// What is seen of every frame, and its rows of the free parameters.
+    fn sights(&self, point: &Point<D>, laws: &[Law<F::Built<Wide>, Wide>]) -> (Vec<Sight<D, M>>, Rows) {
+        let (n, p) = (self.record.t.len(), self.free.len());
+        let mut seen = Rows::zeros(n * M, p);
+        let mut sights = vec![Sight { misfit: SVector::zeros(), h: SMatrix::zeros() }; n];
+        let beyond = self.beyond(point);
+        let views: Vec<View> = (0..laws.len())
+            .map(|film| {
+                let values = &point.sets[film].camera;
+                let chunk = |own: &[(usize, usize)]| {
+                    let camera = tagged(values, own.iter().map(|&(_, number)| number), 0);
+                    (camera, own.iter().map(|&(column, _)| column).collect())
+                };
+                View {
+                    plain: tagged(values, [].into_iter(), 0),
+                    model: acting(&self.free, film, model).into_iter().map(|(column, _)| column).collect(),
+                    tagged: acting(&self.free, film, camera).chunks(WIDTH).map(chunk).collect(),
+                }
+            })
+            .collect();
+        let blocks: Vec<&mut [f64]> = match p {
+            0 => (0..n).map(|_| Default::default()).collect(),
+            _ => seen.blocks_mut(M).collect(),
         };
-        (0..self.record.t.len()).into_par_iter().map(one).collect()
+        sights.par_iter_mut().zip(blocks).enumerate().for_each(|(i, (sight, rows))| {
+            let film = self.record.film[i];
+            let (of, law, view) = (self, &laws[film], &views[film]);
+            Isa::best().run(Look { of, point, law, view, beyond: &beyond, i, sight, rows });
+        });
+        (sights, seen)
     }
 
     /// What was seen in frame `i` less what should have been.
+    #[inline(always)]
     fn misfit(&self, i: usize, expected: &[f64; M]) -> SVector<f64, M> {
         SVector::from_fn(|m, _| {
             let difference = self.record.seen[i][m] - expected[m];
@@ -68,7 +99,8 @@ where
         &self,
         point: &Point<D>,
     ) -> Result<(Vec<SVector<f64, M>>, Vec<SVector<f64, D>>), EstimateError> {
-        let systems: Vec<F::Built<f64>> = self.systems(point);
+        let systems: Vec<F::Built<f64>> =
+            point.sets.iter().map(|set| self.family.build(&set.model)).collect();
         let one = |i: usize| {
             let film = self.record.film[i];
             let set = &point.sets[film];
@@ -81,7 +113,65 @@ where
     }
 }
 
+/// A film's camera.
+struct View {
+    plain: Vec<Wide>,
+    /// The columns of the model's free parameters.
+    model: Vec<usize>,
+    /// The camera differentiated by its free parameters, some at a time, with their columns.
+    tagged: Vec<(Vec<Wide>, Vec<usize>)>,
+}
+
+/// One frame's share of a linearisation.
+struct Look<'a, F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
+    of: &'a Estimator<F, C, D, M>,
+    point: &'a Point<D>,
+    law: &'a Law<F::Built<Wide>, Wide>,
+    view: &'a View,
+    beyond: &'a [Beyond<F::Built<Wide>>],
+    i: usize,
+    sight: &'a mut Sight<D, M>,
+    rows: &'a mut [f64],
+}
+
+impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Look<'_, F, C, D, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        let Self { of: Estimator { sensor, record, .. }, point, law, view, i, sight, rows, .. } = self;
+        let (film, p) = (record.film[i], rows.len() / M);
+        let (state, t) = (&point.states[i], record.t[i] * point.sets[film].pace());
+        let (x, t): ([Wide; D], Wide) = (variable(state), Wide::constant(t));
+        let rate = rates(&law.system, t, &x);
+        // The parameters of the model are seen through the rate, by a camera that looks at it.
+        let seen = sensor.observe(&view.plain, &x, &rate);
+        fill(rows, p, &seen, D, &view.model);
+        sight.misfit = self.of.misfit(i, &seen.map(|s| s.re));
+        sight.h = SMatrix::from_fn(|m, k| seen[m].d[k]);
+        let (x, rate) = (state.map(Wide::constant), rate.map(|rate| Wide::constant(rate.re)));
+        for (camera, columns) in &view.tagged {
+            fill(rows, p, &sensor.observe(camera, &x, &rate), 0, columns);
+        }
+        for Beyond { columns, laws } in self.beyond {
+            let rate = rates(&laws[film].system, t, &x);
+            fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &columns[film]);
+        }
+    }
+}
+
+/// Takes the derivatives from direction `first` on over to the columns of `p`.
+#[inline(always)]
+fn fill<const M: usize>(rows: &mut [f64], p: usize, seen: &[Wide; M], first: usize, columns: &[usize]) {
+    for (m, seen) in seen.iter().enumerate() {
+        for (&column, slope) in columns.iter().zip(&seen.d[first..]) {
+            rows[m * p + column] = *slope;
+        }
+    }
+}
+
 /// The angle modulo a turn, nearest to zero.
+#[inline(always)]
 fn wrap(angle: f64) -> f64 {
     angle - (angle / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }

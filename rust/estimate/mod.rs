@@ -15,6 +15,7 @@ mod bordered;
 mod columns;
 mod evidence;
 mod flow;
+mod follow;
 mod forecast;
 mod gauss_newton;
 mod innovations;
@@ -27,7 +28,7 @@ mod waves;
 
 pub use bordered::{Bordered, Eliminated, Uncertain};
 pub use columns::Columns;
-pub use flow::{Link, PLACES_PER_LINK, Place};
+pub use flow::{Link, PLACES_PER_LINK, Place, Places};
 pub use forecast::Filtered;
 pub use gauss_newton::{Cost, Options, Solution};
 pub use linearise::{Linear, Sight};

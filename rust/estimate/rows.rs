@@ -16,13 +16,20 @@ impl Rows {
         Self { width, numbers: vec![0.0; rows * width] }
     }
 
+    /// Makes them so many rows of `width` zeros.
+    pub(super) fn become_zeros(&mut self, rows: usize, width: usize) {
+        self.width = width;
+        self.numbers.clear();
+        self.numbers.resize(rows * width, 0.0);
+    }
+
     /// The length of a row.
     pub fn width(&self) -> usize {
         self.width
     }
 
     /// How many rows there are; none can be counted where they have no length.
-    fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.numbers.len().checked_div(self.width).unwrap_or(0)
     }
 
@@ -32,9 +39,20 @@ impl Rows {
         &self.numbers[i * self.width..(i + 1) * self.width]
     }
 
+    /// All rows, one after the other.
+    #[inline(always)]
+    pub(super) fn numbers(&self) -> &[f64] {
+        &self.numbers
+    }
+
     #[inline(always)]
     pub fn row_mut(&mut self, i: usize) -> &mut [f64] {
         &mut self.numbers[i * self.width..(i + 1) * self.width]
+    }
+
+    #[inline(always)]
+    pub(super) fn numbers_mut(&mut self) -> &mut [f64] {
+        &mut self.numbers
     }
 
     /// Number `j` of row `i`.
@@ -68,27 +86,126 @@ impl Rows {
         }
         all
     }
+}
 
-    /// Adds the product of a row with itself, from the diagonal on to the right, to these rows.
+/// Numbers that are taken together: what one instruction does at its best.
+const CHUNK: usize = 8;
+
+/// The least width that holds so many numbers and leaves no rest of a chunk.
+pub(super) fn padded(width: usize) -> usize {
+    width.max(1).next_multiple_of(CHUNK)
+}
+
+/// Rows that are collected before their squares are summed, and rows of the sum that are made together.
+const COLLECTED: usize = 28;
+const TOGETHER: usize = 4;
+
+/// A sum of products of rows with themselves, from the diagonal on to the right.
+pub(super) struct Squares {
+    rows: Rows,
+    collected: usize,
+    sign: f64,
+}
+
+impl Squares {
+    /// Of rows of this width; the sign says whether they are added or taken away.
+    pub fn new(width: usize, sign: f64) -> Self {
+        Self { rows: Rows::zeros(COLLECTED, width), collected: 0, sign }
+    }
+
+    /// Room for a row, whose square belongs to `sum`.
     #[inline(always)]
-    pub(super) fn add_square(&mut self, row: &[f64], sign: f64) {
-        for (j, &factor) in row.iter().enumerate() {
-            if factor != 0.0 {
-                add(&mut self.row_mut(j)[j..], sign * factor, &row[j..]);
+    pub fn push(&mut self, row: &[f64], sum: &mut Rows) {
+        self.rows.row_mut(self.collected).copy_from_slice(row);
+        self.collected += 1;
+        if self.collected == COLLECTED {
+            self.flush(sum);
+        }
+    }
+
+    /// Adds what was collected. What lies left of the diagonal is only partly filled.
+    #[inline(always)]
+    pub fn flush(&mut self, sum: &mut Rows) {
+        let (width, count) = (sum.width(), sum.count());
+        let rows = &self.rows.numbers[..self.collected * width];
+        for first in (0..count).step_by(TOGETHER) {
+            let many = TOGETHER.min(count - first);
+            for start in (first / CHUNK * CHUNK..width).step_by(CHUNK) {
+                if many == TOGETHER && start + CHUNK <= width {
+                    let mut sums = [[0.0; CHUNK]; TOGETHER];
+                    for row in rows.chunks_exact(width) {
+                        let factors: &[f64; TOGETHER] = row[first..].first_chunk().expect("rows of the sum");
+                        let chunk: &[f64; CHUNK] = row[start..].first_chunk().expect("a whole chunk");
+                        for (sum, factor) in sums.iter_mut().zip(factors) {
+                            for (to, value) in sum.iter_mut().zip(chunk) {
+                                *to += factor * value;
+                            }
+                        }
+                    }
+                    for (j, own) in sums.iter().enumerate() {
+                        add(&mut sum.row_mut(first + j)[start..start + CHUNK], self.sign, own);
+                    }
+                    continue;
+                }
+                for j in first..first + many {
+                    let end = width.min(start + CHUNK);
+                    let to = &mut sum.numbers[j * width..][start..end];
+                    for row in rows.chunks_exact(width) {
+                        add(to, self.sign * row[j], &row[start..end]);
+                    }
+                }
             }
         }
+        self.collected = 0;
     }
 }
 
 /// The product of two rows.
+#[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<CHUNK>(), b.as_chunks::<CHUNK>());
+    let mut sums = [0.0; CHUNK];
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// Adds multiples of rows that lie one after the other, each as wide as `to`.
+#[inline(always)]
+pub(super) fn combine(to: &mut [f64], factors: &[f64], rows: &[f64]) {
+    let width = to.len();
+    let (chunks, rest) = to.as_chunks_mut::<CHUNK>();
+    for (c, to) in chunks.iter_mut().enumerate() {
+        let mut sum = *to;
+        for (factor, row) in factors.iter().zip(rows.chunks_exact(width)) {
+            let row: &[f64; CHUNK] = row[c * CHUNK..].first_chunk().expect("as wide");
+            for (sum, value) in sum.iter_mut().zip(row) {
+                *sum += factor * value;
+            }
+        }
+        *to = sum;
+    }
+    let done = width - rest.len();
+    for (factor, row) in factors.iter().zip(rows.chunks_exact(width)) {
+        for (to, value) in rest.iter_mut().zip(&row[done..]) {
+            *to += factor * value;
+        }
+    }
 }
 
 /// Adds a multiple of a row to another.
 #[inline(always)]
 pub(super) fn add(to: &mut [f64], factor: f64, row: &[f64]) {
-    for (to, &value) in to.iter_mut().zip(row) {
+    let ((to, to_rest), (row, row_rest)) = (to.as_chunks_mut::<CHUNK>(), row.as_chunks::<CHUNK>());
+    for (to, row) in to.iter_mut().zip(row) {
+        for (to, value) in to.iter_mut().zip(row) {
+            *to += factor * value;
+        }
+    }
+    for (to, value) in to_rest.iter_mut().zip(row_rest) {
         *to += factor * value;
     }
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::bordered::Bordered;
 use super::columns::{Columns, TimeOrigin};
+use super::flow::Places;
 use super::gauss_newton::undetermined;
 use super::linearise::invert;
 use super::rows::Rows;
@@ -42,9 +43,10 @@ where
     /// Scores candidates around a minimum, all together. The states and all free parameters are eliminated.
     pub fn score(&self, point: &Point<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
         let linear = self.linearise(point)?;
+        let places = self.places(point)?;
         let more: Vec<Columns> = candidates
             .iter()
-            .map(|candidate| self.candidate_columns(point, &linear, candidate, TimeOrigin::Record))
+            .map(|candidate| self.candidate_columns(point, &places, candidate, TimeOrigin::Record))
             .collect();
         let size = more.iter().map(|columns| columns.seen.width()).sum();
         let columns = more.iter().fold(linear.columns.clone(), |all, more| all.beside(more));
@@ -56,7 +58,7 @@ where
     pub(super) fn candidate_columns(
         &self,
         point: &Point<D>,
-        linear: &Linear<D, M>,
+        places: &[Places<D>],
         candidate: &Candidate<F>,
         origin: TimeOrigin,
     ) -> Columns {
@@ -64,7 +66,7 @@ where
         let values: Vec<Vec<f64>> = point.sets.iter().map(|set| wider(&set.model)).collect();
         let one = |&role: &Role| Free { role, film: None, mean: 0.0, sd: f64::INFINITY };
         let free: Vec<Free> = candidate.amplitudes.iter().map(one).collect();
-        self.columns(point, &linear.flow, (&candidate.family, &values), &free, origin)
+        self.columns(point, places, (&candidate.family, &values), &free, origin)
     }
 
     /// Scores columns in groups of these sizes, each group as if it were alone.

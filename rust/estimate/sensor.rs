@@ -49,7 +49,7 @@ impl Sensor<4, 3> for DiskCamera {
         channel == 2
     }
 
-    #[inline]
+    #[inline(always)]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
         let &[y0, z0, tilt, scale, right, up, lag, row, lens] =
             camera.first_chunk().expect("nine camera parameters");
@@ -84,7 +84,7 @@ impl Sensor<2, 1> for AngleSensor {
         true
     }
 
-    #[inline]
+    #[inline(always)]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 2], _rate: &[S; 2]) -> [S; 1] {
         let &[theta0, aside, above] = camera.first_chunk().expect("three camera parameters");
         let (sin, cos) = x[1].sin_cos();
@@ -107,7 +107,7 @@ impl<const D: usize> Sensor<D, D> for Direct<D> {
         self.angles[channel]
     }
 
-    #[inline]
+    #[inline(always)]
     fn observe<S: Scalar>(&self, _camera: &[S], x: &[S; D], _rate: &[S; D]) -> [S; D] {
         *x
     }

@@ -48,7 +48,8 @@ where
         frequencies: &[f64],
     ) -> Result<Vec<Score>, EstimateError> {
         let linear = self.linearise(point)?;
-        let responses = self.candidate_columns(point, &linear, &probe.candidate, TimeOrigin::Frame);
+        let places = self.places(point)?;
+        let responses = self.candidate_columns(point, &places, &probe.candidate, TimeOrigin::Frame);
         let steps = self.record.t.windows(2).zip(&self.record.linked).filter(|(_, linked)| **linked);
         let longest = steps.map(|(pair, _)| pair[1] - pair[0]).fold(0.0, f64::max);
         let shares = shares(&probe.frequencies, longest, frequencies);

@@ -352,7 +352,7 @@ fn responses<'py>(
         (data, start): (&Data<'py>, &Start<'py>),
     ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, &[], &[1.0; D])?;
-        let links = interrupt::run(py, |_| estimator.flow(&point))?;
+        let links = interrupt::run(py, |_| estimator.places(&point))?;
         let n = links.len();
         let places = || links.iter().flat_map(|link| link.places);
         let response: Vec<_> = places().map(|p| p.response).collect();

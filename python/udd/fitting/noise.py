@@ -52,15 +52,15 @@ class Noise:
 
     def sd(self, record: Record, omega: Array) -> Array:
         """Standard deviation of every frame and channel, (n, m)."""
-        return np.hypot(self.factor * record.sigma, self.blur * np.abs(omega)[:, None])
+        variance: Array = (self.factor * record.sigma) ** 2 + (self.blur * omega[:, None]) ** 2
+        return np.sqrt(variance)
 
     def information(self, record: Record, omega: Array) -> Array:
         """Inverse covariance of every frame, (n, m, m), outliers weighted down; zero where not seen."""
         sd = self.sd(record, omega)
         seen = np.isfinite(sd)
         scale = np.where(seen, 1.0 / np.where(seen, sd, 1.0), 0.0)
-        inverse = np.linalg.inv(record.rho)
-        result: Array = self.weight[:, None, None] * inverse * scale[:, :, None] * scale[:, None, :]
+        result: Array = self.weight[:, None, None] * record.unmixing * scale[:, :, None] * scale[:, None, :]
         return result
 
     def beyond(self, record: Record, omega: Array, factor: float) -> bool:
@@ -102,12 +102,13 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     distance = _distance(record, misfit, before.sd(record, omega))
     channels = seen.sum(axis=1).clip(1)
     # What is far out is judged by the typical frame: the noise may be stated wrongly.
-    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi2.ppf(0.5, channels))
-    limit = np.sqrt(chi2.ppf(_HONEST, channels)) * np.maximum(typical, 1.0)
+    numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
+    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi2.ppf(0.5, numbers))
+    limit = (np.sqrt(chi2.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
     # The variance comes from the frames within the limit, where honest noise would show this share of its
     # own.
-    shown = chi2.cdf(chi2.ppf(_HONEST, channels), channels + 2) / _HONEST
+    shown = (chi2.cdf(chi2.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
         use = seen[:, m] & (weight == 1.0)
@@ -154,7 +155,7 @@ def remembered(record: Record, misfit: Array, sd: Array, weight: Array) -> Array
 def _distance(record: Record, misfit: Array, sd: Array) -> Array:
     """How many standard deviations each frame is off."""
     normal = np.where(np.isfinite(sd), misfit / np.where(np.isfinite(sd), sd, 1.0), 0.0)
-    squared = np.einsum("ni,nij,nj->n", normal, np.linalg.inv(record.rho), normal)
+    squared = np.einsum("ni,nij,nj->n", normal, record.unmixing, normal)
     result: Array = np.sqrt(np.maximum(squared, 0.0))
     return result
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -108,10 +109,16 @@ class Record:
             result[own[: int(share * len(own))]] = True
         return result
 
-    @property
+    @cached_property
     def observed(self) -> NDArray[np.bool_]:
         """Which channels were seen in which frame, (n, m)."""
         return np.isfinite(self.sigma)
+
+    @cached_property
+    def unmixing(self) -> Array:
+        """The inverses of the channels' correlations, (n, m, m)."""
+        inverse: Array = np.asarray(np.linalg.inv(self.rho), dtype=np.float64)
+        return inverse
 
 
 def record_of(
@@ -206,13 +213,15 @@ def _fill(
     t: Array, rows: NDArray[np.int64], step: float, longest: float
 ) -> tuple[Array, NDArray[np.int64], NDArray[np.bool_]]:
     """Put frames into short gaps; cut at long ones."""
-    times, origin, links = [t[:1]], [rows[:1]], []
-    for a, b, r in zip(t[:-1], t[1:], rows[1:], strict=True):
-        extra = 0 if b - a > longest else max(round((b - a) / step) - 1, 0)
-        times += [np.linspace(a, b, extra + 2)[1:]]
-        origin += [np.full(extra, -1), np.array([r])]
-        links += [np.full(extra + 1, b - a <= longest)]
-    return np.concatenate(times), np.concatenate(origin), np.concatenate(links)
+    gap = np.diff(t)
+    steps = np.maximum(np.where(gap > longest, 1.0, np.rint(gap / step)), 1.0).astype(np.int64)
+    before = np.repeat(np.arange(len(gap)), steps)
+    # Which of the steps over its gap a frame ends; the last ends at the next frame that is there.
+    number = np.arange(len(before)) - np.repeat(np.cumsum(steps) - steps, steps) + 1
+    last = number == steps[before]
+    times = np.where(last, t[before + 1], number * (gap / steps)[before] + t[before])
+    origin = np.where(last, rows[before + 1], -1)
+    return np.append(t[:1], times), np.append(rows[:1], origin), gap[before] <= longest
 
 
 def _odd(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:

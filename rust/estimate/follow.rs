@@ -1,0 +1,173 @@
+//! Links followed one after the other.
+
+use std::array::from_fn;
+
+use rayon::prelude::*;
+
+use super::{EstimateError, Estimator, Point, Role, Sensor, Set};
+use crate::integrate::{Driver, Failure, MOST_STEPS, Method, Taylor, Tolerance, order};
+use crate::model::{Family, System};
+use crate::scalar::{Dual, Isa, Scalar};
+use crate::tape::Tape;
+
+/// Links are taken by so many at least: what follows them is made once for all.
+const TOGETHER: usize = 64;
+
+/// A film's model with its parameters' values, over any number.
+pub(super) struct Law<B, S> {
+    pub values: Vec<S>,
+    pub system: B,
+}
+
+/// What follows one film's links.
+pub(super) enum Follower<'a, M, S: Scalar<Real = f64, Mask = bool>, const D: usize>
+where
+    M: System<S, D>,
+{
+    /// By the law's power series: most links take one step.
+    Series(Box<Driver<&'a M, S, D, Tolerance, Taylor<'a, S, D>>>),
+    /// By a Runge-Kutta method, where the law has no series.
+    Stages(Box<Driver<&'a M, S, D>>),
+}
+
+/// A link on the way from its start.
+pub(super) struct Way<'a, S, const D: usize> {
+    pub start: f64,
+    pub end: f64,
+    pub x: [S; D],
+    /// Places on the way, as parts of it, and the states met there.
+    pub places: &'a [f64],
+    pub met: &'a mut [[S; D]],
+}
+
+/// A link's film, its start and its end in the model's time.
+pub(super) type Span = (usize, f64, f64);
+/// Where a link ends, and whether the law switched on the way.
+pub(super) type End<S, const D: usize> = ([S; D], bool);
+
+impl<'a, M, S, const D: usize> Follower<'a, M, S, D>
+where
+    S: Scalar<Real = f64, Mask = bool>,
+    M: System<S, D>,
+{
+    fn new(tape: Option<&'a Tape<D>>, law: &'a Law<M, S>, tolerance: &Tolerance) -> Self {
+        let (x, system) = ([S::zero(); D], &law.system);
+        match tape {
+            Some(tape) => {
+                let method = Taylor::new(tape, law.values.clone(), order(tolerance), Isa::best());
+                Self::Series(Box::new(Driver::by(method, system, 0.0, x, Some(1.0), tolerance)))
+            }
+            None => Self::Stages(Box::new(Driver::new(system, 0.0, x, Some(1.0), tolerance))),
+        }
+    }
+
+    /// Follows a link; the first trial step is all of it.
+    pub fn follow(&mut self, way: Way<'_, S, D>) -> Result<End<S, D>, Failure> {
+        match self {
+            Self::Series(driver) => follow(driver, way),
+            Self::Stages(driver) => follow(driver, way),
+        }
+    }
+}
+
+fn follow<M, S, K, const D: usize>(
+    driver: &mut Driver<M, S, D, Tolerance, K>,
+    way: Way<'_, S, D>,
+) -> Result<End<S, D>, Failure>
+where
+    S: Scalar<Real = f64, Mask = bool>,
+    M: System<S, D>,
+    K: Method<S, D>,
+{
+    let Way { start, end, x, places, met } = way;
+    driver.start(true, start, x, Some(end - start));
+    let (mut steps, mut ahead) = (0, 0);
+    let (sides, mut switched) = (*driver.sides(), false);
+    while driver.t() != end {
+        driver.advance(end)?;
+        switched |= *driver.sides() != sides;
+        steps += 1;
+        if steps > MOST_STEPS {
+            return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
+        }
+        while ahead < places.len() {
+            let since = start + places[ahead] * (end - start) - driver.from();
+            if since > driver.size() {
+                break;
+            }
+            met[ahead] = if since < driver.size() { driver.dense(since) } else { *driver.x() };
+            ahead += 1;
+        }
+    }
+    Ok((*driver.x(), switched))
+}
+
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// The law of every film over any number, each from its model's values.
+    pub(super) fn laws<S: Scalar>(
+        &self,
+        point: &Point<D>,
+        lifted: impl Fn(usize, &[f64]) -> Vec<S>,
+    ) -> Vec<Law<F::Built<S>, S>> {
+        let one = |(film, set): (usize, &Set)| {
+            let values = lifted(film, &set.model);
+            Law { system: self.family.build(&values), values }
+        };
+        point.sets.iter().enumerate().map(one).collect()
+    }
+
+    /// The film, start and end of link `i` in the model's time, where its frames are linked.
+    pub(super) fn link(&self, point: &Point<D>, i: usize) -> Option<Span> {
+        let film = self.record.film[i];
+        let pace = point.sets[film].pace();
+        self.record.linked[i].then(|| (film, self.record.t[i] * pace, self.record.t[i + 1] * pace))
+    }
+
+    /// The model's operations. What vanishes in all films and is held is left out.
+    fn tape(&self, point: &Point<D>) -> Option<Tape<D>> {
+        let free = |p: usize| self.free.iter().any(|free| free.role == Role::Model(p));
+        let zero = |p: usize| point.sets.iter().all(|set| set.model[p] == 0.0) && !free(p);
+        let known: Vec<_> = (0..point.sets[0].model.len()).map(|p| zero(p).then_some(0.0)).collect();
+        Tape::record(&self.family, &known).ok()
+    }
+
+    /// What `one` makes of every link, given its number and its span; `none` for frames that are not linked.
+    pub(super) fn each_link<S, T: Send>(
+        &self,
+        point: &Point<D>,
+        laws: &[Law<F::Built<S>, S>],
+        one: impl Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span) -> Result<T, Failure> + Sync,
+        none: impl Fn() -> T + Sync,
+    ) -> Result<Vec<T>, EstimateError>
+    where
+        S: Scalar<Real = f64, Mask = bool>,
+    {
+        let tape = self.tape(point);
+        let new = |film: usize| Follower::new(tape.as_ref(), &laws[film], &self.tolerance);
+        // The film whose links were followed last, and what followed them.
+        let each = |last: &mut Option<_>, (i, found): (usize, &mut T)| {
+            let Some(link) = self.link(point, i) else { return Ok(()) };
+            let (_, follower) = match last.take() {
+                Some((film, same)) if film == link.0 => last.insert((film, same)),
+                _ => last.insert((link.0, new(link.0))),
+            };
+            let t = self.record.t[i];
+            *found = one(follower, i, link).map_err(|source| EstimateError::Integration { t, source })?;
+            Ok(())
+        };
+        let mut found: Vec<T> = self.record.linked.iter().map(|_| none()).collect();
+        let links = found.par_iter_mut().enumerate().with_min_len(TOGETHER);
+        links.try_for_each_init(|| None, each)?;
+        Ok(found)
+    }
+}
+
+/// A state whose numbers are differentiated by its components, in the first directions.
+pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D]) -> [Dual<f64, N>; D] {
+    const { assert!(D <= N) };
+    from_fn(|k| Dual::variable(x[k], k))
+}
