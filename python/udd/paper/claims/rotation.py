@@ -146,7 +146,7 @@ _SOON = 1500.0
 
 @functools.cache
 def _transients() -> tuple[float, float, float, float]:
-    """Mean life of the chaos at w = 3.7, B = 0.2, its error, and the shares from -3.2 and -3.5 soon rotating."""
+    """Mean life of the chaos at w = 3.7, B = 0.2, its error, and how many from -3.2 and -3.5 soon rotate."""
     w = 3.7
     model = DLE(w, B=device.B)
     s = np.sqrt(w)
