@@ -11,6 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from typing import TYPE_CHECKING
 
+from udd.pages import templates
+
 from .registry import FAILS, HOLDS, REMARK
 
 if TYPE_CHECKING:
@@ -36,15 +38,7 @@ def sentence(text: str) -> str:
 
 def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
     """The page as HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("udd.paper"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates("udd.paper")
     environment.filters["sentence"] = sentence
     return environment.get_template("index.html").render(
         figures=[(one, _embedded(one)) for one in figures],

@@ -11,6 +11,7 @@ from typing import Any
 from udd.discovery.innovations import innovations
 from udd.errors import UddError
 from udd.files import write_whole
+from udd.pages import templates
 
 from . import figures, own, tables, words
 
@@ -43,18 +44,10 @@ def write(
     UddError
         The page cannot be written there, or the film is not the one that was tracked.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     target = Path(path)
     if target.is_dir():
         raise UddError(f"{target} is a folder, not a page to write to")
-    environment = Environment(
-        loader=PackageLoader("udd.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates("udd.report")
     environment.filters["pretty"] = words.pretty
     origin = film if source is None else source
     of_own = discovery.fit.model.kind == "own"
@@ -64,7 +57,6 @@ def write(
     surprises = [innovations(fit) for fit in fits]
     page = environment.get_template("own.html" if of_own else "page.html").render(
         d=discovery,
-        style=environment.loader.get_source(environment, "page.css")[0] if environment.loader else "",
         words=words,
         tables=tables,
         own=own,

@@ -14,6 +14,7 @@ import numpy as np
 
 from udd.errors import UddError
 from udd.files import write_whole
+from udd.pages import templates
 from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
 
 from . import words
@@ -39,8 +40,6 @@ def write_tracked(
     command: str | None = None,
 ) -> None:
     """As `udd.tracking.page`."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     from udd.tracking.health import health
     from udd.tracking.run import Tracking
 
@@ -52,14 +51,10 @@ def write_tracked(
     if "calibration" not in m.meta or not m.quality:
         raise UddError("the measurement was not tracked in a film, so there is no page about it")
     checked = health(m) if m.kind == "disk" else None
-    environment = Environment(
-        loader=PackageLoader("udd.report"), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
     udd_version, all_versions = versions()
-    page = environment.get_template("tracked.html").render(
+    template = templates("udd.report").get_template("tracked.html")
+    page = template.render(
         m=m,
-        style=environment.loader.get_source(environment, "page.css")[0] if environment.loader else "",
         headline=headline(m),
         numbers=numbers(m, checked),
         calibration=calibration(m),
