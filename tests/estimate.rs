@@ -185,7 +185,8 @@ proptest! {
             let (e_up, r_up) = estimator.residuals(&up).unwrap();
             let (e_down, r_down) = estimator.residuals(&down).unwrap();
             let a = (r_down[0] - r_up[0]) / (2.0 * h);
-            let column = linear.flow[0].a.column(k);
+            let by_state = linear.flow[0].a();
+            let column = by_state.column(k);
             prop_assert!((column - a).norm() < 1e-5 * a.norm().max(1.0), "a {k}");
             let seen = (e_down[0] - e_up[0]) / (2.0 * h);
             prop_assert!((linear.sights[0].h.column(k) - seen).norm() < 1e-5, "h {k}");
