@@ -174,9 +174,13 @@ def upward(places: NDArray[np.complex128], setup: Setup) -> complex:
     """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
 
     Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
-    all the marks of any other layout.
+    all the marks of any other layout. Of one that is said with an error the first mark says it.
     """
     body = setup.layout.unit
+    if setup.sigma.layout and setup.calibrate.layout:
+        first = setup.layout.first
+        turn = complex(places[first] / body[first])
+        return turn / abs(turn)
     if not setup.layout.standard:
         turn = complex(np.vdot(body - body.mean(), places - places.mean()))
         return turn / abs(turn)

@@ -39,7 +39,17 @@ from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
 from .scale import scale as size_of
-from .setup import Calibrate, Layout, Region, Setup, read_calibrate, read_layout, read_region
+from .setup import (
+    Calibrate,
+    Layout,
+    Region,
+    Setup,
+    Sigma,
+    read_calibrate,
+    read_layout,
+    read_region,
+    read_sigma,
+)
 from .survey import Survey, slowest, survey
 from .tags import Tag, follow_tags, is_tags, layout_of, read_tags
 from .upright import Upright, upright
@@ -72,6 +82,7 @@ def track(
     scale: float | None = None,
     region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
+    sigma: Sigma | Mapping[str, float] | None = None,
     bob: str | Sequence[int] | None = None,
     length: float | None = None,
     config: Config | None = None,
@@ -107,6 +118,10 @@ def track(
     calibrate : mapping, optional
         What the film is asked for: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: found (so
         if not given); False: as given, or not there; a number (lens, readout [s], exposure [s]): just that.
+    sigma : mapping, optional
+        Standard errors of what is given: ``pivot`` [pixels], ``scale`` [pixels per metre], ``layout`` [m].
+        With one, it is a beginning that the film improves; where the film does not tell, it stands. Without,
+        it is exact.
     bob : str or (r, g, b), optional
         The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
         picture's vertical, about the centre of the bob's path (or `pivot`).
@@ -162,6 +177,7 @@ def track(
         "scale": scale,
         "region": region,
         "calibrate": calibrate,
+        "sigma": sigma,
     }
     found = track_whole(video, config=config, progress=progress, **given, bob=bob, length=length)
     return found.measurement if isinstance(found, Tracking) else found
@@ -223,6 +239,7 @@ def track_in_detail(
     scale: float | None = None,
     region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
+    sigma: Sigma | Mapping[str, float] | None = None,
     progress: bool = False,
     watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
@@ -236,6 +253,7 @@ def track_in_detail(
         None if scale is None else _length(scale, "scale", "pixels per metre"),
         None if region is None else read_region(region),
         read_calibrate({} if calibrate is None else calibrate),
+        read_sigma({} if sigma is None else sigma),
     )
     film = Film(video, fps=fps)
     if tags:
@@ -317,9 +335,10 @@ def _tracking(
     look_over: Survey | None = None,
 ) -> Tracking:
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
-    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup.pivot)
+    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
     # Where the layout is taken as said, so is the centre.
-    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else 0.0
+    by_layout = setup.sigma.layout * camera.scale
+    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else by_layout
     shared = [unforeseen(tracks, known.exposure**2 / 12)]
     turned = wobble(tracks, known.look)
     stood = upright(tracks, known.look, turned) if turned.amplitude else None
@@ -334,7 +353,7 @@ def _tracking(
             centre_sigma = rim.centre_sigma
         tracks, lean = stood.about(camera.pivot)
         known, shared = replace(known, look=stood.look), [*shared, lean]
-        camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup.pivot)
+        camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
     values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma, shared), camera)
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from .setup import Setup
 
 REACH = 65 / 80  # of the radius: where the marks of the standard disk have their centres
 RIM_EDGE = 0.35  # pixels: how well light and lens let one say where a bright disk ends
+APART = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
+MINOR = 0.1  # share of what is said below which the film alone is named
 PLACED = 0.02  # pixels: how well the marks' mean places are known
 BY_HAND = 0.05e-3  # m: how well two marks are glued where the layout says; three and more show it themselves
 UNLIKE = 0.015  # relative difference from the rim's scale at which the marks are not the standard ones
@@ -31,10 +34,38 @@ def scale(places: NDArray[np.complex128], rim: Outline | None, setup: Setup) -> 
 
     Each counts by its uncertainty: that of the rim is where its edge lies; that of the marks shows in how far
     they are from their layout. Without a given distance the standard marks count where they fit the standard
-    disk.
+    disk. A scale that is said with an error counts by it, too.
     """
-    if setup.scale is not None:
-        return Scale(setup.scale, 0.0, "given")
+    if setup.scale is None:
+        return _found(places, rim, setup)
+    said = Scale(setup.scale, setup.sigma.scale, "given")
+    # a layout that is known no better was measured with that scale: it is no other evidence
+    if not said.sigma or not setup.calibrate.scale or (setup.sigma.layout and rim is None):
+        return said
+    film = _by_rim(rim, setup) if setup.sigma.layout and rim is not None else _found(places, rim, setup)
+    if abs(film.value - said.value) > APART * np.hypot(film.sigma, said.sigma):
+        warnings.warn(
+            f"the film shows {film.value:.1f} pixels per metre (by its {film.origin}), not the "
+            f"{said.value:.1f} that are given; the film is believed",
+            stacklevel=5,
+        )
+        return film
+    return _both(film, said)
+
+
+def _by_rim(rim: Outline, setup: Setup) -> Scale:
+    return Scale(rim.radius / setup.radius, float(np.hypot(rim.sigma, RIM_EDGE)) / setup.radius, "rim")
+
+
+def _both(film: Scale, said: Scale) -> Scale:
+    """Mean of what is found and what is said, each by its uncertainty."""
+    share = film.sigma**2 / (film.sigma**2 + said.sigma**2)  # of what is said
+    origin = film.origin if share < MINOR else f"{film.origin}, and given"
+    return Scale(film.value + share * (said.value - film.value), float(np.sqrt(share)) * said.sigma, origin)
+
+
+def _found(places: NDArray[np.complex128], rim: Outline | None, setup: Setup) -> Scale:
+    """The film's own."""
     layout, radius = setup.layout, setup.radius
     reach = layout.reach if not layout.standard else setup.distance or REACH * radius
     body = layout.unit * reach
@@ -47,10 +78,12 @@ def scale(places: NDArray[np.complex128], rim: Outline | None, setup: Setup) -> 
     spare = 2 * len(places) - 4
     by_marks = abs(factor)
     glued = float(np.sqrt((np.abs(rest) ** 2).sum() / spare)) if spare else BY_HAND * by_marks
-    marks_sigma = float(np.hypot(glued, PLACED) / np.sqrt(square))
+    known = np.hypot(PLACED, setup.sigma.layout * by_marks)
+    marks_sigma = float(np.hypot(glued, known) / np.sqrt(square))
     if rim is None:
         return Scale(by_marks, marks_sigma, "marks")
-    by_rim, rim_sigma = rim.radius / radius, float(np.hypot(rim.sigma, RIM_EDGE)) / radius
+    shown = _by_rim(rim, setup)
+    by_rim, rim_sigma = shown.value, shown.sigma
     if layout.standard and setup.distance is None and abs(by_marks / by_rim - 1) > UNLIKE:
         return Scale(by_rim, rim_sigma, "rim")
     w_rim, w_marks = rim_sigma**-2, marks_sigma**-2

@@ -53,6 +53,25 @@ class Calibrate:
 
 
 @dataclass(frozen=True)
+class Sigma:
+    """How well is known what is said: standard errors. 0: it is just that, and nothing in the film moves it.
+
+    Attributes
+    ----------
+    pivot : float
+        Of each of its coordinates [pixels].
+    scale : float
+        [pixels per metre]
+    layout : float
+        Of each coordinate of a mark [m].
+    """
+
+    pivot: float = 0.0
+    scale: float = 0.0
+    layout: float = 0.0
+
+
+@dataclass(frozen=True)
 class Setup:
     """All that may be said by hand."""
 
@@ -63,6 +82,7 @@ class Setup:
     scale: float | None = None  # pixels per metre
     region: Region | None = None  # u from, v from, u to, v to [pixels]
     calibrate: Calibrate = Calibrate()
+    sigma: Sigma = Sigma()
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
@@ -71,6 +91,10 @@ class Setup:
         for name in ("scale", "pivot"):
             if not getattr(self.calibrate, name) and getattr(self, name) is None:
                 raise TrackError(f"{name} is not to be found in the film, so it must be given")
+            if getattr(self.sigma, name) and getattr(self, name) is None:
+                raise TrackError(f"sigma says how well {name} is known, but {name} is not given")
+        if self.sigma.layout and self.layout.standard:
+            raise TrackError("sigma says how well layout is known, but layout is not given")
 
     def view(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Pixels inside the region, (height, width)."""
@@ -119,6 +143,27 @@ def read_calibrate(said: Any) -> Calibrate:
     return Calibrate(**said)
 
 
+def read_sigma(said: Any) -> Sigma:
+    """From a mapping of names to standard errors.
+
+    Raises
+    ------
+    TrackError
+        A name that there is not, or a value that is no standard error.
+    """
+    if isinstance(said, Sigma):
+        return said
+    if not isinstance(said, Mapping):
+        raise TrackError(f"sigma must be a table of {', '.join(_SIGMAS)}, not {said!r}")
+    for name, value in said.items():
+        if name not in _SIGMAS:
+            raise TrackError(f"sigma: there is no item {name!r}; there are {', '.join(_SIGMAS)}")
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not (number and math.isfinite(value) and value >= 0):
+            raise TrackError(f"sigma: {name} must be a standard error in {_SIGMAS[name]}, not {value!r}")
+    return Sigma(**{name: float(value) for name, value in said.items()})
+
+
 def read_region(said: Any) -> Region:
     """Four numbers: u and v of the upper left corner, and of the lower right [pixels]."""
     try:
@@ -131,6 +176,17 @@ def read_region(said: Any) -> Region:
 
 
 _ITEMS = tuple(f.name for f in fields(Calibrate))
+_SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
 _RANGES = {"lens": (-0.3, 0.3, ""), "readout": (-0.1, 0.1, " s"), "exposure": (0.0, 0.1, " s")}
 
-__all__ = ["Calibrate", "Layout", "Region", "Setup", "read_calibrate", "read_layout", "read_region"]
+__all__ = [
+    "Calibrate",
+    "Layout",
+    "Region",
+    "Setup",
+    "Sigma",
+    "read_calibrate",
+    "read_layout",
+    "read_region",
+    "read_sigma",
+]
