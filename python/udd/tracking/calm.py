@@ -9,7 +9,7 @@ from .find import LEAST_CHROMA
 from .flags import unusable
 from .survey import Survey
 
-OPEN = 0.1  # of the range from fewest to most coloured samples: how much may be hidden
+OPEN = 0.05  # of the range from fewest to most coloured samples: how much may be hidden
 MOST = 8  # frames to choose from
 
 

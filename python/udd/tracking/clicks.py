@@ -28,7 +28,7 @@ ASKED = {
     "pivot": "Click the point about which the disk turns, where the wheels hold it.",
     "marks": "Click the middle of each coloured mark, beginning with the one that is above the disk's centre "
     "when beta is 0.",
-    "ruler": "Click two points of the disk that are {distance:g} m apart.",
+    "ruler": "Click two points of the disk that are {distance:g} m apart; best the middles of two marks.",
     "rim": "Click the disk's edge at three places or more, far apart; or, once, its centre.",
     "region": "Click two opposite corners (or drag) of the part of the picture in which the disk moves.",
     "end": "That is all: Enter writes it down.",
@@ -184,8 +184,12 @@ class Clicks:
         if size is not None and "scale" not in self.known:
             scale, error = size
             out["scale"], sigma["scale"] = round(scale, 3), round(error, 3)
+            ends = self._ends()
+            if ends is not None:
+                out["apart"] = [*ends, self.distance]
             # a length that was clicked is all that is known of the size, where nobody says the radius
-            calibrate.setdefault("scale", not (len(a.ruler) == 2 and "disk_radius" not in self.known))
+            alone = len(a.ruler) == 2 and ends is None and "disk_radius" not in self.known
+            calibrate.setdefault("scale", not alone)
         if a.marks and size is not None:
             centre, centre_sigma, radius = self._disk()
             out["layout"] = _layout(a.marks, centre, size[0])
@@ -285,6 +289,12 @@ class Clicks:
         if found is None:
             return self.answers.rim[0], CENTRE, None
         return found.centre, found.centre_sigma, found.radius
+
+    def _ends(self) -> tuple[int, int] | None:
+        """Numbers of the marks whose distance was clicked, where it was that of marks."""
+        numbers = {m.centre: k for k, m in enumerate(self.answers.marks, start=1)}
+        ends = [numbers[z] for z in self.answers.ruler if z in numbers]
+        return (ends[0], ends[1]) if len(ends) == 2 else None
 
     def _size(self) -> tuple[float, float] | None:
         """Pixels per metre and the standard error; None where nothing tells."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from .decode import TrackError
 from .layout import read_bob, read_layout
-from .setup import read_calibrate, read_region, read_sigma
+from .setup import read_apart, read_calibrate, read_region, read_sigma
 from .tags import is_tags, read_tags
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
@@ -27,7 +27,8 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
         ``pivot`` (two numbers [pixels]), ``refine`` (true or false), ``scale`` [pixels per metre],
         ``region`` (four numbers [pixels]), ``layout`` (a list of marks, each with ``at`` and ``colour``),
         ``calibrate`` (a table of what is to be found in the film), ``sigma`` (a table of standard errors of
-        what is said), ``bob`` (a colour), ``length`` [m].
+        what is said), ``apart`` (numbers of two marks, and their distance [m]), ``bob`` (a colour),
+        ``length`` [m].
     **given
         The same by name; None is not given.
 
@@ -115,6 +116,7 @@ _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "layout": ("a list of marks", _layout),
     "calibrate": ("a table", read_calibrate),
     "sigma": ("a table of standard errors", read_sigma),
+    "apart": ("two marks' numbers and a distance", read_apart),
     "bob": ("the colour of a pendulum's bob", _bob),
     "length": ("a positive number of metres", _positive),
 }

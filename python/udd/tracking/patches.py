@@ -18,7 +18,7 @@ HALF = 0.5  # of the colour's strength: where a pixel is half patch, half disk
 SMALLEST = 6  # half-resolution pixels of a patch that is one
 LARGEST = 0.05  # of the picture: what has more is a wall, no mark
 FULL = 0.74  # of the smallest rectangle about it that a square or rectangular mark fills, coarse as it is
-DARK = 0.7  # of the usual brightness about a patch: below, something stands there that is not the disk
+DARK = 0.5  # of the usual brightness about a patch: below, something stands there that is not the disk
 HIDDEN = 0.1  # of what is about a patch that is dark where the mark is hidden in part
 
 

@@ -40,11 +40,13 @@ from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
 from .scale import scale as size_of
 from .setup import (
+    Apart,
     Calibrate,
     Layout,
     Region,
     Setup,
     Sigma,
+    read_apart,
     read_calibrate,
     read_layout,
     read_region,
@@ -83,6 +85,7 @@ def track(
     region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
     sigma: Sigma | Mapping[str, float] | None = None,
+    apart: Apart | None = None,
     bob: str | Sequence[int] | None = None,
     length: float | None = None,
     config: Config | None = None,
@@ -122,6 +125,9 @@ def track(
         Standard errors of what is given: ``pivot`` [pixels], ``scale`` [pixels per metre], ``layout`` [m].
         With one, it is a beginning that the film improves; where the film does not tell, it stands. Without,
         it is exact.
+    apart : (int, int, float), optional
+        Numbers of two marks (from 1; of the standard ones that is red) and the distance of their middles [m],
+        measured on the disk: that sets the scale.
     bob : str or (r, g, b), optional
         The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
         picture's vertical, about the centre of the bob's path (or `pivot`).
@@ -178,6 +184,7 @@ def track(
         "region": region,
         "calibrate": calibrate,
         "sigma": sigma,
+        "apart": apart,
     }
     found = track_whole(video, config=config, progress=progress, **given, bob=bob, length=length)
     return found.measurement if isinstance(found, Tracking) else found
@@ -240,6 +247,7 @@ def track_in_detail(
     region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
     sigma: Sigma | Mapping[str, float] | None = None,
+    apart: Apart | None = None,
     progress: bool = False,
     watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
@@ -254,6 +262,7 @@ def track_in_detail(
         None if region is None else read_region(region),
         read_calibrate({} if calibrate is None else calibrate),
         read_sigma({} if sigma is None else sigma),
+        None if apart is None else read_apart(apart),
     )
     film = Film(video, fps=fps)
     if tags:

@@ -14,6 +14,7 @@ from .decode import Picture, TrackError
 from .layout import STANDARD, Layout, read_layout
 
 Region = tuple[float, float, float, float]
+Apart = tuple[int, int, float]  # numbers of two marks, from 1, and how far apart their middles are [m]
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class Setup:
     region: Region | None = None  # u from, v from, u to, v to [pixels]
     calibrate: Calibrate = Calibrate()
     sigma: Sigma = Sigma()
+    apart: Apart | None = None
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
@@ -93,6 +95,10 @@ class Setup:
                 raise TrackError(f"{name} is not to be found in the film, so it must be given")
             if getattr(self.sigma, name) and getattr(self, name) is None:
                 raise TrackError(f"sigma says how well {name} is known, but {name} is not given")
+        if self.apart is not None and max(self.apart[:2]) > len(self.layout.places):
+            raise TrackError(
+                f"apart: there is no mark {max(self.apart[:2])}: there are {len(self.layout.places)}"
+            )
         if self.sigma.layout and self.layout.standard:
             raise TrackError("sigma says how well layout is known, but layout is not given")
 
@@ -164,6 +170,26 @@ def read_sigma(said: Any) -> Sigma:
     return Sigma(**{name: float(value) for name, value in said.items()})
 
 
+def read_apart(said: Any) -> Apart:
+    """Two marks' numbers and their distance.
+
+    Raises
+    ------
+    TrackError
+        It is something else.
+    """
+    try:
+        one, other, distance = said
+        numbers = all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in (one, other))
+        if not numbers or one == other or not 0 < float(distance) < math.inf:
+            raise ValueError
+    except (TypeError, ValueError):
+        raise TrackError(
+            f"apart must be the numbers of two marks (from 1) and their distance in m, not {said!r}"
+        ) from None
+    return one, other, float(distance)
+
+
 def read_region(said: Any) -> Region:
     """Four numbers: u and v of the upper left corner, and of the lower right [pixels]."""
     try:
@@ -180,11 +206,13 @@ _SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
 _RANGES = {"lens": (-0.3, 0.3, ""), "readout": (-0.1, 0.1, " s"), "exposure": (0.0, 0.1, " s")}
 
 __all__ = [
+    "Apart",
     "Calibrate",
     "Layout",
     "Region",
     "Setup",
     "Sigma",
+    "read_apart",
     "read_calibrate",
     "read_layout",
     "read_region",

@@ -31,7 +31,7 @@ class Shown:
         self.drawn: list[Artist] = []
         height, width = clicks.picture.y.shape
         grid = figure.add_gridspec(
-            2, 2, left=0.02, right=0.98, bottom=0.07, top=0.86, width_ratios=(2.6, 1), height_ratios=(1, 1.6)
+            2, 2, left=0.02, right=0.98, bottom=0.07, top=0.86, width_ratios=(2.4, 1), height_ratios=(1, 1.6)
         )
         self.axes = figure.add_subplot(grid[:, 0], label="frame")
         self.loupe = figure.add_subplot(grid[0, 1], label="loupe")
@@ -75,6 +75,8 @@ class Shown:
         self.keys.set_text(f"{keys}     (frame at {clicks.picture.t:.2f} s, {number} of {frames})")
         said = [*self._pivot(), *self._marks(), *self._ruler(), *self._rim(), *self._region()]
         style: dict[str, Any] = {"fontsize": 9, "va": "top", "transform": self.list.transAxes}
+        if said:
+            said = [("clicked", "u, v in pixels"), *said]
         for row, (name, value) in enumerate(said):
             for x, text, colour in ((0.0, name, "0.35"), (0.27, value, "0.1")):
                 self.drawn.append(self.list.text(x, 0.98 - LINE * row, text, color=colour, **style))

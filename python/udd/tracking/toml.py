@@ -19,6 +19,7 @@ NOTES = {
     "scale": "pixels per metre",
     "region": "u0, v0, u1, v1: nothing outside is looked at, pixels",
     "length": "m",
+    "apart": "two marks, by their numbers from 1, and how far apart their middles are, m",
     "calibrate": "true: found in the film; false: as given, or not there",
     "sigma": "standard errors of what is given (pixels, pixels per metre, m): the film improves it",
     "layout": "m right of and above the disk's centre when beta is 0; sRGB codes",
