@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from .calm import calm
-from .clicks import NO_DISK, Clicks
+from .clicks import Clicks, check
 from .config import Config, as_said, settings
 from .decode import Film, TrackError
 from .survey import survey
@@ -72,8 +72,7 @@ def click(
     known = settings({} if config is None else config)
     if distance is not None:
         distance = _distance(distance)
-    if "bob" in known:
-        raise TrackError(NO_DISK)
+    check(known, distance)
     film = Film(video, fps=known.get("fps"))
     figure = _figure()
     try:
@@ -110,14 +109,16 @@ def _figure() -> Figure:
     """
     import matplotlib.pyplot as plt
 
-    why = "matplotlib finds no screen, or no toolkit such as Tk or Qt"
+    no_window, instead = "no window can be opened to click in", "a config file says the same"
     try:
         figure = plt.figure(figsize=SIZE, num=None)
     except Exception as error:  # each toolkit fails in a way of its own
-        raise TrackError(f"no window can be opened to click in: {str(error).splitlines()[0]}") from None
+        why = next(iter(str(error).splitlines()), type(error).__name__)
+        raise TrackError(f"{no_window} ({why}); {instead}") from None
     if getattr(type(figure.canvas), "required_interactive_framework", None) is None:
         plt.close(figure)
-        raise TrackError(f"no window can be opened to click in: {why}")
+        why = "matplotlib finds no screen, or no toolkit such as Tk or Qt"
+        raise TrackError(f"{no_window} ({why}); {instead}")
     return figure
 
 

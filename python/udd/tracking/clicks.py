@@ -16,14 +16,13 @@ from .patches import CLICK, Patch, patch
 
 PIVOT = 2 * CLICK  # pixels: the contact is hidden behind the wheels, and guessed
 CENTRE = 2 * CLICK  # pixels: so is a centre with nothing on it
-SNAP = 2 * CLICK  # pixels from a mark's middle within which that middle is meant
+SNAP = 3 * CLICK  # pixels from a mark's middle within which that middle is meant
 SHORTEST = 20.0  # pixels between two points with a known distance
 NARROWEST = 16.0  # pixels: side of a region
 SAME_PAINT = 0.966  # cosine between two marks' colours' directions (15 degrees) above which it is one paint
 OUTSIDE = 1.05  # of the disk's radius: no mark lies beyond
 RADIUS = 0.08  # m: of the disk where nobody says it
 
-NO_DISK = "clicks are for a disk's film: of a pendulum the bob's colour and its length are enough"
 ASKED = {
     "pivot": "Click the point about which the disk turns, where the wheels hold it.",
     "marks": "Click the middle of each coloured mark, beginning with the one that is above the disk's centre "
@@ -81,10 +80,7 @@ class Clicks:
     def __init__(
         self, picture: Picture, full_range: bool, known: Mapping[str, Any], distance: float | None = None
     ) -> None:
-        if known.get("bob") is not None:
-            raise TrackError(NO_DISK)
-        if distance is not None and known.get("scale") is not None:
-            raise TrackError("distance and scale both say how large a pixel is: say one of them")
+        check(known, distance)
         self.picture, self.full_range = picture, full_range
         self.known, self.distance = dict(known), distance
         self.remark = ""  # to the last click
@@ -184,11 +180,10 @@ class Clicks:
         if size is not None and "scale" not in self.known:
             scale, error = size
             out["scale"], sigma["scale"] = round(scale, 3), round(error, 3)
-            ends = self._ends()
-            if ends is not None:
-                out["apart"] = [*ends, self.distance]
+            if self.ends is not None:
+                out["apart"] = [*self.ends, self.distance]
             # a length that was clicked is all that is known of the size, where nobody says the radius
-            alone = len(a.ruler) == 2 and ends is None and "disk_radius" not in self.known
+            alone = len(a.ruler) == 2 and self.ends is None and "disk_radius" not in self.known
             calibrate.setdefault("scale", not alone)
         if a.marks and size is not None:
             centre, centre_sigma, radius = self._disk()
@@ -290,7 +285,8 @@ class Clicks:
             return self.answers.rim[0], CENTRE, None
         return found.centre, found.centre_sigma, found.radius
 
-    def _ends(self) -> tuple[int, int] | None:
+    @property
+    def ends(self) -> tuple[int, int] | None:
         """Numbers of the marks whose distance was clicked, where it was that of marks."""
         numbers = {m.centre: k for k, m in enumerate(self.answers.marks, start=1)}
         ends = [numbers[z] for z in self.answers.ruler if z in numbers]
@@ -310,6 +306,16 @@ class Clicks:
             return None
         radius = float(self.known.get("disk_radius", RADIUS))
         return rim.radius / radius, rim.radius_sigma / radius
+
+
+def check(known: Mapping[str, Any], distance: float | None) -> None:
+    """Refuse what has no use for clicks, or says the scale twice."""
+    if known.get("bob") is not None:
+        raise TrackError(
+            "clicks are for a disk's film: of a pendulum the bob's colour and its length are enough"
+        )
+    if distance is not None and known.get("scale") is not None:
+        raise TrackError("distance and scale both say how large a pixel is: say one of them")
 
 
 def _faults(marks: tuple[Patch, ...]) -> str:

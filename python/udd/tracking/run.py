@@ -346,8 +346,8 @@ def _tracking(
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
     camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
     # Where the layout is taken as said, so is the centre.
-    by_layout = setup.sigma.layout * camera.scale
-    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else by_layout
+    by_hand = 0.0 if rim is not None and setup.calibrate.layout else setup.sigma.layout
+    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else by_hand * camera.scale
     shared = [unforeseen(tracks, known.exposure**2 / 12)]
     turned = wobble(tracks, known.look)
     stood = upright(tracks, known.look, turned) if turned.amplitude else None
@@ -367,7 +367,8 @@ def _tracking(
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
-    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > UNSURE * setup.radius
+    # by how much the centre is off that was said, all frames are: that makes none of them vague
+    vague = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2 > (UNSURE * setup.radius) ** 2
     for table in (values, sigma, rho):
         table[vague] = np.nan
     tracks.flag = [VAGUE if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]

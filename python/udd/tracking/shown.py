@@ -112,7 +112,9 @@ class Shown:
             return []
         self._points(ends, "o", SAID)
         self._line(ends, SAID)
-        return [(f"{self.clicks.distance:g} m", " to ".join(_pixels(z) for z in ends))]
+        marks = self.clicks.ends
+        said = " to ".join(_pixels(z) for z in ends) if marks is None else "mark {} to mark {}".format(*marks)
+        return [(f"{self.clicks.distance:g} m", said)]
 
     def _rim(self) -> list[tuple[str, str]]:
         points, edge = self.clicks.answers.rim, self.clicks.edge

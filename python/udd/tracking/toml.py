@@ -75,7 +75,7 @@ def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
         if isinstance(table, Mapping):
             blocks.append([f"[{name}]{note}", *(f"{key} = {_value(value)}" for key, value in table.items())])
             continue
-        if isinstance(table, str) or not all(isinstance(mark, Mapping) for mark in table):
+        if not isinstance(table, list | tuple) or not all(isinstance(mark, Mapping) for mark in table):
             raise TrackError(f"{name} must be a table, or a list of them, to be written")
         for mark in table:
             blocks.append([f"[[{name}]]{note}", *(f"{key} = {_value(x)}" for key, x in mark.items())])
