@@ -16,7 +16,7 @@ from .window import Window
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SIZE = (11.0, 8.6)  # inches
+SIZE = (10.4, 7.2)  # inches
 
 
 def click(

@@ -14,9 +14,11 @@ from .decode import Picture, TrackError
 from .layout import Layout, read_layout
 from .patches import CLICK, Patch, patch
 
-PIVOT = 2 * CLICK  # pixels: the contact is hidden behind the wheels, and guessed
-CENTRE = 2 * CLICK  # pixels: so is a centre with nothing on it
-SNAP = 3 * CLICK  # pixels from a mark's middle within which that middle is meant
+ROWS = 600  # of a picture for which there is room on the screen; of more, a hand misses more pixels
+# in units of what a hand misses:
+PIVOT = 2.0  # the contact is hidden behind the wheels, and guessed
+CENTRE = 2.0  # so is a centre with nothing on it
+SNAP = 3.0  # from a mark's middle, within which that middle is meant
 SHORTEST = 20.0  # pixels between two points with a known distance
 NARROWEST = 16.0  # pixels: side of a region
 SAME_PAINT = 0.966  # cosine between two marks' colours' directions (15 degrees) above which it is one paint
@@ -88,6 +90,11 @@ class Clicks:
         self.history[0] = _State(self._after(""))
 
     @property
+    def miss(self) -> float:
+        """By how much a hand misses [pixels]."""
+        return max(CLICK, CLICK * float(self.picture.y.shape[0]) / ROWS)
+
+    @property
     def question(self) -> str:
         """What is asked now, by name: one of `ASKED`, empty where all is answered."""
         return self.history[-1].question
@@ -139,7 +146,7 @@ class Clicks:
         elif self.question == "rim":
             self._put(replace(a, rim=(*a.rim, at)))
         elif self.question == "ruler":
-            near = [m.centre for m in a.marks if abs(m.centre - at) < SNAP]
+            near = [m.centre for m in a.marks if abs(m.centre - at) < SNAP * self.miss]
             self._pair("ruler", near[0] if near else at, SHORTEST, "too near to each other to tell a scale")
         elif self.question == "region":
             self._pair("region", at, NARROWEST, "too near to each other for a region")
@@ -171,7 +178,7 @@ class Clicks:
         calibrate, sigma = dict(out.pop("calibrate", {})), dict(out.pop("sigma", {}))
         if a.pivot is not None:
             out["pivot"] = [round(a.pivot.real, 2), round(a.pivot.imag, 2)]
-            sigma["pivot"] = PIVOT
+            sigma["pivot"] = round(PIVOT * self.miss, 2)
             calibrate.setdefault("pivot", True)
         if a.region:
             (u0, v0), (u1, v1) = ((z.real, z.imag) for z in a.region)
@@ -217,11 +224,11 @@ class Clicks:
         if any(m.holds(at) for m in a.marks):
             self.remark = "That mark is clicked already."
             return
-        found = patch(self.picture, at, self.full_range)
+        found = patch(self.picture, at, self.full_range, self.miss)
         if found is None:
             self.remark = "There is no colour there: click the middle of a coloured mark."
             return
-        if found.refined and any(abs(m.centre - found.centre) < SNAP for m in a.marks):
+        if found.refined and any(abs(m.centre - found.centre) < SNAP * self.miss for m in a.marks):
             self.remark = "That mark is clicked already."
             return
         if not found.refined:
@@ -276,13 +283,13 @@ class Clicks:
     def edge(self) -> Circle | None:
         """The circle through what is clicked of the disk's edge; None where that fixes none."""
         rim = self.answers.rim
-        return circle(np.array(rim), CLICK) if len(rim) > 2 else None
+        return circle(np.array(rim), self.miss) if len(rim) > 2 else None
 
     def _disk(self) -> tuple[complex, float, float | None]:
         """The disk's centre, its standard error, and the radius where the edge was clicked [pixels]."""
         found = self.edge
         if found is None:
-            return self.answers.rim[0], CENTRE, None
+            return self.answers.rim[0], CENTRE * self.miss, None
         return found.centre, found.centre_sigma, found.radius
 
     @property
@@ -299,7 +306,7 @@ class Clicks:
             return float(known), 0.0
         if len(ruler) == 2 and self.distance is not None:
             found = {m.centre: m.sigma for m in self.answers.marks}
-            error = math.hypot(*(found.get(z, CLICK) for z in ruler))
+            error = math.hypot(*(found.get(z, self.miss) for z in ruler))
             return abs(ruler[1] - ruler[0]) / self.distance, error / self.distance
         rim = self.edge
         if rim is None:

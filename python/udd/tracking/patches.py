@@ -11,7 +11,7 @@ from .decode import Picture
 from .layout import PALEST
 from .rgb import rgb
 
-CLICK = 1.5  # pixels by which a hand misses, in each direction
+CLICK = 1.5  # pixels by which a hand misses, in each direction, where the screen shows each pixel
 FOUND = 0.3  # pixels by which a patch's middle misses its mark's: colours have half the resolution
 ALIKE = 0.94  # cosine between the directions of a pixel's colour and the patch's: 20 degrees
 HALF = 0.5  # of the colour's strength: where a pixel is half patch, half disk
@@ -49,15 +49,15 @@ class Patch:
     @property
     def refined(self) -> bool:
         """Whether the patch tells the centre better than the click."""
-        return self.sigma < CLICK
+        return self.sigma <= FOUND
 
     def holds(self, at: complex) -> bool:
         """Whether a place lies within the patch, or is where it was clicked."""
-        return bool(abs(at - self.centre) < max(0.5 * np.sqrt(self.area), 2 * CLICK))
+        return bool(abs(at - self.centre) < max(0.5 * np.sqrt(self.area), 2 * self.sigma))
 
 
-def patch(picture: Picture, at: complex, full_range: bool) -> Patch | None:
-    """The patch of like colour about a place that was clicked; None where there is no colour.
+def patch(picture: Picture, at: complex, full_range: bool, miss: float = CLICK) -> Patch | None:
+    """The patch of like colour about a place clicked to `miss` [pixels]; None where there is no colour.
 
     A pixel belongs to it by the direction of its colour and half its strength. What is not a whole rectangle
     (hidden in part, or grown into its surroundings) leaves the click where it was.
@@ -81,7 +81,7 @@ def patch(picture: Picture, at: complex, full_range: bool) -> Patch | None:
     _, number, stats, _ = cv2.connectedComponentsWithStats(like.astype(np.uint8), connectivity=4)
     codes = rgb(picture, full_range)
     full = slice(max(0, 2 * row - 2), 2 * row + 4), slice(max(0, 2 * column - 2), 2 * column + 4)
-    clicked = Patch(at, _median(codes[full]), CLICK, 0.0, np.empty(0, np.complex128))
+    clicked = Patch(at, _median(codes[full]), miss, 0.0, np.empty(0, np.complex128))
     here = int(number[row, column])
     if not here:
         return clicked
@@ -94,7 +94,7 @@ def patch(picture: Picture, at: complex, full_range: bool) -> Patch | None:
     sides, outline = _rectangle(part)
     hidden = _beside(part, picture) > HIDDEN or (size < FULL * sides and size > 4 * SMALLEST)
     if hidden:
-        return Patch(at, colour, CLICK, 4.0 * size, outline)
+        return Patch(at, colour, miss, 4.0 * size, outline)
     return Patch(_middle(part, along / float(np.median(along[inner]))), colour, FOUND, 4.0 * size, outline)
 
 

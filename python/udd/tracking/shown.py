@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LOUPE = 20  # pixels each side of the pointer that the loupe shows
-WIDE, NARROW = 96, 116  # letters of a line, large and small
+WIDE, NARROW = 92, 112  # letters of a line, large and small
 LINE = 0.06  # of the list's height
 KEYS = "Enter or Space: go on     Backspace: take back     Esc: leave, nothing is written"
 OTHER = "     ← →: another frame"
