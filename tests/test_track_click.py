@@ -468,6 +468,8 @@ def test_a_config_is_written_as_it_is_read(tmp_path: Path) -> None:
     write_config(path, known, comment='Two lines,\nwith "quotes"')
     assert path.read_text().startswith('# Two lines,\n# with "quotes"\n')
     assert settings(path) == settings(known)
+    write_config(path, known, comment="bell\x07, half a letter \udce4")
+    assert path.read_text().startswith("# bell?, half a letter ?\n") and settings(path) == settings(known)
     tags = {"layout": [{"tag": "4x4_50:7", "at": [0.0, 0.0], "side": 0.03}]}
     write_config(path, tags)
     assert settings(path) == settings(tags)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
 from udd.errors import UddError
+
+from .answer import watched
 
 _HEAD = """Clicked in {film}, by udd track --click; to be edited, and used again with --config.
 What has a standard error in [sigma] is a beginning, which the film improves."""
@@ -45,6 +48,8 @@ def clicked(args: argparse.Namespace, options: dict[str, Any]) -> tuple[dict[str
     said = {} if args.config is None else dict(as_said(args.config)[1])
     given = {"disk_radius": args.disk_radius, **options}
     said |= {name: value for name, value in given.items() if value is not None and name != "config"}
+    if watched():
+        print("udd: looking for a calm frame; a window opens then", file=sys.stderr)
     found = click(args.file, distance=args.distance, config=said)
     write_config(args.click, found, comment=_HEAD.format(film=args.file.name))
     args.config = args.click

@@ -77,6 +77,8 @@ def click(
     figure = _figure()
     try:
         frames = calm(survey(film))
+        if not frames:
+            raise TrackError(f"{film.path}: no frame decodes whole, so there is none to click on")
         clicks = Clicks(frames[0], film.full_range, said, distance)
         window = Window(figure, frames, clicks)
         _wait(figure, f"{film.path.name}: what is known by hand")

@@ -65,7 +65,7 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
 
 def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
     """The text of the file."""
-    blocks = [[f"# {line}".rstrip() for line in comment.splitlines()]]
+    blocks = [[f"# {_plain(line)}".rstrip() for line in comment.splitlines()]]
     blocks.append([_line(name, config[name]) for name in config if name not in TABLES])
     for name in TABLES:
         table = config.get(name)
@@ -81,6 +81,11 @@ def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
             blocks.append([f"[[{name}]]{note}", *(f"{key} = {_value(x)}" for key, x in mark.items())])
             note = ""
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
+
+
+def _plain(text: str) -> str:
+    """What TOML and UTF-8 have no room for (a file's name may hold anything) as question marks."""
+    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def _line(name: str, value: Any) -> str:
