@@ -71,6 +71,16 @@ def add(commands: Any) -> None:
         metavar="TOML",
         help="file with any of these, and with layout (marks or tags of another disk); options win",
     )
+    parser.add_argument(
+        "--click",
+        type=Path,
+        metavar="TOML",
+        help="open a window to click in what is known (pivot, marks, edge, region), write it to this file, "
+        "and track with it",
+    )
+    parser.add_argument(
+        "--distance", type=float, metavar="M", help="with --click: between two points to click, for the scale"
+    )
     parser.add_argument("--fast", action="store_true", help="without the second pass")
     parser.add_argument(
         "--smooth", action="store_true", help="average the noise over neighbouring frames (not for fits)"
@@ -106,11 +116,20 @@ def run(args: argparse.Namespace) -> Answer:
         raise UddError(f"{args.out}: there is no folder {args.out.parent}")
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
-    said, recording = ("", {}) if args.camera is None else _record(args)
+    said, before = ("", {}) if args.camera is None else _record(args)
+    if args.click is not None:
+        from .clicking import clicked
+
+        options, said, before = clicked(args, options)
     detail: list[Any] = []
-    m = _tracked(args, options, detail).with_meta(**more)
+    try:
+        m = _tracked(args, options, detail).with_meta(**more)
+    except UddError as error:
+        if args.click is None:
+            raise
+        raise UddError(f"{error} ({said.strip()})") from None
     text, data = _summary(m)
-    text, data = said + text, {**recording, **data}
+    text, data = said + text, {**before, **data}
     if args.overlay is not None:
         from udd.tracking import overlay
 
@@ -136,6 +155,12 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _check_source(args: argparse.Namespace) -> None:
+    if args.distance is not None and args.click is None:
+        raise UddError("--distance is an option of --click")
+    if args.click is not None:
+        from .clicking import check
+
+        check(args)
     if args.camera is None:
         if args.file is None:
             raise UddError("say which film to track, or --camera 0 to record one")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from .camera import Recording, record
+from .click import click
 from .decode import Film, TrackError
 from .glimpse import Glimpse
 from .overlay import overlay
 from .page import page
 from .result import Pixels, pixels
 from .run import Tracking, pictures_at, pictures_between, track, track_in_detail
+from .toml import write_config
 
 __all__ = [
     "Film",
@@ -17,6 +19,7 @@ __all__ = [
     "Recording",
     "TrackError",
     "Tracking",
+    "click",
     "overlay",
     "page",
     "pictures_at",
@@ -25,4 +28,5 @@ __all__ = [
     "record",
     "track",
     "track_in_detail",
+    "write_config",
 ]

@@ -21,11 +21,14 @@ from .wobble import Wobble
 
 CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
 BLOCKS = 20  # stretches of the film whose means are the independent pieces
-Given = tuple[float, float] | None
+MINOR = 0.1  # share of what is said below which the film alone is named
+APART = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
 
 
-def camera_of(tracks: Tracks, known: Known, size: Scale, given: Given) -> Camera:
+def camera_of(tracks: Tracks, known: Known, size: Scale, setup: Setup) -> Camera:
     """Scale and contact point, from the rolling constraint, by hand, or at worst from the support.
+
+    A contact that is said with an error counts by it beside the rolling constraint's own.
 
     Raises
     ------
@@ -43,11 +46,24 @@ def camera_of(tracks: Tracks, known: Known, size: Scale, given: Given) -> Camera
     def camera(place: complex, sigma: float, origin: str) -> Camera:
         return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive, drive_sigma)
 
-    if given is not None:
-        place = complex(float(given[0]), float(given[1]))
+    if setup.pivot is not None:
+        place = complex(float(setup.pivot[0]), float(setup.pivot[1]))
         if not np.isfinite(place):
-            raise TrackError(f"pivot must be two finite numbers, not {given!r}")
-        return camera(complex(known.look.lens.plane(place)), 0.0, "given")
+            raise TrackError(f"pivot must be two finite numbers, not {setup.pivot!r}")
+        place, said = complex(known.look.lens.plane(place)), setup.sigma.pivot
+        if found is None or not said or not setup.calibrate.pivot:
+            return camera(place, said / size.value, "given")
+        of_film = float(found.covariance[0, 0])
+        if abs(found.place - place) < APART * np.hypot(said, np.sqrt(of_film)):
+            share = of_film / (of_film + said**2)  # of what is said
+            sigma = float(np.sqrt(share) * said) / size.value
+            how = "rolling constraint" if share < MINOR else "rolling constraint and given"
+            return camera(found.place + share * (place - found.place), sigma, how)
+        warnings.warn(
+            f"the disk turns about a point {abs(found.place - place):.0f} pixels from the pivot that is "
+            "given; the motion is believed",
+            stacklevel=5,
+        )
     if found is not None:
         return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / size.value, "rolling constraint")
     guess = support(known.view)

@@ -11,7 +11,7 @@ from typing import Any
 
 from .decode import TrackError
 from .layout import read_bob, read_layout
-from .setup import read_calibrate, read_region
+from .setup import read_apart, read_calibrate, read_region, read_sigma
 from .tags import is_tags, read_tags
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
@@ -26,7 +26,9 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
         A TOML file, or what would stand in one: ``disk_radius``, ``mark_distance`` [m], ``fps`` [1/s],
         ``pivot`` (two numbers [pixels]), ``refine`` (true or false), ``scale`` [pixels per metre],
         ``region`` (four numbers [pixels]), ``layout`` (a list of marks, each with ``at`` and ``colour``),
-        ``calibrate`` (a table of what is to be found in the film), ``bob`` (a colour), ``length`` [m].
+        ``calibrate`` (a table of what is to be found in the film), ``sigma`` (a table of standard errors of
+        what is said), ``apart`` (numbers of two marks, and their distance [m]), ``bob`` (a colour),
+        ``length`` [m].
     **given
         The same by name; None is not given.
 
@@ -40,7 +42,7 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     >>> settings({"disk_radius": 0.08, "pivot": [275, 310.5]}, disk_radius=0.075)
     {'disk_radius': 0.075, 'pivot': (275.0, 310.5)}
     """
-    where, said = ("config", config) if isinstance(config, Mapping) else _read(Path(config))
+    where, said = as_said(config)
     found = {}
     for key, value in said.items():
         if key not in _KINDS:
@@ -53,6 +55,11 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
         except (TypeError, ValueError, OverflowError):
             raise TrackError(f"{where}: {key} must be {kind}, not {value!r}") from None
     return {**found, **{key: value for key, value in given.items() if value is not None}}
+
+
+def as_said(config: Config) -> tuple[str, Mapping[str, Any]]:
+    """The name of a config, and what stands in it, unread."""
+    return ("config", config) if isinstance(config, Mapping) else _read(Path(config))
 
 
 def _read(path: Path) -> tuple[str, dict[str, Any]]:
@@ -108,6 +115,8 @@ _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "region": ("four numbers of pixels [u0, v0, u1, v1]", read_region),
     "layout": ("a list of marks", _layout),
     "calibrate": ("a table", read_calibrate),
+    "sigma": ("a table of standard errors", read_sigma),
+    "apart": ("two marks' numbers and a distance", read_apart),
     "bob": ("the colour of a pendulum's bob", _bob),
     "length": ("a positive number of metres", _positive),
 }

@@ -30,6 +30,7 @@ SLACK = 0.12  # of the arm by which a mark may miss its place
 STILL = 0.7  # share of the survey in which a patch that stands still is none of the marks
 STANDS = 1.5  # pixels by which it may seem to move
 SMALLEST, LARGEST = 0.015, 0.6  # side of a mark against the marks' reach
+MIDDLE = 0.2  # of the marks' reach: nearer to the centre a mark has no direction worth telling
 MOST = 40  # ways to see the disk in one picture that are kept
 
 
@@ -61,6 +62,11 @@ class Layout:
     def unit(self) -> NDArray[np.complex128]:
         """The places in units of `reach`."""
         return np.array(self.places, dtype=np.complex128) / self.reach
+
+    @cached_property
+    def first(self) -> int:
+        """Number of the first mark that is far enough from the centre to have a direction."""
+        return int(np.argmax(np.abs(self.unit) > MIDDLE))
 
     @cached_property
     def chroma(self) -> NDArray[np.float64]:

@@ -32,6 +32,7 @@ FOR_LENS = 90  # frames from which tilt and lens are measured
 LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
 SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
+SURE = 4.0  # standard errors of the layout by which it may be further off, up to as much again
 NEAR_RIM = 0.12  # of the radius by which the rim may be off where a layout says it is
 
 
@@ -138,7 +139,8 @@ def rim_span(setup: Setup) -> tuple[float, float]:
     if setup.layout.standard:
         return SPAN
     ratio = setup.radius / setup.layout.reach
-    return (1 - NEAR_RIM) * ratio, (1 + NEAR_RIM) * ratio
+    near = NEAR_RIM + min(SURE * setup.sigma.layout / setup.radius, NEAR_RIM)
+    return (1 - near) * ratio, (1 + near) * ratio
 
 
 def _contact(in_motion: list[Moving], look: Look) -> Contact | None:
@@ -174,9 +176,13 @@ def upward(places: NDArray[np.complex128], setup: Setup) -> complex:
     """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
 
     Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
-    all the marks of any other layout.
+    all the marks of any other layout. Of one that is said with an error the first mark says it.
     """
     body = setup.layout.unit
+    if setup.sigma.layout and setup.calibrate.layout:
+        first = setup.layout.first
+        turn = complex(places[first] / body[first])
+        return turn / abs(turn)
     if not setup.layout.standard:
         turn = complex(np.vdot(body - body.mean(), places - places.mean()))
         return turn / abs(turn)

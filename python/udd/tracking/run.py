@@ -39,7 +39,19 @@ from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
 from .scale import scale as size_of
-from .setup import Calibrate, Layout, Region, Setup, read_calibrate, read_layout, read_region
+from .setup import (
+    Apart,
+    Calibrate,
+    Layout,
+    Region,
+    Setup,
+    Sigma,
+    read_apart,
+    read_calibrate,
+    read_layout,
+    read_region,
+    read_sigma,
+)
 from .survey import Survey, slowest, survey
 from .tags import Tag, follow_tags, is_tags, layout_of, read_tags
 from .upright import Upright, upright
@@ -72,6 +84,8 @@ def track(
     scale: float | None = None,
     region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
+    sigma: Sigma | Mapping[str, float] | None = None,
+    apart: Apart | None = None,
     bob: str | Sequence[int] | None = None,
     length: float | None = None,
     config: Config | None = None,
@@ -107,6 +121,13 @@ def track(
     calibrate : mapping, optional
         What the film is asked for: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: found (so
         if not given); False: as given, or not there; a number (lens, readout [s], exposure [s]): just that.
+    sigma : mapping, optional
+        Standard errors of what is given: ``pivot`` [pixels], ``scale`` [pixels per metre], ``layout`` [m].
+        With one, it is a beginning that the film improves; where the film does not tell, it stands. Without,
+        it is exact.
+    apart : (int, int, float), optional
+        Numbers of two marks (from 1; of the standard ones that is red) and the distance of their middles [m],
+        measured on the disk: that sets the scale.
     bob : str or (r, g, b), optional
         The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
         picture's vertical, about the centre of the bob's path (or `pivot`).
@@ -162,6 +183,8 @@ def track(
         "scale": scale,
         "region": region,
         "calibrate": calibrate,
+        "sigma": sigma,
+        "apart": apart,
     }
     found = track_whole(video, config=config, progress=progress, **given, bob=bob, length=length)
     return found.measurement if isinstance(found, Tracking) else found
@@ -223,6 +246,8 @@ def track_in_detail(
     scale: float | None = None,
     region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
+    sigma: Sigma | Mapping[str, float] | None = None,
+    apart: Apart | None = None,
     progress: bool = False,
     watch: Callable[[Glimpse], object] | None = None,
 ) -> Tracking:
@@ -236,6 +261,8 @@ def track_in_detail(
         None if scale is None else _length(scale, "scale", "pixels per metre"),
         None if region is None else read_region(region),
         read_calibrate({} if calibrate is None else calibrate),
+        read_sigma({} if sigma is None else sigma),
+        None if apart is None else read_apart(apart),
     )
     film = Film(video, fps=fps)
     if tags:
@@ -317,9 +344,10 @@ def _tracking(
     look_over: Survey | None = None,
 ) -> Tracking:
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
-    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup.pivot)
+    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
     # Where the layout is taken as said, so is the centre.
-    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else 0.0
+    by_hand = 0.0 if rim is not None and setup.calibrate.layout else setup.sigma.layout
+    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else by_hand * camera.scale
     shared = [unforeseen(tracks, known.exposure**2 / 12)]
     turned = wobble(tracks, known.look)
     stood = upright(tracks, known.look, turned) if turned.amplitude else None
@@ -334,12 +362,13 @@ def _tracking(
             centre_sigma = rim.centre_sigma
         tracks, lean = stood.about(camera.pivot)
         known, shared = replace(known, look=stood.look), [*shared, lean]
-        camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup.pivot)
+        camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
     values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma, shared), camera)
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
-    vague = np.hypot(sigma[:, 0], sigma[:, 1]) > UNSURE * setup.radius
+    # by how much the centre is off that was said, all frames are: that makes none of them vague
+    vague = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2 > (UNSURE * setup.radius) ** 2
     for table in (values, sigma, rho):
         table[vague] = np.nan
     tracks.flag = [VAGUE if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]

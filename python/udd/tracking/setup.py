@@ -14,6 +14,7 @@ from .decode import Picture, TrackError
 from .layout import STANDARD, Layout, read_layout
 
 Region = tuple[float, float, float, float]
+Apart = tuple[int, int, float]  # numbers of two marks, from 1, and how far apart their middles are [m]
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,25 @@ class Calibrate:
 
 
 @dataclass(frozen=True)
+class Sigma:
+    """How well is known what is said: standard errors. 0: it is just that, and nothing in the film moves it.
+
+    Attributes
+    ----------
+    pivot : float
+        Of each of its coordinates [pixels].
+    scale : float
+        [pixels per metre]
+    layout : float
+        Of each coordinate of a mark [m].
+    """
+
+    pivot: float = 0.0
+    scale: float = 0.0
+    layout: float = 0.0
+
+
+@dataclass(frozen=True)
 class Setup:
     """All that may be said by hand."""
 
@@ -63,6 +83,8 @@ class Setup:
     scale: float | None = None  # pixels per metre
     region: Region | None = None  # u from, v from, u to, v to [pixels]
     calibrate: Calibrate = Calibrate()
+    sigma: Sigma = Sigma()
+    apart: Apart | None = None
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
@@ -71,6 +93,14 @@ class Setup:
         for name in ("scale", "pivot"):
             if not getattr(self.calibrate, name) and getattr(self, name) is None:
                 raise TrackError(f"{name} is not to be found in the film, so it must be given")
+            if getattr(self.sigma, name) and getattr(self, name) is None:
+                raise TrackError(f"sigma says how well {name} is known, but {name} is not given")
+        if self.apart is not None and max(self.apart[:2]) > len(self.layout.places):
+            raise TrackError(
+                f"apart: there is no mark {max(self.apart[:2])}: there are {len(self.layout.places)}"
+            )
+        if self.sigma.layout and self.layout.standard:
+            raise TrackError("sigma says how well layout is known, but layout is not given")
 
     def view(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Pixels inside the region, (height, width)."""
@@ -119,6 +149,47 @@ def read_calibrate(said: Any) -> Calibrate:
     return Calibrate(**said)
 
 
+def read_sigma(said: Any) -> Sigma:
+    """From a mapping of names to standard errors.
+
+    Raises
+    ------
+    TrackError
+        A name that there is not, or a value that is no standard error.
+    """
+    if isinstance(said, Sigma):
+        return said
+    if not isinstance(said, Mapping):
+        raise TrackError(f"sigma must be a table of {', '.join(_SIGMAS)}, not {said!r}")
+    for name, value in said.items():
+        if name not in _SIGMAS:
+            raise TrackError(f"sigma: there is no item {name!r}; there are {', '.join(_SIGMAS)}")
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not (number and math.isfinite(value) and value >= 0):
+            raise TrackError(f"sigma: {name} must be a standard error in {_SIGMAS[name]}, not {value!r}")
+    return Sigma(**{name: float(value) for name, value in said.items()})
+
+
+def read_apart(said: Any) -> Apart:
+    """Two marks' numbers and their distance.
+
+    Raises
+    ------
+    TrackError
+        It is something else.
+    """
+    try:
+        one, other, distance = said
+        numbers = all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in (one, other))
+        if not numbers or one == other or not 0 < float(distance) < math.inf:
+            raise ValueError
+    except (TypeError, ValueError):
+        raise TrackError(
+            f"apart must be the numbers of two marks (from 1) and their distance in m, not {said!r}"
+        ) from None
+    return one, other, float(distance)
+
+
 def read_region(said: Any) -> Region:
     """Four numbers: u and v of the upper left corner, and of the lower right [pixels]."""
     try:
@@ -131,6 +202,19 @@ def read_region(said: Any) -> Region:
 
 
 _ITEMS = tuple(f.name for f in fields(Calibrate))
+_SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
 _RANGES = {"lens": (-0.3, 0.3, ""), "readout": (-0.1, 0.1, " s"), "exposure": (0.0, 0.1, " s")}
 
-__all__ = ["Calibrate", "Layout", "Region", "Setup", "read_calibrate", "read_layout", "read_region"]
+__all__ = [
+    "Apart",
+    "Calibrate",
+    "Layout",
+    "Region",
+    "Setup",
+    "Sigma",
+    "read_apart",
+    "read_calibrate",
+    "read_layout",
+    "read_region",
+    "read_sigma",
+]
