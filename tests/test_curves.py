@@ -396,7 +396,8 @@ def test_a_surface_is_added_and_refitted():
     )
     located = fit_curve(base, found.curves[0], "surface")
     assert located.fit.converged
-    assert located.fit.chi2 < base.chi2 - 200
+    # Not by chi2: the plain model has to be held more loosely, where any model fits.
+    assert located.fit.evidence > base.evidence + 200
     # Where the record has been the surface is the law, but for what a torque over Y or over Z alone could do
     # as well (friction, a pivot that is off): the mixed second difference is left.
     y, z = np.meshgrid([-0.015, 0.015], [-0.02, 0.01], indexing="ij")

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use super::control::{Controller, initial_step};
-use super::landing::{Landed, Landing, NOISE, TARGETS, WALL, Watch};
+use super::landing::{Landed, Landing, NOISE, TARGETS, WALL, Watch, union};
 use super::method::{Method, Point, Trial};
 use super::runge_kutta::Dopri5;
 use super::saltation::pass;
@@ -555,11 +555,6 @@ fn is_zero<R: Real>(value: R) -> R::Mask {
 #[inline(always)]
 fn tick<R: Real>(lanes: R::Mask, count: R, by: f64) -> R {
     R::select(lanes, count + R::constant(by), count)
-}
-
-#[inline(always)]
-fn union<M: Mask>(masks: &[M; TARGETS]) -> M {
-    masks[1..].iter().fold(masks[0], |any, &mask| any.or(mask))
 }
 
 /// At a start exactly on a surface the side is the one the flow goes to.

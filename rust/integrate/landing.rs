@@ -11,11 +11,19 @@ use super::method::{MOST_PROBES, Method, Point};
 use super::root::bracketed;
 use crate::model::{MAX_SURFACES, System};
 use crate::scalar::{Mask, Real, Scalar};
-use crate::unroll::vector;
+use crate::unroll::{unroll, vector};
 
 /// What can be crossed: the switching surfaces, then the wall.
 pub const TARGETS: usize = MAX_SURFACES + 1;
 pub const WALL: usize = MAX_SURFACES;
+
+/// The lanes of any target. Unrolled by hand: a fold stays a function without vector instructions.
+#[inline(always)]
+pub fn union<M: Mask>(masks: &[M; TARGETS]) -> M {
+    let mut any = masks[0];
+    unroll!(j in 1..TARGETS => { any = any.or(masks[j]); });
+    any
+}
 
 /// A target's function counts as zero below this part of its largest value in the step.
 const ZERO: f64 = 1e-13;
@@ -222,7 +230,7 @@ impl<R: Real> Landing<R> {
     /// The lanes that are landing.
     #[inline(always)]
     pub fn lanes(&self) -> R::Mask {
-        self.on.iter().fold(R::mask(false), |any, &lanes| any.or(lanes))
+        union(&self.on)
     }
 
     /// Begins for the crossings found; `slope` is the function's on the polynomial.
