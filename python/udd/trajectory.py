@@ -232,7 +232,7 @@ def simulate(
     method : {"dopri5", "dop853", "taylor", "auto"}
         ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
         theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
-        solution's power series to order 12 or 18, by the tolerance; its dense output is as accurate as its
+        solution's power series to order 10 or 18, by the tolerance; its dense output is as accurate as its
         steps. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured.
     dense : bool
         Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.

@@ -65,6 +65,9 @@ pub trait Fleet: Sync {
 
     /// Whether packets are worth it.
     const PACKETS: bool;
+    /// Whether its numbers carry derivatives: packets are then of one register, since those of two leave too few
+    /// registers for them.
+    const DERIVATIVES: bool = false;
 
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
@@ -106,7 +109,12 @@ impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) {
-        if const { T::PACKETS && !matches!(V::ISA, Isa::Baseline) } {
+        if const { !T::PACKETS || matches!(V::ISA, Isa::Baseline) } {
+            return;
+        }
+        if const { T::DERIVATIVES && matches!(V::ISA, Isa::Avx2) } {
+            self.fleet.sail::<Packet<4, V>>(self.queue, self.yields);
+        } else {
             self.fleet.sail::<Packet<LANES, V>>(self.queue, self.yields);
         }
     }

@@ -92,6 +92,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
     type Yield = Exponents<D, N>;
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
+    const DERIVATIVES: bool = true;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Exponents<D, N>>) {

@@ -10,7 +10,7 @@ use crate::scalar::{Fan, Instructions, Isa, Mask, Packet, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
 /// The orders whose programs are unrolled, which takes long to compile.
-pub const LOW: usize = 12;
+pub const LOW: usize = 10;
 pub const HIGH: usize = 18;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.

@@ -20,7 +20,7 @@ def trajectory(rtol: float = 1.9e-9) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", final
 
 
-def starts(rtol: float = 3.9e-6) -> tuple[str, Any]:
+def starts(rtol: float = 7.3e-6) -> tuple[str, Any]:
     """The setting, and ``finals(starts, t)``."""
     import udd
 
@@ -47,7 +47,7 @@ def spectrum(rtol: float = 2.8e-8) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", run
 
 
-def sweep(rtol: float = 3.4e-5) -> tuple[str, Any]:
+def sweep(rtol: float = 3.9e-5) -> tuple[str, Any]:
     """The setting, and ``run(w, starts, transient, t)``: the exponents and the states at t."""
     import udd
     from udd import _core
