@@ -10,7 +10,7 @@ use super::saltation::pass;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
 use crate::model::{MAX_SURFACES, System, choose, sides_of};
 use crate::scalar::{Mask, Real, Scalar};
-use crate::unroll::vector;
+use crate::unroll::{unroll, vector};
 
 /// What the work was, summed over the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -442,15 +442,21 @@ where
 
     #[inline(always)]
     fn commit(&mut self, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
-        let t = S::Real::select(last, end, self.at.t + trial.size);
+        let mut t = S::Real::select(last, end, self.at.t + trial.size);
         if const { !M::SMOOTH } {
             let elapsed = lanes.and(is_zero(t - self.at.t).not());
             self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
         }
-        self.from = S::Real::select(lanes, self.at.t, self.from);
-        self.size = S::Real::select(lanes, trial.size, self.size);
-        self.at.t = S::Real::select(lanes, t, self.at.t);
-        self.at.x = vector!(S, D; n => S::select(lanes, trial.x[n], self.at.x[n]));
+        let (mut from, mut size, mut x) = (self.at.t, trial.size, trial.x);
+        // Without the question these are stores to some lanes, which AMD's processors take long for.
+        if lanes.not().any() {
+            from = S::Real::select(lanes, from, self.from);
+            size = S::Real::select(lanes, size, self.size);
+            t = S::Real::select(lanes, t, self.at.t);
+            unroll!(n in 0..D => { x[n] = S::select(lanes, x[n], self.at.x[n]); });
+        }
+        (self.from, self.size) = (from, size);
+        (self.at.t, self.at.x) = (t, x);
         self.method.accept(lanes);
         self.work.accepted = tick(lanes, self.work.accepted, 1.0);
     }
@@ -554,7 +560,7 @@ fn is_zero<R: Real>(value: R) -> R::Mask {
 
 #[inline(always)]
 fn tick<R: Real>(lanes: R::Mask, count: R, by: f64) -> R {
-    R::select(lanes, count + R::constant(by), count)
+    count + R::select(lanes, R::constant(by), R::zero())
 }
 
 /// At a start exactly on a surface the side is the one the flow goes to.

@@ -33,7 +33,7 @@ def entry(setting: str, final: Any, note: str = "") -> Entry:
     return Entry(setting, work, probe, note)
 
 
-def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
+def numba(rtol: float = 9e-10, atol: float = 9e-13) -> Entry:
     from numba import njit
 
     from peers import dop853

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 
-def trajectory(rtol: float = 1.9e-9) -> tuple[str, Any]:
+def trajectory(rtol: float = 1.4e-9) -> tuple[str, Any]:
     """The setting, and ``final(start, t)``."""
     import udd
 
@@ -99,7 +99,7 @@ def bifurcation(rtol: float = 2.8e-9) -> tuple[str, Any]:
     return f"Taylor, rtol {rtol:g}", run
 
 
-def disk(rtol: float = 2.0e-9) -> tuple[str, Any]:
+def disk(rtol: float = 3e-9) -> tuple[str, Any]:
     """The setting, and ``final(start, t)``."""
     import udd
     from peers import problems
