@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ from .calm import calm
 from .clicks import Clicks, check
 from .config import Config, as_said, settings
 from .decode import Film, TrackError
+from .setup import length_of
 from .survey import survey
 from .window import Window
 
@@ -71,7 +71,7 @@ def click(
     said = dict(as_said({} if config is None else config)[1])
     known = settings({} if config is None else config)
     if distance is not None:
-        distance = _distance(distance)
+        distance = length_of(distance, "distance")
     check(known, distance)
     film = Film(video, fps=known.get("fps"))
     figure = _figure()
@@ -89,16 +89,6 @@ def click(
     out = clicks.config()
     settings(out)
     return out
-
-
-def _distance(value: Any) -> float:
-    try:
-        length = float(value)
-    except (TypeError, ValueError):
-        raise TrackError(f"distance must be a number of metres, not {value!r}") from None
-    if not (math.isfinite(length) and length > 0):
-        raise TrackError(f"distance must be positive and finite, not {value!r}")
-    return length
 
 
 def _figure() -> Figure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -46,6 +45,7 @@ from .setup import (
     Region,
     Setup,
     Sigma,
+    length_of,
     read_apart,
     read_calibrate,
     read_layout,
@@ -224,12 +224,12 @@ def _pendulum(
     setup = Setup(
         pivot=pivot,
         layout=read_bob(bob),
-        scale=None if scale is None else _length(scale, "scale", "pixels per metre"),
+        scale=None if scale is None else length_of(scale, "scale", "pixels per metre"),
         region=None if region is None else read_region(region),
         calibrate=read_calibrate({} if calibrate is None else calibrate),
     )
     film = Film(video, fps=fps)
-    metres_long = None if length is None else _length(length, "length")
+    metres_long = None if length is None else length_of(length, "length")
     with tqdm(total=film.packets, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
         return track_bob(film, metres_long, setup, lambda _: bar.update())
 
@@ -254,11 +254,11 @@ def track_in_detail(
     """As `track`, with everything that was found on the way, in pixels; `watch` is told of each frame."""
     tags = read_tags(layout) if is_tags(layout) and not isinstance(layout, Layout) else ()
     setup = Setup(
-        _length(disk_radius, "disk_radius"),
-        None if mark_distance is None else _length(mark_distance, "mark_distance"),
+        length_of(disk_radius, "disk_radius"),
+        None if mark_distance is None else length_of(mark_distance, "mark_distance"),
         pivot,
         layout_of(tags) if tags else read_layout(layout),
-        None if scale is None else _length(scale, "scale", "pixels per metre"),
+        None if scale is None else length_of(scale, "scale", "pixels per metre"),
         None if region is None else read_region(region),
         read_calibrate({} if calibrate is None else calibrate),
         read_sigma({} if sigma is None else sigma),
@@ -400,16 +400,6 @@ def _rim_upright(look_over: Survey, stood: Upright, known: Known, rim: Outline, 
         return outline(frames, stood.look, known.view, rim_span(setup), short=short, across=stood.across)
     except TrackError:  # it was seen once, but not now
         return replace(rim, centre=0j)
-
-
-def _length(value: float, name: str, unit: str = "metres") -> float:
-    try:
-        length = float(value)
-    except (TypeError, ValueError):
-        raise TrackError(f"{name} must be a number of {unit}, not {value!r}") from None
-    if not (math.isfinite(length) and length > 0):
-        raise TrackError(f"{name} must be positive and finite, not {value!r}")
-    return length
 
 
 def _follow(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -132,11 +132,7 @@ def read_calibrate(said: Any) -> Calibrate:
     """
     if isinstance(said, Calibrate):
         return said
-    if not isinstance(said, Mapping):
-        raise TrackError(f"calibrate must be a table of {', '.join(_ITEMS)}, not {said!r}")
-    for name, value in said.items():
-        if name not in _ITEMS:
-            raise TrackError(f"calibrate: there is no item {name!r}; there are {', '.join(_ITEMS)}")
+    for name, value in _items(said, "calibrate", _ITEMS):
         if isinstance(value, bool):
             continue
         low, high, unit = _RANGES.get(name, (math.nan, math.nan, ""))
@@ -159,11 +155,7 @@ def read_sigma(said: Any) -> Sigma:
     """
     if isinstance(said, Sigma):
         return said
-    if not isinstance(said, Mapping):
-        raise TrackError(f"sigma must be a table of {', '.join(_SIGMAS)}, not {said!r}")
-    for name, value in said.items():
-        if name not in _SIGMAS:
-            raise TrackError(f"sigma: there is no item {name!r}; there are {', '.join(_SIGMAS)}")
+    for name, value in _items(said, "sigma", _SIGMAS):
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and math.isfinite(value) and value >= 0):
             raise TrackError(f"sigma: {name} must be a standard error in {_SIGMAS[name]}, not {value!r}")
@@ -218,3 +210,24 @@ __all__ = [
     "read_region",
     "read_sigma",
 ]
+
+
+def _items(said: Any, table: str, known: Collection[str]) -> Iterator[tuple[str, Any]]:
+    """The items of a table by name, each one that there is."""
+    if not isinstance(said, Mapping):
+        raise TrackError(f"{table} must be a table of {', '.join(known)}, not {said!r}")
+    for name, value in said.items():
+        if name not in known:
+            raise TrackError(f"{table}: there is no item {name!r}; there are {', '.join(known)}")
+        yield name, value
+
+
+def length_of(value: float, name: str, unit: str = "metres") -> float:
+    """A positive, finite number."""
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TrackError(f"{name} must be a number of {unit}, not {value!r}") from None
+    if not (math.isfinite(length) and length > 0):
+        raise TrackError(f"{name} must be positive and finite, not {value!r}")
+    return length
