@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .along import unit_covariance
+from .look import Look
 from .loop import Tracks
 
 Array = NDArray[np.float64]
@@ -15,54 +17,53 @@ ALIKE = 1000.0  # coordinates that stand for a usual frame where frames differ b
 GROUP = 40  # frames with like streaks from which their usual disagreement is taken
 
 
-def covariance(tracks: Tracks, centre_sigma: float = 0.0, shared: Sequence[Array] = ()) -> Array:
-    """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad, the centre known to so much.
+def covariance(tracks: Tracks, look: Look) -> Array:
+    """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad, of what moves each mark for itself.
 
     The fit's own covariance assumes independent pixels of known noise. Compression, lens and light
-    are neither; the marks' disagreement shows by how much: a rigid disk leaves 2 m - 3 of the 2 m
-    coordinates of m marks over. Where the centre is among them only the rim says; what it is off by turns
-    with the disk. `shared` are standard errors (n, 3), signed alike, of causes that move all marks together.
+    are neither; the marks' disagreement shows by how much, along their streaks and across: a rigid disk
+    leaves 2 m - 3 of the 2 m coordinates of m marks over.
     """
-    chi2, info = np.array(tracks.chi2), np.array(tracks.information)
+    chi2 = np.array(tracks.chi2)
     marks = np.isfinite(chi2).sum(axis=1)
     spare = np.maximum(2 * marks - 3, 0)
     total = np.nansum(chi2, axis=1)
-    usual, belief = _usual(total, spare, np.array(tracks.streak))
+    usual, belief, group = _usual(total, spare, np.array(tracks.streak))
     # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
     inflation = (belief * usual + total) / (belief + spare)
-    good = np.isfinite(info).all(axis=(1, 2))
-    out = np.full(info.shape, np.nan)
-    if good.any():
-        out[good] = inflation[good, None, None] * np.linalg.inv(info[good])
-        out[good] += np.diag([centre_sigma**2, centre_sigma**2, 0.0])
-        for cause in shared:
-            out[good] += cause[good, :, None] * cause[good, None, :]
-    return out
+    return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, group))
 
 
-def _usual(total: Array, spare: NDArray[np.int_], streak: Array) -> tuple[Array, Array]:
-    """Misfit per spare coordinate that frames with like streaks have, and the coordinates that is worth.
+def with_causes(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
+    """The covariance with causes that move all marks together, the centre known to so much.
+
+    Where the centre is among the marks only the rim says; what it is off by turns with the disk. `shared`
+    are standard errors (n, 3) of u, v and beta, signed alike.
+    """
+    out = covariance + np.diag([centre_sigma**2, centre_sigma**2, 0.0])
+    for cause in shared:
+        out = out + cause[:, :, None] * cause[:, None, :]
+    return np.asarray(out)
+
+
+def _usual(total: Array, spare: NDArray[np.int_], streak: Array) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Misfit per spare coordinate of frames with like streaks, the coordinates that is worth, their group.
 
     Of a variance that itself is drawn anew for each frame, 1 / variance being gamma distributed, the mean
     given a frame's misfit is that of both, and the less they scatter the more the usual one counts.
     """
     out, belief = np.ones(len(total)), np.full(len(total), ALIKE)
+    which = np.full(len(total), -1)
     known = np.flatnonzero(spare > 0)
     order = known[np.argsort(streak[known], kind="stable")]
     groups = np.array_split(order, max(1, min(6, len(order) // GROUP))) if len(order) else []
-    for group in groups:
+    for number, group in enumerate(groups):
         each = total[group] / spare[group]
         most = OUTLIER * float(np.median(each))
         each = np.minimum(each, most)
         level = float(np.sum(each * spare[group]) / spare[group].sum())
-        out[group], belief[group] = level, _belief(each / level, spare[group])
-    if groups:  # where two marks leave nothing over, the film as a whole has to do
-        rest = np.setdiff1d(np.arange(len(total)), known)
-        ends = np.array([streak[g].max() for g in groups])
-        first = np.array([g[0] for g in groups])
-        like = first[np.minimum(np.searchsorted(ends, streak[rest]), len(groups) - 1)]
-        out[rest], belief[rest] = out[like], belief[like]
-    return out, belief
+        out[group], belief[group], which[group] = level, _belief(each / level, spare[group]), number
+    return out, belief, which
 
 
 def _belief(each: Array, spare: NDArray[np.int_]) -> float:

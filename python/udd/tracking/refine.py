@@ -137,6 +137,23 @@ def unforeseen(tracks: Tracks, variance: float) -> Array:
     return factor * np.array([(centre.real, centre.imag, angle) for centre, angle in missed])
 
 
+def taken_to_middle(tracks: Tracks, covariance: Array, variance: float) -> Array:
+    """Covariances (n, 3, 3) of poses in the middle of paths whose bending poses with those errors told.
+
+    What the mean of a path is off its middle by is taken off, half the second derivative times `variance`
+    [s^2]. That derivative has the errors of the frame itself, against the sign, and of its neighbours: of a
+    shutter that is open all the time they make the pose worse by a tenth.
+    """
+    around, out = Around(tracks), covariance.copy()
+    good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
+    for k in np.flatnonzero(good):
+        near, weights = around.bending(int(k))
+        if good[near].all():
+            share = (near == k) - 0.5 * variance * weights
+            out[k] = np.einsum("j,jab->ab", share**2, covariance[near])
+    return out
+
+
 class Around:
     """A first pass, to be looked at around each of its frames."""
 
@@ -165,6 +182,13 @@ class Around:
         weights = np.linalg.inv(np.vander(x, len(x), increasing=True))[0]
         centre, angle = weights @ self.centre[near], weights @ self.angle[near]
         return complex(self.centre[k] - centre), float(self.angle[k] - angle)
+
+    def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
+        """Frames that tell the second derivative at a frame that is held, and their weights [1 / s^2]."""
+        near, x, held = self._near(k)
+        if len(near) < 3 or not held:
+            return np.array([k]), np.zeros(1)
+        return near, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
 
     def at(self, k: int) -> Local | None:
         """Polynomials through the nearest poses on both sides; None where too few are near."""

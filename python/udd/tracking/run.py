@@ -23,17 +23,18 @@ from .exposure import at_middle
 from .find import COLOURS, FEWEST, sightings
 from .flags import GONE, VAGUE, is_lost
 from .glimpse import Glimpse
+from .jumps import in_common
 from .layout import STANDARD, read_bob
 from .layout import sightings as matching
 from .learn import MOST
 from .learn import refine as learn
 from .look import Look, Pose
 from .loop import Known, Tracks, follow
-from .noise import covariance
+from .noise import covariance, with_causes
 from .prepare import SHARP, prepare, rim_span, upward
 from .quality import quality, remarks
 from .readout import readout
-from .refine import LONG, Around, drop_weak, unforeseen
+from .refine import LONG, Around, drop_weak, taken_to_middle, unforeseen
 from .refine import refine as second_pass
 from .result import Camera, left_the_wheels, metres, recount
 from .rgb import rgb
@@ -363,7 +364,10 @@ def _tracking(
         tracks, lean = stood.about(camera.pivot)
         known, shared = replace(known, look=stood.look), [*shared, lean]
         camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
-    values, sigma, rho = metres(tracks, covariance(tracks, centre_sigma, shared), camera)
+    own = taken_to_middle(tracks, covariance(tracks, known.look), known.exposure**2 / 12)
+    alike = in_common(tracks, with_causes(own, 0.0, shared), camera)
+    shared += [alike[:, None] * np.eye(3)[axis] for axis in (0, 1)]
+    values, sigma, rho = metres(tracks, with_causes(own, centre_sigma, shared), camera)
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan

@@ -1,0 +1,82 @@
+"""Errors that all marks of a frame share: their agreement hides these, jumps of the rolling disk do not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from .loop import Tracks
+from .result import Camera
+
+Array = NDArray[np.float64]
+GROUP = 80  # frames with like streaks that share as much
+CLOSE = 2.5  # usual intervals that three frames may span
+OUTLIER = 6.0  # times the median; a jump beyond is cut down to that: the disk may have slipped or been let go
+CUT = 1 - 2**-OUTLIER  # of their mean that squares of two normal coordinates keep so
+# standard error of such a mean, times the root of their number: second differences that overlap go together,
+# so that there are half as many
+SCATTER = 2**0.5
+HALVINGS = 40
+
+
+def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
+    """Standard error (n,) of u and of v that `covariance` lacks; 0 where it is less than its own error.
+
+    Codecs move all that goes the same way alike, by a vector or by leaving out what changes little. A disk
+    that rolls keeps (see `pivot`)  (c - p) exp(-i angle) - d * integral exp(-i angle) dt ; over three frames
+    in a row slip changes that evenly, and its second difference is what the frames' own errors make it.
+    """
+    out = np.zeros(len(tracks.t))
+    if not np.isfinite(camera.drive):
+        return out
+    seen, expected = _jumps(tracks, covariance, camera)
+    streak = np.array(tracks.streak)
+    known = np.flatnonzero(np.isfinite(seen))
+    order = known[np.argsort(streak[known], kind="stable")]
+    if len(order) < GROUP:
+        return out
+    groups = np.array_split(order, len(order) // GROUP if np.isfinite(streak[order]).all() else 1)
+    excess = np.array([_excess(seen[g], expected[g]) for g in groups])
+    ends = np.array([streak[g].max() for g in groups])
+    return np.asarray(np.sqrt(excess[np.minimum(np.searchsorted(ends, streak), len(groups) - 1)]))
+
+
+def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array]:
+    """Squares of second differences and what is expected [pixels^2], per frame; NaN where there is none."""
+    t, angle = np.array(tracks.t), np.array(tracks.angle)
+    away = np.array(tracks.centre) - camera.pivot
+    drive = complex(np.conj(camera.drive)) * camera.scale
+    good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
+    maps = np.zeros((len(t), 2, 3))  # of a pose's error to that of c - p where the angle is taken out
+    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
+    maps[:, 0, 2], maps[:, 1, 2] = away.imag, -away.real
+    own = np.einsum("nij,njk,nik->n", maps, covariance, maps)
+    usual = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+    seen, expected = np.full(len(t), np.nan), np.full(len(t), np.nan)
+    for k in range(1, len(t) - 1):
+        three = slice(k - 1, k + 2)
+        if not good[three].all() or t[k + 1] - t[k - 1] > CLOSE * usual:
+            continue
+        near = np.flatnonzero(good[max(0, k - 2) : k + 3]) + max(0, k - 2)
+        swept = CubicSpline(t[near], np.exp(-1j * (angle[near] - angle[k]))).antiderivative()(t[three])
+        rest = away[three] * np.exp(-1j * (angle[three] - angle[k])) - drive * swept
+        seen[k] = abs(rest[0] - 2 * rest[1] + rest[2]) ** 2 / 6
+        expected[k] = own[three] @ np.array([1, 4, 1]) / 6
+    return seen, expected
+
+
+def _excess(seen: Array, expected: Array) -> float:
+    """Variance of u and of v with which the mean is what it is expected to be."""
+
+    def ratio(more: float) -> float:
+        each = seen / (expected + 2 * more)
+        return float(np.minimum(each, OUTLIER * np.median(each)).mean()) / CUT
+
+    if ratio(0.0) < 1 + SCATTER / np.sqrt(len(seen)):
+        return 0.0
+    low, high = 0.0, float(seen.max())
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if ratio(middle) > 1 else (low, middle)
+    return high
