@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,16 @@ from udd.film.light import to_light
 from udd.film.sprite import MARKS
 from udd.tracking.decode import Picture, light_of_codes
 from udd.tracking.find import BODY, Sight
+from udd.tracking.jumps import in_common
+from udd.tracking.look import Look, Mark, Pose
+from udd.tracking.loop import Tracks, append
+from udd.tracking.marks import Sighting
 from udd.tracking.mixing import mixed
-from udd.tracking.noise import _belief
+from udd.tracking.noise import _belief, covariance
+from udd.tracking.pose import Fit
+from udd.tracking.refine import taken_to_middle
+from udd.tracking.result import Camera
+from udd.tracking.rigid import solve
 from udd.tracking.shade import evenness
 
 WEIGHT = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
@@ -98,3 +107,78 @@ def test_a_wobbling_disk_is_measured_as_if_it_did_not(tmp_path: Path) -> None:
     off[:, 2] -= 2 * np.pi * np.round(np.median(off[:, 2]) / (2 * np.pi))
     assert np.sqrt(np.nanmean(off[:, :2] ** 2)) < 40e-6  # 0.15 mm where the foreshortening is not undone
     assert np.sqrt(np.nanmean(off[:, 2] ** 2)) < 0.4e-3
+
+
+ROLLING = udd.simulate(udd.Disk(0.039), np.arange(0, 14, 0.005), [1, 0.02, -0.02, 0.3], dense=True)
+SCALE, PIVOT = 1000.0, 300 + 300j
+MARKS = [Mark(60 * 1j**k, (10.0, 10.0), 0.0, -100.0) for k in range(4)]
+LOOK = Look(MARKS, 0.8, 1.0, light_of_codes(True), 100.0)
+
+
+def rolled(rng: np.random.Generator, along: float, across: float, common: float) -> tuple[Tracks, np.ndarray]:
+    """Poses of a rolling disk from marks with such errors [pixels], 0.01 being assumed; errors of the poses."""
+    t = np.arange(0, 13.9, 0.04)
+    state = ROLLING(t)
+    tracks, off = Tracks(*([] for _ in fields(Tracks))), []
+    speed = SCALE * np.gradient(state[:, 1] - 1j * state[:, 2], t)
+    for k in range(len(t)):
+        centre, angle = PIVOT + SCALE * complex(state[k, 1], -state[k, 2]), float(state[k, 3])
+        arms = LOOK.places * np.exp(1j * angle)
+        moving = speed[k] + 1j * state[k, 0] * arms
+        error = moving / np.abs(moving) * (along * rng.normal(size=4) + 1j * across * rng.normal(size=4))
+        error = error + common * complex(*rng.normal(size=2))
+        sightings = [
+            Sighting(np.array([z.real, z.imag]), np.eye(2) / 0.01**2, 1.0, 1.0, 0.0, 1.0, (0, 0, 0, 0))
+            for z in error
+        ]
+        step = solve(MARKS, sightings, angle, np.ones(4))
+        assert step is not None
+        off.append(step.change)
+        pose = Pose(centre + complex(*step.change[:2]), angle + float(step.change[2]))
+        streak = 0.01 * float(np.abs(moving).max())
+        append(tracks, float(t[k]), "", Fit(step, sightings, np.ones(4, dtype=bool), 0.0), pose, streak, 4)
+    return tracks, np.array(off)
+
+
+def covers(off: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Rms of normalised errors of u, v and beta, and of all three."""
+    each = (off**2 / np.einsum("nii->ni", covariance)).mean(axis=0)
+    whole = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariance), off).mean() / 3
+    return np.sqrt([*each, whole])
+
+
+def test_errors_along_streaks_and_across_are_told_apart() -> None:
+    tracks, off = rolled(np.random.default_rng(2), 0.03, 0.01, 0.0)
+    # 350 frames tell an rms to 0.04; with one variance for both directions 1.3 for beta
+    assert np.abs(covers(off, covariance(tracks, LOOK)) - 1).max() < 0.12
+
+
+def test_what_a_path_is_bent_by_has_errors_of_its_own() -> None:
+    tracks, _ = rolled(np.random.default_rng(3), 0.01, 0.01, 0.0)
+    own = np.tile(np.eye(3), (len(tracks.t), 1, 1))
+    found = taken_to_middle(tracks, own, 0.04**2 / 12)
+    weights = np.array([-1 / 12, 4 / 3, -5 / 2, 4 / 3, -1 / 12]) / 24  # of a quartic's second derivative
+    expected = ((np.array([0, 0, 1, 0, 0]) - weights) ** 2).sum()
+    assert 1.2 < expected < 1.3
+    np.testing.assert_allclose(found[5:-5], expected * own[5:-5], atol=1e-9)
+    np.testing.assert_array_equal(taken_to_middle(tracks, own, 0.0), own)
+
+
+def test_what_all_marks_share_is_seen_where_the_disk_jumps() -> None:
+    camera = Camera(SCALE, 1.0, "given", PIVOT, 0.0, "given", 0.039j)
+    tracks, off = rolled(np.random.default_rng(4), 0.01, 0.01, 0.02)
+    own = covariance(tracks, LOOK)
+    found = in_common(tracks, own, camera)
+    assert 0.015 < np.median(found) < 0.025  # 80 frames tell it to a tenth
+    both = own + (found**2)[:, None, None] * np.diag([1.0, 1.0, 0.0])
+    assert covers(off, own)[3] > 2.5
+    assert abs(covers(off, both)[3] - 1) < 0.15
+
+
+def test_slip_is_no_error_that_all_marks_share() -> None:
+    camera = Camera(SCALE, 1.0, "given", PIVOT, 0.0, "given", 0.039j)
+    tracks, _ = rolled(np.random.default_rng(5), 0.01, 0.01, 0.0)
+    # 5 pixels to and fro, within a second; all that slips turns with the disk about the contact
+    slip = 5 * np.sin(np.array(tracks.t)) * np.exp(1j * np.array(tracks.angle))
+    slipped = replace(tracks, centre=list(np.array(tracks.centre) + slip))
+    assert np.median(in_common(slipped, covariance(tracks, LOOK), camera)) < 0.003
