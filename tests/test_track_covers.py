@@ -17,11 +17,12 @@ from udd.film import Defects
 from udd.film.light import to_light
 from udd.film.sprite import MARKS
 from udd.tracking.decode import Picture, light_of_codes
+from udd.tracking.exposure import again
 from udd.tracking.find import BODY, Sight
 from udd.tracking.jumps import in_common
-from udd.tracking.look import Look, Mark, Pose
+from udd.tracking.look import Look, Mark, Motion, Pose
 from udd.tracking.loop import Tracks, append
-from udd.tracking.marks import Sighting
+from udd.tracking.marks import Sighting, coverage
 from udd.tracking.mixing import mixed
 from udd.tracking.noise import _belief, covariance
 from udd.tracking.pose import Fit
@@ -116,7 +117,7 @@ LOOK = Look(MARKS, 0.8, 1.0, light_of_codes(True), 100.0)
 
 
 def rolled(rng: np.random.Generator, along: float, across: float, common: float) -> tuple[Tracks, np.ndarray]:
-    """Poses of a rolling disk from marks with such errors [pixels], 0.01 being assumed; errors of the poses."""
+    """Poses of a rolling disk from marks with such errors [pixels], 0.01 being assumed; what they are off."""
     t = np.arange(0, 13.9, 0.04)
     state = ROLLING(t)
     tracks, off = Tracks(*([] for _ in fields(Tracks))), []
@@ -182,3 +183,23 @@ def test_slip_is_no_error_that_all_marks_share() -> None:
     slip = 5 * np.sin(np.array(tracks.t)) * np.exp(1j * np.array(tracks.angle))
     slipped = replace(tracks, centre=list(np.array(tracks.centre) + slip))
     assert np.median(in_common(slipped, covariance(tracks, LOOK), camera)) < 0.003
+
+
+def test_an_exposure_is_found_from_a_first_estimate_of_a_third() -> None:
+    rng = np.random.default_rng(6)
+    frames = []
+    for _ in range(8):
+        pose, rate = (
+            Pose(complex(*rng.uniform(95, 105, 2)), rng.uniform(-3, 3)),
+            complex(*rng.normal(0, 700, 2)),
+        )
+        spin, amount = rng.normal(0, 10), np.full((200, 200), LOOK.light[230])
+        for mark in MARKS:
+            seen = coverage(
+                mark, pose.centre, pose.angle, Motion(0.01 * rate, 0.01 * spin), 0.8, (0, 200, 0, 200)
+            )
+            amount += mark.level * seen
+        codes = np.searchsorted(LOOK.light, amount).astype(np.uint8)
+        frames.append((codes, pose, lambda T, r=rate, s=spin: Motion(r * T, s * T)))
+    found = again(frames, 0.003, LOOK, np.ones((200, 200), dtype=bool))
+    assert found == pytest.approx(0.01, rel=0.03)  # codes are whole numbers, streaks ten pixels

@@ -17,7 +17,8 @@ from .survey import Moving
 SHARES = np.linspace(0.0, 1.0, 9)  # of the frame interval
 FASTEST = 12
 MOST = 36  # frames from which it is measured again
-ROUNDS = 5
+ROUNDS = 20
+STEP = 0.1  # of the exposure's logarithm in one of them: the first estimate may be off by half
 SMALL = 0.02  # relative change over which slopes are taken
 WORSE = 5.0  # times the least misfit
 PARABOLA = 0.2  # of the step between shares, to which its vertex is good
@@ -83,7 +84,7 @@ def again(
         if not each[:, 1].sum() > 0:
             return open_for
         step = float(each[:, 0].sum() / each[:, 1].sum())
-        best *= float(np.exp(np.clip(step, -0.1, 0.1)))
+        best *= float(np.exp(np.clip(step, -STEP, STEP)))
         if abs(step) < 1e-3:
             break
     return best
