@@ -366,7 +366,7 @@ def _tracking(
         camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
     own = taken_to_middle(tracks, covariance(tracks, known.look), known.exposure**2 / 12)
     alike = in_common(tracks, with_causes(own, 0.0, shared), camera)
-    shared += [alike[:, None] * np.eye(3)[axis] for axis in (0, 1)]
+    shared += [alike[:, None] * np.eye(3)[axis] for axis in (0, 1)]  # u and v have causes of their own
     values, sigma, rho = metres(tracks, with_causes(own, centre_sigma, shared), camera)
     gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
