@@ -119,13 +119,14 @@ def still(
 
 
 def _shrink(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The mean light of each pixel: what OpenCV's area mode is where whole pixels go into one."""
     h, w = image.shape[0] // OVER, image.shape[1] // OVER
-    return np.asarray(image.reshape(h, OVER, w, OVER, 3).mean(axis=(1, 3)))
+    return np.asarray(cv2.resize(image, (w, h), interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
 @lru_cache(maxsize=4)
-def _empty(support: bool) -> NDArray[np.float32]:
-    return _shrink(still(0, 0, 0, disk=False, support=support))
+def _empty(support: bool) -> NDArray[np.uint8]:
+    return codes(_shrink(still(0, 0, 0, disk=False, support=support)))
 
 
 def frame(
@@ -148,11 +149,10 @@ def frame(
     )
     steps = 1 if exposure == 0 else 5
     times = t + exposure * ((np.arange(steps) + 0.5) / steps - 0.5)
-    picture = _empty(support).copy()
-    picture[box[0] : box[1], box[2] : box[3]] = sum(
-        _shrink(still(*motion.at(float(x)), box, marks=marks, support=support)) for x in times
-    ) / np.float32(steps)
-    noisy = codes(picture).astype(float) + rng.normal(0, 1.5, picture.shape)
+    picture = _empty(support).astype(float)
+    total = sum(still(*motion.at(float(x)), box, marks=marks, support=support) for x in times)
+    picture[box[0] : box[1], box[2] : box[3]] = codes(_shrink(np.asarray(total) / np.float32(steps)))
+    noisy = picture + rng.normal(0, 1.5, picture.shape)
     return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
 
 
