@@ -63,6 +63,8 @@ def codes(x: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.clip(np.round(255 * y), 0, 255).astype(np.uint8)
 
 
+BOB = light((200, 38, 44))  # of a plain pendulum
+
 Box = tuple[int, int, int, int]  # rows from, to, columns from, to [pixels]
 
 
@@ -191,12 +193,12 @@ def swinging(
     high = np.ceil(np.maximum(ends.max(axis=0) + radius + 3, np.array(pivot) + 3)).astype(int)
     (c0, r0), (c1, r1) = np.maximum(low, 0), np.minimum(high, (WIDTH, HEIGHT))
     shift = 4
-    paint = light((200, 38, 44)).tolist()
+    paint = BOB.tolist()
 
     def at(u: float, v: float) -> list[int]:
         return [round((OVER * z + (OVER - 1) / 2) * 2**shift) for z in (u - c0, v - r0)]
 
-    total = np.zeros((r1 - r0, c1 - c0, 3), dtype=np.float32)
+    total = np.zeros(((r1 - r0) * OVER, (c1 - c0) * OVER, 3), dtype=np.float32)
     for u, v in ends:
         image = np.broadcast_to(light(WALL), ((r1 - r0) * OVER, (c1 - c0) * OVER, 3)).copy()
         if clutter:
@@ -204,10 +206,16 @@ def swinging(
         cv2.line(image, at(*pivot), at(u, v), light((90, 92, 95)).tolist(), 2 * OVER, cv2.LINE_AA, shift)
         size = round((radius * OVER - 0.5) * 2**shift)  # cv2 fills what the outline touches
         cv2.circle(image, at(u, v), size, paint, -1, cv2.LINE_8, shift)
-        total += _shrink(image)
+        total += image
+    picture = _wall(clutter).astype(float)
+    picture[r0:r1, c0:c1] = codes(_shrink(total / np.float32(len(ends))))
+    noisy = picture + rng.normal(0, 1.5, picture.shape)
+    return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
+
+
+@lru_cache(maxsize=2)
+def _wall(clutter: bool) -> NDArray[np.uint8]:
     picture = np.broadcast_to(light(WALL), (HEIGHT, WIDTH, 3)).copy()
     if clutter:
-        cv2.circle(picture, (40, 350), 20, paint, -1)
-    picture[r0:r1, c0:c1] = total / np.float32(len(ends))
-    noisy = codes(picture).astype(float) + rng.normal(0, 1.5, picture.shape)
-    return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
+        cv2.circle(picture, (40, 350), 20, BOB.tolist(), -1)
+    return codes(picture)
