@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import signal
 from pathlib import Path
 
@@ -9,6 +10,13 @@ import pytest
 matplotlib.use("Agg")  # no test opens a window
 # A shell that starts the tests in the background has them ignore Ctrl-C, which some tests press.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kept(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """What a test process has discovered is there for the others: pytest-xdist gives each a folder in one."""
+    own = tmp_path_factory.getbasetemp()
+    os.environ["UDD_DISCOVERED"] = str(own.parent if "PYTEST_XDIST_WORKER" in os.environ else own)
 
 
 @pytest.fixture(scope="session")

@@ -63,6 +63,8 @@ def codes(x: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.clip(np.round(255 * y), 0, 255).astype(np.uint8)
 
 
+BOB = light((200, 38, 44))  # of a plain pendulum
+
 Box = tuple[int, int, int, int]  # rows from, to, columns from, to [pixels]
 
 
@@ -119,13 +121,14 @@ def still(
 
 
 def _shrink(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The mean light of each pixel: what OpenCV's area mode is where whole pixels go into one."""
     h, w = image.shape[0] // OVER, image.shape[1] // OVER
-    return np.asarray(image.reshape(h, OVER, w, OVER, 3).mean(axis=(1, 3)))
+    return np.asarray(cv2.resize(image, (w, h), interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
 @lru_cache(maxsize=4)
-def _empty(support: bool) -> NDArray[np.float32]:
-    return _shrink(still(0, 0, 0, disk=False, support=support))
+def _empty(support: bool) -> NDArray[np.uint8]:
+    return codes(_shrink(still(0, 0, 0, disk=False, support=support)))
 
 
 def frame(
@@ -148,11 +151,10 @@ def frame(
     )
     steps = 1 if exposure == 0 else 5
     times = t + exposure * ((np.arange(steps) + 0.5) / steps - 0.5)
-    picture = _empty(support).copy()
-    picture[box[0] : box[1], box[2] : box[3]] = sum(
-        _shrink(still(*motion.at(float(x)), box, marks=marks, support=support)) for x in times
-    ) / np.float32(steps)
-    noisy = codes(picture).astype(float) + rng.normal(0, 1.5, picture.shape)
+    picture = _empty(support).astype(float)
+    total = sum(still(*motion.at(float(x)), box, marks=marks, support=support) for x in times)
+    picture[box[0] : box[1], box[2] : box[3]] = codes(_shrink(np.asarray(total) / np.float32(steps)))
+    noisy = picture + rng.normal(0, 1.5, picture.shape)
     return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
 
 
@@ -191,12 +193,12 @@ def swinging(
     high = np.ceil(np.maximum(ends.max(axis=0) + radius + 3, np.array(pivot) + 3)).astype(int)
     (c0, r0), (c1, r1) = np.maximum(low, 0), np.minimum(high, (WIDTH, HEIGHT))
     shift = 4
-    paint = light((200, 38, 44)).tolist()
+    paint = BOB.tolist()
 
     def at(u: float, v: float) -> list[int]:
         return [round((OVER * z + (OVER - 1) / 2) * 2**shift) for z in (u - c0, v - r0)]
 
-    total = np.zeros((r1 - r0, c1 - c0, 3), dtype=np.float32)
+    total = np.zeros(((r1 - r0) * OVER, (c1 - c0) * OVER, 3), dtype=np.float32)
     for u, v in ends:
         image = np.broadcast_to(light(WALL), ((r1 - r0) * OVER, (c1 - c0) * OVER, 3)).copy()
         if clutter:
@@ -204,10 +206,16 @@ def swinging(
         cv2.line(image, at(*pivot), at(u, v), light((90, 92, 95)).tolist(), 2 * OVER, cv2.LINE_AA, shift)
         size = round((radius * OVER - 0.5) * 2**shift)  # cv2 fills what the outline touches
         cv2.circle(image, at(u, v), size, paint, -1, cv2.LINE_8, shift)
-        total += _shrink(image)
+        total += image
+    picture = _wall(clutter).astype(float)
+    picture[r0:r1, c0:c1] = codes(_shrink(total / np.float32(len(ends))))
+    noisy = picture + rng.normal(0, 1.5, picture.shape)
+    return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
+
+
+@lru_cache(maxsize=2)
+def _wall(clutter: bool) -> NDArray[np.uint8]:
     picture = np.broadcast_to(light(WALL), (HEIGHT, WIDTH, 3)).copy()
     if clutter:
-        cv2.circle(picture, (40, 350), 20, paint, -1)
-    picture[r0:r1, c0:c1] = total / np.float32(len(ends))
-    noisy = codes(picture).astype(float) + rng.normal(0, 1.5, picture.shape)
-    return np.asarray(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
+        cv2.circle(picture, (40, 350), 20, BOB.tolist(), -1)
+    return codes(picture)

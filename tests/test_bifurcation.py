@@ -312,7 +312,7 @@ def test_without_xarray_one_sentence_says_how_to_get_it(monkeypatch: pytest.Monk
 @pytest.mark.skipif(os.name == "nt", reason="signals to a process of its own")
 @pytest.mark.parametrize("path", ["independent", "both"])
 def test_ctrl_c_gives_what_is_finished(path: str) -> None:
-    timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     try:
         with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):

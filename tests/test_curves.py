@@ -83,13 +83,14 @@ def test_nothing_is_located_where_nothing_is_missing(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", unmodelled.CASES, ids=lambda case: case.name)
 def test_bands_hold_the_law(case):
-    """Over 20 records at 0.4 of the law's size.
+    """Over 12 records at 0.4 of the law's size.
 
     A band of a smoothness prior holds its share of the curves that are as smooth everywhere; a bump is not,
-    and is rounded off: hence 80 %. The three others measured 96 % and more.
+    and is rounded off: hence 80 %. The three others measured 98 % and more. The share scatters by 12 % from
+    record to record of the bump, by 2 % of the others: these records give its mean to 3 % and 1 %.
     """
     inside = []
-    for seed in range(20):
+    for seed in range(12):
         fit = udd.fit(unmodelled.record(weak(case, 0.4), seed), udd.Disk(W))
         only = scan_curves(fit, only=lambda slot, own: (slot.title, own[0].name) == case.found[0])
         curve = distinct(refined(only.curves[0], fit), fit)

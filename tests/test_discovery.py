@@ -8,6 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
+import discovered
 import simulated
 import udd
 from udd.discovery.candidates import ripples
@@ -18,7 +19,7 @@ from udd.errors import FitError
 E = udd.effects
 
 
-def discovered(effect: udd.effects.Effect | None, seed: int, duration: float = 40.0) -> udd.Discovery:
+def search(effect: udd.effects.Effect | None, seed: int, duration: float = 40.0) -> udd.Discovery:
     """What is found in a record whose device has an effect that the search is not told."""
     truth = udd.Disk(0.045, effects=[] if effect is None else [effect])
     measured, _states = simulated.film(truth, np.random.default_rng(seed), duration)
@@ -40,7 +41,7 @@ def discovered(effect: udd.effects.Effect | None, seed: int, duration: float = 4
     ids=lambda e: f"{e.name}-{e.momentum}",
 )
 def test_an_undeclared_effect_is_named(effect):
-    found = discovered(effect, seed=11)
+    found = search(effect, seed=11)
     if effect.name == "tilt":
         # Seen by a camera that may be turned, it is a drive that pulls to the side, u = a: both are named.
         assert [a.effect.expression[:4] for a in found.alternatives] == ["u = "]
@@ -77,7 +78,7 @@ def test_an_undeclared_effect_is_named(effect):
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_nothing_is_found_where_nothing_is_missing(seed):
-    found = discovered(None, seed)
+    found = search(None, seed)
     assert found.verdict == "nothing missing"
     assert found.effects == []
     assert found.alternatives == []
@@ -88,11 +89,11 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
 def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, found):
     # With all parameters held, their errors may hide what the held-out frames gain; fitted too, they show it.
     monkeypatch.setattr(Search, "_held_ratio", lambda *_: ratio)
-    assert bool(discovered(E.quadratic_drag(c=5e-4), seed=12, duration=20.0).effects) == found
+    assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=20.0).effects) == found
 
 
 def test_a_shape_between_those_tried_is_found():
-    found = discovered(E.stribeck(c=0.01, fade=1.7), seed=1, duration=60.0)
+    found = search(E.stribeck(c=0.01, fade=1.7), seed=1, duration=60.0)
     (effect,) = found.effects
     assert effect.title == "Stribeck friction"
     for name, value in (("c", 0.01), ("fade", 1.7)):
@@ -115,7 +116,7 @@ def test_what_a_film_gets_wrong_is_no_effect():
 
 
 def test_an_effect_outside_the_library_is_located_and_written_down():
-    found = discovered(E.uneven_disk(a=0.03, b=0.0, n=7), seed=4)
+    found = discovered.outside()
     (effect,) = found.effects
     assert effect.curve.title == "torque as a function of beta"
     # Seven waves a turn are in no library; the sign and the phase are the disk's.
@@ -180,7 +181,7 @@ def test_the_strongest_ripple_is_found_between_lines_too(shift):
 
 
 def test_a_result_is_data():
-    found = discovered(E.quadratic_drag(c=5e-4), seed=12, duration=20.0)
+    found = search(E.quadratic_drag(c=5e-4), seed=12, duration=20.0)
     text = json.dumps(found.to_dict(), allow_nan=True)
     assert json.dumps(pickle.loads(pickle.dumps(found)).to_dict(), allow_nan=True) == text
     assert json.loads(text)["effects"][0]["parameters"]["c"]["value"] == found.effects[0].parameters["c"]

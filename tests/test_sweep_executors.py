@@ -36,21 +36,41 @@ from udd.errors import IncompleteWarning, UddError
 xr = pytest.importorskip("xarray", reason="sweeps need the extra 'scale'")
 zarr = pytest.importorskip("zarr", reason="sweeps need the extra 'scale'")
 
+Whole = Callable[[udd.SweepSpec], tuple[Any, dict[str, bytes]]]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    """What an undisturbed sweep gives, and the files of its store: each once for all tests."""
+    known: dict[str, tuple[Any, dict[str, bytes]]] = {}
+
+    def get(spec: udd.SweepSpec) -> tuple[Any, dict[str, bytes]]:
+        text = spec.to_json()
+        if text not in known:
+            store = tmp_path_factory.mktemp("whole") / "whole.zarr"
+            known[text] = udd.sweep(spec, store=store), files(store)
+        return known[text]
+
+    return get
+
+
 # --- the same bytes, whoever does the work
 
 
 @pytest.mark.parametrize(
     "executor", [lambda: ThreadPoolExecutor(3), spawned, dask_executor], ids=["threads", "spawn", "dask"]
 )
-def test_every_executor_gives_the_same_bytes(executor: Callable[[], Any], tmp_path: Path) -> None:
+def test_every_executor_gives_the_same_bytes(
+    executor: Callable[[], Any], tmp_path: Path, whole: Whole
+) -> None:
     with executor() as workers:
         for k, spec in enumerate((disk_spec(), exponents_spec())):
-            alone, spread = tmp_path / f"alone{k}.zarr", tmp_path / f"spread{k}.zarr"
-            in_memory = udd.sweep(spec)
-            assert udd.sweep(spec, store=alone).identical(in_memory)
+            stored, alone = whole(spec)
+            in_memory, spread = udd.sweep(spec), tmp_path / f"spread{k}.zarr"
+            assert stored.identical(in_memory)
             assert udd.sweep(spec, workers, store=spread).identical(in_memory)
             assert udd.sweep(spec, workers).identical(in_memory)
-            assert files(spread) == files(alone)
+            assert files(spread) == alone
 
 
 def test_a_group_will_do_as_a_store() -> None:
@@ -71,14 +91,13 @@ def test_workers_that_do_not_reach_the_store_are_found_out() -> None:
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_and_resumed_it_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_killed_at_any_moment_and_resumed_it_gives_the_same_bytes(tmp_path: Path, whole: Whole) -> None:
     # Runs so short that nearly all of the time goes into writing.
     spec = disk_spec(chunk=2, n=14)
-    udd.sweep(spec, store=tmp_path / "whole.zarr")
     call, store = command(spec, tmp_path), tmp_path / "killed.zarr"
     chance = random.Random(3)
     landed = []
-    for turn in range(7):
+    for turn in range(5):
         process = subprocess.Popen(call, stderr=subprocess.PIPE)
         # The first two kills are meant for the template.
         begun = flags(store)
@@ -96,7 +115,7 @@ def test_killed_at_any_moment_and_resumed_it_gives_the_same_bytes(tmp_path: Path
     assert landed[-1] < 196  # the last kill came before the end
     assert landed[-1] > landed[2] > 0
     subprocess.run(call, check=True, timeout=120, capture_output=True)
-    assert files(store) == files(tmp_path / "whole.zarr")
+    assert files(store) == whole(spec)[1]
 
 
 STOPPED = """
@@ -131,9 +150,11 @@ if __name__ == "__main__":
 """
 
 
-# 60 chunks of a few hundredths of a second each.
-_EXPONENTS = exponents_spec(n=60, t=1000.0, chunk=1)
-_RUNS = udd.SweepSpec("outcome", udd.DLE(1.0), {"w": np.linspace(0.5, 5, 60)}, options={"t": 3e4}, chunk=1)
+# Chunks of a few hundredths of a second each.
+_CHUNKS = 30
+_EXPONENTS = exponents_spec(n=_CHUNKS, t=1000.0, chunk=1)
+_DRIVES = {"w": np.linspace(0.5, 5, _CHUNKS)}
+_RUNS = udd.SweepSpec("outcome", udd.DLE(1.0), _DRIVES, options={"t": 3e4}, chunk=1)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +163,7 @@ _RUNS = udd.SweepSpec("outcome", udd.DLE(1.0), {"w": np.linspace(0.5, 5, 60)}, o
     ids=["here", "here, runs", "threads", "spawn"],
 )
 def test_ctrl_c_keeps_what_is_finished_and_cancels_the_rest(
-    kind: str, spec: udd.SweepSpec, tmp_path: Path
+    kind: str, spec: udd.SweepSpec, tmp_path: Path, whole: Whole
 ) -> None:
     script, store = tmp_path / "stopped.py", tmp_path / "a.zarr"
     script.write_text(STOPPED.replace("{{", "{").replace("}}", "}"))
@@ -155,14 +176,13 @@ def test_ctrl_c_keeps_what_is_finished_and_cancels_the_rest(
     finished, missing = map(int, counts.split())
     assert finished >= 1
     assert missing >= 1
-    assert finished + missing == 60
+    assert finished + missing == _CHUNKS
     udd.sweep(spec, store=store)
-    udd.sweep(spec, store=tmp_path / "whole.zarr")
-    assert files(store) == files(tmp_path / "whole.zarr")
+    assert files(store) == whole(spec)[1]
 
 
 def test_the_command_stopped_by_ctrl_c_says_so(tmp_path: Path) -> None:
-    spec = exponents_spec(n=60, t=1000.0, chunk=1)
+    spec = _EXPONENTS
     call, store = command(spec, tmp_path), tmp_path / "killed.zarr"
     process = subprocess.Popen([*call, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for(lambda: flags(store) > 2, "flags", process)
@@ -226,7 +246,7 @@ def test_a_mistake_in_the_work_is_not_taken_for_a_death() -> None:
         udd.sweep(disk_spec(), workers)
 
 
-def test_a_pool_that_breaks_ends_the_sweep_and_another_goes_on(tmp_path: Path) -> None:
+def test_a_pool_that_breaks_ends_the_sweep_and_another_goes_on(tmp_path: Path, whole: Whole) -> None:
     spec, store = exponents_spec(n=50, chunk=1), tmp_path / "a.zarr"
     pool = spawned()
 
@@ -245,8 +265,7 @@ def test_a_pool_that_breaks_ends_the_sweep_and_another_goes_on(tmp_path: Path) -
     assert 0 < (found["outcome"] == 0).sum() < 50
     with spawned() as fresh:
         udd.sweep(spec, fresh, store)
-    udd.sweep(spec, store=tmp_path / "whole.zarr")
-    assert files(store) == files(tmp_path / "whole.zarr")
+    assert files(store) == whole(spec)[1]
 
 
 class Counted:
@@ -263,7 +282,7 @@ class Counted:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("failures", [3, 0], ids=["dask tries again", "udd tries again"])
-def test_a_dask_worker_killed_in_the_middle(failures: int, tmp_path: Path) -> None:
+def test_a_dask_worker_killed_in_the_middle(failures: int, tmp_path: Path, whole: Whole) -> None:
     """With no failures allowed Dask gives the chunk up at once, and it is handed over again."""
     dask = pytest.importorskip("dask")
     pytest.importorskip("distributed", reason="Dask needs the extra 'scale'")
@@ -284,9 +303,9 @@ def test_a_dask_worker_killed_in_the_middle(failures: int, tmp_path: Path) -> No
         killer.join()
     assert killed[0] < 30
     assert counted.count == 30 if failures else counted.count > 30
-    assert found.identical(udd.sweep(spec))
-    udd.sweep(spec, store=tmp_path / "whole.zarr")
-    assert files(store) == files(tmp_path / "whole.zarr")
+    alone, bytes_of = whole(spec)
+    assert found.identical(alone)
+    assert files(store) == bytes_of
 
 
 def test_the_command_with_a_dask_cluster(tmp_path: Path) -> None:

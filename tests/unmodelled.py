@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import ode
 
 import udd
 
@@ -76,7 +77,7 @@ def rates(law: Law | None, w: float) -> Callable[[float, np.ndarray], list[float
     """The equations of motion."""
 
     def f(t: float, x: np.ndarray) -> list[float]:
-        o, y, z, b = x
+        o, y, z, b = x.tolist()  # numbers of Python's own: several times the speed of NumPy's
         torque, lateral, vertical = law(t, o, y, z, b) if law else (0.0, 0.0, 0.0)
         k = max(K1 - K2 * abs(o), K0)
         inertia = R * R / 2 + y * y + z * z
@@ -86,15 +87,23 @@ def rates(law: Law | None, w: float) -> Callable[[float, np.ndarray], list[float
 
 
 def motion(law: Law | None, w: float, t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """States at times, from a random start from which the disk stays between the wheels."""
-    gone = lambda _t, x: R - 0.002 - np.hypot(x[1], x[2])  # noqa: E731
-    gone.terminal = True  # type: ignore[attr-defined]
+    """States at times, from a random start from which the disk stays between the wheels.
+
+    SciPy's older interface, whose steps are compiled: a quarter of the time that `solve_ivp` takes.
+    """
+    run = ode(rates(law, w)).set_integrator("dop853", rtol=1e-9, atol=1e-11)
+    run.set_solout(lambda _t, x: -1 if math.hypot(x[1], x[2]) > R - 0.002 else 0)  # -1: no further
     for _ in range(200):
         radius, angle = rng.uniform(0.01, 0.05), rng.uniform(0, 2 * np.pi)
         start = [rng.normal(0, 2), radius * np.sin(angle), radius * np.cos(angle), rng.uniform(0, 6)]
-        run = solve_ivp(rates(law, w), (t[0], t[-1]), start, "DOP853", t, rtol=1e-9, atol=1e-11, events=gone)
-        if run.status == 0:
-            return run.y.T
+        run.set_initial_value(start, t[0])
+        states = [np.array(start)]
+        for end in t[1:]:
+            states.append(run.integrate(end).copy())
+            if run.get_return_code() != 1:  # 1: it has come to the end
+                break
+        else:
+            return np.array(states)
     raise RuntimeError("no start stays between the wheels")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,7 @@ from .terms import waves
 _ABSORBED = 1e-4
 _ALIKE = 1e6  # condition of the information from which on candidates act alike
 _WAVES = 100  # scored at a time: what a long record takes in memory
+_GROUPS = 20_000  # looked at together: some ten megabytes
 _LINES = 24  # of a scan over frequencies, looked at between them too
 
 
@@ -70,23 +71,41 @@ class Scan:
         usable = [k for k, s in enumerate(self.scored) if not s.absorbed]
         # Candidates that act alike have no place side by side.
         unit = _unit(self.information)
-        unlike = {
-            (i, j)
-            for i, j in itertools.combinations(usable, 2)
-            if np.linalg.cond(unit[np.ix_(own := self.columns[i] + self.columns[j], own)]) < _ALIKE
-        }
-        result = []
-        for group in itertools.combinations(usable, size):
-            if not unlike.issuperset(itertools.combinations(group, 2)):
-                continue
-            columns = [c for k in group for c in self.columns[k]]
-            block = self.information[np.ix_(columns, columns)]
-            if size > 2 and np.linalg.cond(unit[np.ix_(columns, columns)]) >= _ALIKE:
-                continue
-            g = self.gradient[columns]
-            fall = float(g @ np.linalg.solve(block, g)) / self.scatter
-            result.append(([self.scored[k] for k in group], fall))
-        return sorted(result, key=lambda found: -found[1])
+
+        def alike(at: NDArray[np.intp]) -> NDArray[np.float64]:
+            return np.asarray(np.linalg.cond(unit[at[:, :, None], at[:, None, :]]))
+
+        def fall(at: NDArray[np.intp]) -> NDArray[np.float64]:
+            g = self.gradient[at][:, :, None]
+            found = g.mT @ np.linalg.solve(self.information[at[:, :, None], at[:, None, :]], g)
+            return np.asarray(found[:, 0, 0]) / self.scatter
+
+        pairs, groups = _combinations(usable, 2), _combinations(usable, size)
+        unlike = np.zeros((len(self.scored),) * 2, dtype=bool)
+        unlike[tuple(pairs.T)] = self._each(pairs, alike) < _ALIKE
+        for two in _combinations(range(size), 2):
+            groups = groups[unlike[tuple(groups[:, two].T)]]
+        if size > 2:
+            groups = groups[self._each(groups, alike) < _ALIKE]
+        falls = self._each(groups, fall)
+        order = np.argsort(-falls, kind="stable")
+        return [([self.scored[k] for k in groups[i]], float(falls[i])) for i in order]
+
+    def _each(
+        self, groups: NDArray[np.intp], value: Callable[[NDArray[np.intp]], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """A value of each group from its columns: of groups with as many columns many at a time."""
+        widths = np.array([len(own) for own in self.columns], dtype=np.intp)
+        table = np.zeros((len(widths), widths.max(initial=1)), dtype=np.intp)
+        for row, own in zip(table, self.columns, strict=True):
+            row[: len(own)] = own
+        result = np.empty(len(groups))
+        for kind in np.unique(widths[groups], axis=0):
+            rows = np.flatnonzero((widths[groups] == kind).all(axis=1))
+            for some in np.array_split(rows, len(rows) // _GROUPS + 1):
+                at = [table[groups[some, k], :width] for k, width in enumerate(kind)]
+                result[some] = value(np.concatenate(at, axis=1))
+        return result
 
     def likeness(self, i: int, j: int) -> float:
         """How alike two candidates act on the data: the largest canonical correlation, 0 to 1."""
@@ -95,6 +114,11 @@ class Scan:
         left = np.linalg.solve(block[np.ix_(a, a)], block[np.ix_(a, b)])
         right = np.linalg.solve(block[np.ix_(b, b)], block[np.ix_(b, a)])
         return float(np.sqrt(max(np.linalg.eigvals(left @ right).real.max(), 0.0)))
+
+
+def _combinations(items: Iterable[int], size: int) -> NDArray[np.intp]:
+    """All choices of so many of them, one a row."""
+    return np.array(list(itertools.combinations(items, size)), dtype=np.intp).reshape(-1, size)
 
 
 def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
