@@ -400,6 +400,31 @@ fn tangents_in_lanes_have_the_same_bits() {
     assert!(ends.iter().all(|end| *end == ends[0]));
 }
 
+/// A single disk's sums are computed in one register where there is one; those of packets and tangents are not.
+#[test]
+fn a_disks_written_series_has_the_same_bits() {
+    const N: usize = HIGH + 1;
+    type T = Dual<f64, 2>;
+    let family = DiskFamily { effects: vec![], edge: false };
+    let tape = Tape::record(&family, &[]).unwrap();
+    let x0 = [3.0, 0.01, 0.03, 0.4];
+    for isa in Isa::available() {
+        let system = family.build(&PLAIN);
+        let alone = run::<f64, 4, N>(&tape, &system, (&PLAIN, x0, 2.0), (1e-9, isa));
+        let p = PLAIN.map(T::constant);
+        let tangents = run::<T, 4, N>(&tape, &family.build(&p), (&p, x0.map(T::constant), 2.0), (1e-9, isa));
+        let p = PLAIN.map(Packet::<2>::constant);
+        let packet = run::<Packet<2>, 4, N>(
+            &tape,
+            &family.build(&p),
+            (&p, x0.map(Packet::constant), 2.0),
+            (1e-9, isa),
+        );
+        assert_eq!(tangents.map(|x| x.re.to_bits()), alone.map(f64::to_bits), "{isa:?}");
+        assert_eq!(packet.map(|x| x.lane(1).to_bits()), alone.map(f64::to_bits), "{isa:?}");
+    }
+}
+
 /// A law with a comparison of its own.
 #[derive(Clone, Copy)]
 struct Compares;

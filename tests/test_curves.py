@@ -65,6 +65,9 @@ def test_the_form_of_a_wave_is_named():
     (only,) = formulas_for(curve, 4500).formulas
     assert only.text == "a * sin(5 * beta)"
     assert only.parameters["a"] == pytest.approx(SHARE * 0.02, rel=0.05)
+    # Constants do not take the name of a state, as of a double pendulum's angles a and b.
+    (only,) = formulas_for(curve, 4500, taken=["a", "b"]).formulas
+    assert only.text == "c * sin(5 * beta)"
 
 
 def test_a_law_of_two_coordinates_is_located():

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use super::control::{Controller, initial_step};
-use super::landing::{Landed, Landing, NOISE, TARGETS, WALL, Watch, union};
+use super::landing::{Landed, Landing, Look, TARGETS, WALL, Watch, union};
 use super::method::{Method, Point, Trial};
 use super::runge_kutta::Dopri5;
 use super::saltation::pass;
@@ -331,11 +331,16 @@ where
         let mut progress =
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
         if const { !M::SMOOTH } && targets {
-            let accepted = progress.moved;
-            self.on_surfaces(&trial, accepted, landing, factor, (end, last), &mut progress);
-        } else {
-            self.commit(&trial, progress.moved, (end, last));
+            let lanes = progress.moved.and(self.undecided.not());
+            let watch = Watch::new(&self.system, &self.at, self.wall, self.norm.state());
+            let look = watch.look(&self.method, trial.size, lanes);
+            if union(&look.beyond).or(landing).or(self.undecided).any() {
+                let accepted = progress.moved;
+                self.on_surfaces(&trial, (accepted, &look), landing, factor, (end, last), &mut progress);
+                return progress;
+            }
         }
+        self.commit(&trial, progress.moved, (end, last));
         progress
     }
 
@@ -343,21 +348,16 @@ where
     fn on_surfaces(
         &mut self,
         trial: &Trial<S, D>,
-        accepted: S::Mask,
+        (accepted, look): (S::Mask, &Look<S, D>),
         landing: S::Mask,
         factor: S::Real,
         (end, last): (S::Real, S::Mask),
         progress: &mut Progress<S::Mask>,
     ) {
         let never = S::mask(false);
-        let watch = Watch {
-            system: &self.system,
-            at: &self.at,
-            wall: self.wall,
-            noise: NOISE.max(self.norm.state().atol),
-        };
+        let watch = Watch::new(&self.system, &self.at, self.wall, self.norm.state());
         let leaving = accepted.and(self.undecided);
-        let found = watch.find(&self.method, trial.size, accepted.and(leaving.not()));
+        let found = watch.find(&self.method, trial.size, accepted.and(leaving.not()), look);
         let crossing = union(&found.crossing);
         let stale = union(&found.stale);
         let clear = accepted.and(crossing.or(stale).not());

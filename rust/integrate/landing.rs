@@ -9,6 +9,7 @@ use std::array::from_fn;
 
 use super::method::{MOST_PROBES, Method, Point};
 use super::root::bracketed;
+use super::tolerance::Tolerance;
 use crate::model::{MAX_SURFACES, System};
 use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
@@ -29,7 +30,13 @@ pub fn union<M: Mask>(masks: &[M; TARGETS]) -> M {
 const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
-pub const NOISE: f64 = 1e-14;
+const NOISE: f64 = 1e-14;
+
+/// The places at which a step is looked at, and the lanes that are beyond each target at any of them.
+pub struct Look<S: Scalar, const D: usize> {
+    probes: [[S::Real; D]; MOST_PROBES],
+    pub beyond: [S::Mask; TARGETS],
+}
 
 /// What a step does to the targets, lane by lane.
 #[derive(Clone, Copy, Debug)]
@@ -48,18 +55,24 @@ pub struct Found<R: Real> {
 
 /// A run on the way from one step to the next: what is looked at, and from where.
 pub struct Watch<'a, M, S: Scalar, const D: usize> {
-    pub system: &'a M,
-    pub at: &'a Point<S, D>,
-    pub wall: bool,
+    system: &'a M,
+    at: &'a Point<S, D>,
+    wall: bool,
     /// A surface whose function stays below this in a step is left alone: the step's error is larger.
-    pub noise: f64,
+    noise: f64,
 }
 
-impl<M, S, const D: usize> Watch<'_, M, S, D>
+impl<'a, M, S, const D: usize> Watch<'a, M, S, D>
 where
     S: Scalar,
     M: System<S, D>,
 {
+    /// From here on, with or without a wall.
+    #[inline(always)]
+    pub fn new(system: &'a M, at: &'a Point<S, D>, wall: bool, tolerance: &Tolerance) -> Self {
+        Self { system, at, wall, noise: NOISE.max(tolerance.atol) }
+    }
+
     /// The targets that there are.
     pub fn targets(&self) -> impl Iterator<Item = usize> + use<M, S, D> {
         (0..self.system.surfaces()).chain(self.wall.then_some(WALL))
@@ -82,9 +95,36 @@ where
         self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
     }
 
-    /// The first crossings within the method's last trial, of size `h`.
+    /// Looks at the method's last trial, of size `h`, in these lanes: in most steps there is nothing to find.
     #[inline(always)]
-    pub fn find<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Found<S::Real> {
+    pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
+        let probes = method.along(h, K::PROBES, &self.system.watched());
+        let mut beyond = [S::mask(false); TARGETS];
+        // Unrolled, so that each target's function is known.
+        unroll!(target in 0..TARGETS => {
+            if target < self.system.surfaces() || target == WALL && self.wall {
+                unroll!(i in 0..MOST_PROBES => {
+                    if i < K::PROBES.len() {
+                        let x = vector!(S, D; n => S::lift(probes[i][n]));
+                        let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
+                        beyond[target] = beyond[target].or(value.less(S::Real::zero()));
+                    }
+                });
+                beyond[target] = beyond[target].and(lanes);
+            }
+        });
+        Look { probes, beyond }
+    }
+
+    /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.
+    #[inline(always)]
+    pub fn find<K: Method<S, D>>(
+        &self,
+        method: &K,
+        h: S::Real,
+        lanes: S::Mask,
+        look: &Look<S, D>,
+    ) -> Found<S::Real> {
         let never = S::mask(false);
         let infinite = S::Real::constant(f64::INFINITY);
         let zero = S::Real::zero();
@@ -92,25 +132,16 @@ where
             Found { crossing: [never; TARGETS], stale: [never; TARGETS], dt: infinite, high: infinite, zero };
         let mut earliest = infinite;
         let mut stale = never;
-        let probes = method.along(h, K::PROBES, &self.system.watched());
-        for target in self.targets() {
-            let mut values = [zero; MOST_PROBES];
-            let mut any = never;
-            for (i, &theta) in K::PROBES.iter().enumerate() {
-                let x = vector!(S, D; n => S::lift(probes[i][n]));
-                values[i] = self.value(target, self.at.t + h.scale(theta), &x);
-                any = any.or(values[i].less(zero));
-            }
-            if !any.and(lanes).any() {
-                continue;
-            }
+        for target in self.targets().filter(|&target| look.beyond[target].any()) {
             let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
             let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
             for (i, &theta) in K::PROBES.iter().enumerate() {
-                let (dt, value) = (h.scale(theta), values[i]);
+                let dt = h.scale(theta);
+                let x = vector!(S, D; n => S::lift(look.probes[i][n]));
+                let value = self.value(target, self.at.t + dt, &x);
                 scale = scale.max(value.abs());
                 let new = value.less(zero).and(wrong.not());
                 high = pick(new, (dt, value), high);

@@ -143,7 +143,7 @@ impl<R: Real, const N: usize> Growth<R, N> {
             let near = R::constant(1e-40).less(square).and(square.less(R::constant(1e40)));
             lanes = moved.and(near.not());
         } else {
-            let steps = R::select(moved, self.steps + R::one(), self.steps);
+            let steps = self.steps + R::select(moved, R::one(), R::zero());
             let due = steps.less(R::constant(TURN)).not();
             self.steps = R::select(due, R::zero(), steps);
             lanes = moved.and(due.or(told));

@@ -125,7 +125,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             if const { N == D } {
                 moments.add(self.isa, &ship.driver, moved.and(counting));
             }
-            steps = R::select(moved, steps + R::one(), steps);
+            steps += R::select(moved, R::one(), R::zero());
             let t = ship.driver.t();
             let full = moved.and(t.less(full_at).or(steps.less(R::constant(LEAST_STEPS))).not());
             let over = ship.arrived().or(progress.walled()).or(progress.failed);

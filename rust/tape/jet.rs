@@ -2,7 +2,8 @@
 
 use std::array::from_fn;
 
-use super::known::{Disk, Dle, FastDisk, KINK, Known, MOST_HELD, Program};
+use super::disk;
+use super::known::{Dle, Known, MOST_HELD, Program};
 use super::node::{INVERSE, hold};
 use super::{Step, Tape};
 use crate::model::Sides;
@@ -77,10 +78,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             return known::<Dle, S, D, N>(work, order, held, t, x, sides);
         }
         if const { D == 4 } && tape.known == Known::Disk {
-            if const { S::Real::LANES == 1 } && !sides[KINK].lane(0) {
-                return known::<FastDisk, S, D, N>(work, order, held, t, x, sides);
-            }
-            return known::<Disk, S, D, N>(work, order, held, t, x, sides);
+            return disk::expand::<V, S, D, N>(work, order, held, x, sides);
         }
         interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], order, held, t, x, sides);
     }
@@ -123,11 +121,9 @@ macro_rules! every {
     };
 }
 
-/// Whether a known tape's orders are unrolled too: not where tangents make every operation long, or where
-/// there are many operations.
-const fn worthwhile<S: Scalar, const D: usize, const N: usize>() -> bool {
-    let longest = if D == 3 { 2 * size_of::<S::Real>() } else { size_of::<f64>() };
-    N == HIGH + 1 && size_of::<S>() <= longest
+/// Whether a known tape's orders are unrolled too: not where tangents make every operation long.
+const fn worthwhile<S: Scalar, const N: usize>() -> bool {
+    N == HIGH + 1 && size_of::<S>() <= 2 * size_of::<S::Real>()
 }
 
 /// A known tape: its operations are unrolled, and its orders where that is worthwhile.
@@ -141,7 +137,7 @@ fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
     sides: &Sides<S>,
 ) {
     let work = &mut work[..P::SLOTS];
-    if const { !worthwhile::<S, D, N>() } {
+    if const { !worthwhile::<S, N>() } {
         return rolled::<P, S, D, N>(work, order, held, t, x, sides);
     }
     match order {

@@ -1,4 +1,4 @@
-//! Tapes that the compiler knows: the same operations as recorded, unrolled for speed.
+//! Tapes that the compiler knows: their series are computed by programs of their own, for speed.
 
 use super::{Node, Step, Tape};
 
@@ -15,7 +15,7 @@ impl Known {
         let is = |steps: &[Step], rates: &[u16]| tape.steps == steps && tape.rates == *rates;
         if is(Dle::STEPS, Dle::RATES) {
             Known::Dle
-        } else if is(Disk::STEPS, Disk::RATES) {
+        } else if is(DISK, DISK_RATES) {
             Known::Disk
         } else {
             Known::Not
@@ -47,62 +47,30 @@ impl Program for Dle {
     const SLOTS: usize = 7;
 }
 
-/// The disk without effects.
-pub(super) struct Disk;
-
-/// The surface on whose negative side the friction is k0.
-pub(super) const KINK: usize = 1;
-
-impl Program for Disk {
-    const STEPS: &'static [Step] = &[
-        // g Y - k Omega, where k = k1 - k2 |Omega| or k0
-        Step { node: Node::Scale(1, 0), to: 4 },
-        Step { node: Node::Neg(0), to: 5 },
-        Step { node: Node::Select(0, 0, 5), to: 6 },
-        Step { node: Node::Scale(6, 2), to: 7 },
-        Step { node: Node::From(1, 7), to: 8 },
-        Step { node: Node::Hold(3), to: 9 },
-        Step { node: Node::Select(1, 8, 9), to: 10 },
-        Step { node: Node::Mul(0, 10), to: 11 },
-        Step { node: Node::Sub(4, 11), to: 12 },
-        // - W Z Omega
-        Step { node: Node::Mul(0, 2), to: 13 },
-        Step { node: Node::Scale(13, 4), to: 14 },
-        Step { node: Node::Sub(12, 14), to: 15 },
-        // over the moment of inertia
-        Step { node: Node::Square(1), to: 16 },
-        Step { node: Node::Plus(16, 8), to: 17 },
-        Step { node: Node::Square(2), to: 18 },
-        Step { node: Node::Add(17, 18), to: 19 },
-        Step { node: Node::Div(15, 19), to: 20 },
-        // W - Y Omega
-        Step { node: Node::Mul(0, 1), to: 22 },
-        Step { node: Node::From(4, 22), to: 23 },
-    ];
-    const RATES: &'static [u16] = &[20, 13, 23, 0];
-    const SLOTS: usize = 24;
-}
-
-/// The same beyond the kink, where the friction is k0 and its product with Omega is no product of series.
-pub(super) struct FastDisk;
-
-impl Program for FastDisk {
-    const STEPS: &'static [Step] = &[
-        // g Y - k0 Omega
-        Step { node: Node::Scale(1, 0), to: 4 },
-        Step { node: Node::Scale(0, 3), to: 11 },
-        Step { node: Node::Sub(4, 11), to: 12 },
-        Disk::STEPS[9],
-        Disk::STEPS[10],
-        Disk::STEPS[11],
-        Disk::STEPS[12],
-        Disk::STEPS[13],
-        Disk::STEPS[14],
-        Disk::STEPS[15],
-        Disk::STEPS[16],
-        Disk::STEPS[17],
-        Disk::STEPS[18],
-    ];
-    const RATES: &'static [u16] = Disk::RATES;
-    const SLOTS: usize = Disk::SLOTS;
-}
+/// The disk without effects, as recorded. Its [series](super::disk) is written out.
+const DISK: &[Step] = &[
+    // g Y - k Omega, where k = k1 - k2 |Omega| or k0
+    Step { node: Node::Scale(1, 0), to: 4 },
+    Step { node: Node::Neg(0), to: 5 },
+    Step { node: Node::Select(0, 0, 5), to: 6 },
+    Step { node: Node::Scale(6, 2), to: 7 },
+    Step { node: Node::From(1, 7), to: 8 },
+    Step { node: Node::Hold(3), to: 9 },
+    Step { node: Node::Select(1, 8, 9), to: 10 },
+    Step { node: Node::Mul(0, 10), to: 11 },
+    Step { node: Node::Sub(4, 11), to: 12 },
+    // - W Z Omega
+    Step { node: Node::Mul(0, 2), to: 13 },
+    Step { node: Node::Scale(13, 4), to: 14 },
+    Step { node: Node::Sub(12, 14), to: 15 },
+    // over the moment of inertia
+    Step { node: Node::Square(1), to: 16 },
+    Step { node: Node::Plus(16, 8), to: 17 },
+    Step { node: Node::Square(2), to: 18 },
+    Step { node: Node::Add(17, 18), to: 19 },
+    Step { node: Node::Div(15, 19), to: 20 },
+    // W - Y Omega
+    Step { node: Node::Mul(0, 1), to: 22 },
+    Step { node: Node::From(4, 22), to: 23 },
+];
+const DISK_RATES: &[u16] = &[20, 13, 23, 0];

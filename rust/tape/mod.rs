@@ -4,6 +4,7 @@
 //! what repeated evaluation of the rates cannot: the Taylor coefficients of the solution, order by
 //! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
 
+mod disk;
 mod jet;
 mod known;
 mod node;
@@ -64,7 +65,7 @@ impl<const D: usize> Tape<D> {
         self.switches_held
     }
 
-    /// Whether its series are computed by a program of their own, unrolled when this was compiled.
+    /// Whether its series are computed by a program of their own.
     pub fn is_unrolled(&self) -> bool {
         self.known != known::Known::Not
     }

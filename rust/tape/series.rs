@@ -7,23 +7,46 @@
 
 use crate::scalar::Scalar;
 
+/// A coefficient, or several side by side, that numbers multiply.
+pub trait Coefficient<S>: Copy {
+    /// -0 : adding to it changes nothing, not even the sign of a zero.
+    fn nothing() -> Self;
+    /// `self + a b`, rounded once.
+    fn with(self, a: S, b: Self) -> Self;
+    fn plus(self, other: Self) -> Self;
+}
+
+impl<S: Scalar> Coefficient<S> for S {
+    #[inline(always)]
+    fn nothing() -> S {
+        S::constant(-0.0)
+    }
+    #[inline(always)]
+    fn with(self, a: S, b: S) -> S {
+        self.fused(a, b)
+    }
+    #[inline(always)]
+    fn plus(self, other: S) -> S {
+        self + other
+    }
+}
+
 /// `sum of a[j] b[k-j] for j in 1..k`, the coefficient `k` of the product without its first and last term.
 #[inline(always)]
-pub fn inner<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
+pub fn inner<S: Copy, C: Coefficient<S>, const N: usize>(a: &[S; N], b: &[C; N], k: usize) -> C {
     let pairs = k.saturating_sub(1) / 2;
     let (a_low, a_high) = (&a[1..=pairs], &a[k - pairs..k]);
     let (b_low, b_high) = (&b[1..=pairs], &b[k - pairs..k]);
-    // Adding to -0 changes nothing, not even the sign of a zero.
-    let (mut even, mut odd) = (S::constant(-0.0), S::constant(-0.0));
+    let (mut even, mut odd) = (C::nothing(), C::nothing());
     if k >= 2 && k.is_multiple_of(2) {
-        even = a[k / 2] * b[k / 2];
+        even = even.with(a[k / 2], b[k / 2]);
     }
     let outwards = a_low.iter().rev().zip(b_high).zip(b_low.iter().rev().zip(a_high));
     for ((&al, &bh), (&bl, &ah)) in outwards {
-        even = even.fused(al, bh);
-        odd = odd.fused(bl, ah);
+        even = even.with(al, bh);
+        odd = odd.with(ah, bl);
     }
-    even + odd
+    even.plus(odd)
 }
 
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,8 @@ _MOST = 12  # formulas looked at closely
 _FAR = 40.0  # nats below the curve, from which shortening does not bring a formula back
 _HUGE = 1e6
 _POSITIONS = 160
-_NAMES = "abcdpqrsuvwz"
+_MOST_CONSTANTS = 12
+_NAMES = "abcdpqrsuvwzfghjklmn"  # of constants; enough where a model's states have taken some
 _EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 0.5, -1.0)
 #: Coordinates that are never negative.
 _POSITIVE = ("|Omega|", "R")
@@ -88,7 +90,7 @@ class Formulas:
     note: str
 
 
-def formulas_for(curve: Curve, observations: int, seed: int = 0) -> Formulas:
+def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collection[str] = ()) -> Formulas:
     """Short formulas for a curve of one coordinate.
 
     Usual forms (powers, steps, bumps, waves) and those that symbolic regression comes upon (pyoperon, where
@@ -103,11 +105,13 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0) -> Formulas:
         Numbers in the record.
     seed : int
         Of the regression.
+    taken : collection of str
+        Names that constants may not have: a model's states'.
     """
     if len(curve.coordinates) != 1:
         return Formulas([], False, "no formula is sought for a surface")
     target = _Target(curve, observations)
-    found, note = regression(curve, len(_NAMES), seed)
+    found, note = regression(curve, _MOST_CONSTANTS, seed)
     trials = []
     for node, values in itertools.chain(usual(curve), found):
         node = simplify(without_sign(node) if curve.coordinates[0].name in _POSITIVE else node, values)
@@ -116,7 +120,8 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0) -> Formulas:
             trials.append(fitted)
     near = [one for one in _different(trials, target.x) if one.nats > curve.evidence - _FAR][:_MOST]
     ranked = _different([target.shorten(one) for one in near], target.x)
-    formulas = [_formula(curve, one) for one in ranked]
+    free = [name for name in _NAMES if name not in taken]
+    formulas = [_formula(curve, one, free) for one in ranked]
     best = max((one.nats for one in formulas), default=-math.inf)
     return Formulas([one for one in formulas if one.nats > best - NATS], best > -NATS, note)
 
@@ -210,10 +215,10 @@ class _Target:
         return fitted
 
 
-def _formula(curve: Curve, fitted: _Fitted) -> Formula:
+def _formula(curve: Curve, fitted: _Fitted, free: Sequence[str]) -> Formula:
     numbers = constants(fitted.node)
     order = {number: k for k, number in enumerate(numbers)}
-    names = {number: _NAMES[k] for number, k in order.items()}
+    names = {number: free[k] for number, k in order.items()}
     own = curve.coordinates[0]
     text = write(fitted.node, own.text or own.name, names)
     parameters = {names[number]: fitted.values[number] for number in numbers}

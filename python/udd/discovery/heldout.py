@@ -332,12 +332,9 @@ def _turned(angle: Array) -> Array:
 
 
 def _median(column: Array) -> float:
-    """NumPy's `nanmedian` to the bit, in a sixth of its time: it is taken of thousands of resamplings."""
-    known = np.sort(column[~np.isnan(column)])
-    if not known.size:
-        return float("nan")
-    middle = known.size // 2
-    return float(known[middle] if known.size % 2 else (known[middle - 1] + known[middle]) / 2)
+    """NaN left out; `nanmedian` takes longer, and this is taken of thousands of resamplings."""
+    known = column[~np.isnan(column)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 def _sum(column: Array) -> float:

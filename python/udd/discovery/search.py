@@ -395,7 +395,9 @@ class Search:
             self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
     def _formulas(self, current: State, curve: Curve) -> list[Formula]:
-        return formulas_for(curve, int(np.isfinite(current.part.misfit).sum())).formulas[:_FORMULAS]
+        observations = int(np.isfinite(current.part.misfit).sum())
+        taken = current.part.model.state_names
+        return formulas_for(curve, observations, taken=taken).formulas[:_FORMULAS]
 
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
         best = passing[:_TRIED]
