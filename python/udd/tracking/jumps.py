@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 from .loop import Tracks
 from .result import Camera
@@ -17,7 +18,6 @@ CUT = 1 - 2**-OUTLIER  # of their mean that squares of two normal coordinates ke
 # standard error of such a mean, times the root of their number: second differences that overlap go together,
 # so that there are half as many
 SCATTER = 2**0.5
-HALVINGS = 40
 
 
 def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
@@ -75,8 +75,4 @@ def _excess(seen: Array, expected: Array) -> float:
 
     if ratio(0.0) < 1 + SCATTER / np.sqrt(len(seen)):
         return 0.0
-    low, high = 0.0, float(seen.max())
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if ratio(middle) > 1 else (low, middle)
-    return high
+    return float(brentq(lambda more: ratio(more) - 1, 0.0, float(seen.max()), rtol=1e-6))
