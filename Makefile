@@ -53,7 +53,6 @@ lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stu
 
 lint-rust: .venv/.made
 	cargo fmt --check
-	cargo clippy --locked --all-targets -- -D warnings
 	cargo clippy --locked --all-targets --features python -- -D warnings
 
 lint-python: .venv/.udd
@@ -101,7 +100,7 @@ lock: .venv/.deps ## write requirements.lock anew, with today's versions
 	  --custom-compile-command "make lock" --output-file requirements.lock
 
 clean: ## remove .venv and everything that was built
-	rm -rf .venv .venv-peers dist demo paper docs/_build target .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers build dist demo paper docs/_build target .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 
