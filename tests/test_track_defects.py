@@ -20,6 +20,7 @@ from udd.errors import UddError
 from udd.film import Defects, Film
 from udd.tracking import decode, overlay, pictures_at
 from udd.tracking.find import BODY, COLOURS, Blobs, squares
+from udd.tracking.result import left_the_wheels
 
 SMALL = (276, 350)  # pixels: half of the paper's, 878 per metre
 
@@ -166,3 +167,13 @@ def test_a_folder_of_films(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     said = capsys.readouterr().out
     assert "a.mp4: 50 of 50 frames usable" in said and "b.mp4 is not a film" in said
     assert (tmp_path / "tables" / "a.csv").is_file() and not (tmp_path / "tables" / "b.csv").exists()
+
+
+def test_a_disk_that_leaps_inward_at_its_edge_has_gone() -> None:
+    """Thrown off, it may cover the contact again; farther in, a leap is a matter of its own."""
+    t = np.arange(0, 4, 0.04)
+    away = 0.04 + 0.039 * 0.9 * (t - t[-1]) + 0.0398  # m, up to its edge as fast as it can roll
+    for k, gone in ((len(t) - 3, True), (len(t) // 2, False)):
+        leapt = np.where(np.arange(len(t)) < k, away, away - 0.008)
+        found = left_the_wheels(t, np.column_stack([0 * t, leapt, 0 * t]), 0.08, 1e-5)
+        assert list(found) == list(gone & (np.arange(len(t)) >= k))

@@ -17,6 +17,8 @@ from .loop import Tracks
 Array = NDArray[np.float64]
 OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
 NEAR_EDGE = 0.8  # of the radius; a disk that was last seen farther in is lost, not gone
+LEAP = 3.0  # times as fast as nearly all the time; a disk near its edge that moves so has been let go
+FAR = 0.02  # of the radius, that a leap goes at least
 LONG = 1.0  # s: over a longer gap the rate may have done anything
 
 
@@ -109,17 +111,23 @@ def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     return values, sigma, np.clip(rho, -0.999999, 0.999999)
 
 
-def left_the_wheels(values: Array, radius: float, pivot_sigma: float) -> NDArray[np.bool_]:
-    """Frames from the one on in which the contact lies outside the disk: it is held no more.
+def left_the_wheels(t: Array, values: Array, radius: float, pivot_sigma: float) -> NDArray[np.bool_]:
+    """Frames from the one on in which the disk is held no more.
 
-    Also those after the last in which it was seen, where that was near its edge.
+    The contact lies outside of it then, or leaps: of a disk that rolls d(Y^2 + Z^2)/dT = 2 W Z, so that its
+    distance changes no faster than the wheels turn. Also those after the last in which the disk was seen,
+    where the contact was near its edge.
     """
     gone = np.zeros(len(values), dtype=bool)
     away = np.hypot(values[:, 0], values[:, 1])
-    outside = np.flatnonzero(away > radius * (1 + OUTSIDE) + 3 * pivot_sigma)
+    outside = away > radius * (1 + OUTSIDE) + 3 * pivot_sigma
     seen = np.flatnonzero(np.isfinite(away))
-    if len(outside):
-        gone[outside[0] :] = True
+    if len(seen) > 1:
+        change, time = np.abs(np.diff(away[seen])), np.diff(t[seen])
+        most = np.maximum(LEAP * float(np.quantile(change / time, 0.95)) * time, FAR * radius)
+        outside[seen[1:]] |= (away[seen[:-1]] > NEAR_EDGE * radius) & (change > most)
+    if outside.any():
+        gone[np.argmax(outside) :] = True
     elif len(seen) and away[seen[-1]] > NEAR_EDGE * radius and len(away) - seen[-1] > 3:
         gone[seen[-1] + 1 :] = True
     return gone

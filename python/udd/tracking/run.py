@@ -368,7 +368,7 @@ def _tracking(
     alike = in_common(tracks, with_causes(own, 0.0, shared), camera)
     shared += [alike[:, None] * np.eye(3)[axis] for axis in (0, 1)]  # u and v have causes of their own
     values, sigma, rho = metres(tracks, with_causes(own, centre_sigma, shared), camera)
-    gone = left_the_wheels(values, setup.radius, camera.pivot_sigma)
+    gone = left_the_wheels(np.array(tracks.t), values, setup.radius, camera.pivot_sigma)
     for table in (values, sigma, rho):
         table[gone] = np.nan
     # by how much the centre is off that was said, all frames are: that makes none of them vague
