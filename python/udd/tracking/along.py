@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .look import Look
+from .look import Look, moved_by_pose
 from .loop import Tracks
 from .refine import Around
 
@@ -49,12 +49,9 @@ def _marks(tracks: Tracks, look: Look, around: Around, k: int) -> tuple[Array, A
         return None
     way = moving / np.abs(moving)
     axes = np.stack([way.real, way.imag, -way.imag, way.real], axis=-1).reshape(-1, 2, 2)
-    maps = np.zeros((len(arm), 2, 3))
-    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
-    maps[:, 0, 2], maps[:, 1, 2] = -arm.imag, arm.real
     values, vectors = np.linalg.eigh(axes @ tracks.marks[k][used].astype(float) @ axes.transpose(0, 2, 1))
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :] @ vectors.transpose(0, 2, 1) @ axes
-    design = (root @ maps).reshape(-1, 3)
+    design = (root @ moved_by_pose(arm)).reshape(-1, 3)
     return design, (root @ tracks.leftover[k][used][..., None]).ravel()
 
 

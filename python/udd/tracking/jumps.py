@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from .look import moved_by_pose
 from .loop import Tracks
 from .result import Camera
 
@@ -48,9 +49,7 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     away = np.array(tracks.centre) - camera.pivot
     drive = complex(np.conj(camera.drive)) * camera.scale
     good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
-    maps = np.zeros((len(t), 2, 3))  # of a pose's error to that of c - p where the angle is taken out
-    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
-    maps[:, 0, 2], maps[:, 1, 2] = away.imag, -away.real
+    maps = moved_by_pose(-away)  # of a pose's error to that of c - p where the angle is taken out
     own = np.einsum("nij,njk,nik->n", maps, covariance, maps)
     usual = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     seen, expected = np.full(len(t), np.nan), np.full(len(t), np.nan)

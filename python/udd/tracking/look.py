@@ -102,3 +102,11 @@ class Pose:
 
     centre: complex
     angle: float
+
+
+def moved_by_pose(arms: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """How a pose (u, v, beta) moves points at `arms` (n,) from the disk's centre, (n, 2, 3)."""
+    maps = np.zeros((len(arms), 2, 3))
+    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
+    maps[:, 0, 2], maps[:, 1, 2] = -arms.imag, arms.real
+    return maps

@@ -197,20 +197,6 @@ _ITEMS = tuple(f.name for f in fields(Calibrate))
 _SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
 _RANGES = {"lens": (-0.3, 0.3, ""), "readout": (-0.1, 0.1, " s"), "exposure": (0.0, 0.1, " s")}
 
-__all__ = [
-    "Apart",
-    "Calibrate",
-    "Layout",
-    "Region",
-    "Setup",
-    "Sigma",
-    "read_apart",
-    "read_calibrate",
-    "read_layout",
-    "read_region",
-    "read_sigma",
-]
-
 
 def _items(said: Any, table: str, known: Collection[str]) -> Iterator[tuple[str, Any]]:
     """The items of a table by name, each one that there is."""
@@ -231,3 +217,19 @@ def length_of(value: float, name: str, unit: str = "metres") -> float:
     if not (math.isfinite(length) and length > 0):
         raise TrackError(f"{name} must be positive and finite, not {value!r}")
     return length
+
+
+__all__ = [
+    "Apart",
+    "Calibrate",
+    "Layout",
+    "Region",
+    "Setup",
+    "Sigma",
+    "length_of",
+    "read_apart",
+    "read_calibrate",
+    "read_layout",
+    "read_region",
+    "read_sigma",
+]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .look import Look
+from .look import Look, moved_by_pose
 from .loop import Tracks
 from .wobble import SINE, Wobble
 
@@ -129,10 +129,7 @@ class _Frame:
     def of(cls, tracks: Tracks, look: Look, k: int) -> _Frame:
         turn = complex(np.exp(1j * tracks.angle[k]))
         arms = look.places * turn
-        maps = np.zeros((len(arms), 2, 3))
-        maps[:, 0, 0] = maps[:, 1, 1] = 1.0
-        maps[:, 0, 2], maps[:, 1, 2] = -arms.imag, arms.real
-        design = maps.reshape(-1, 3)
+        design = moved_by_pose(arms).reshape(-1, 3)
         weight = np.zeros((len(design), len(design)))
         for j, information in enumerate(tracks.marks[k]):
             weight[2 * j : 2 * j + 2, 2 * j : 2 * j + 2] = information
