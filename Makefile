@@ -38,7 +38,7 @@ docs: .venv/.udd ## build the documentation into docs/_build/html; every page is
 test: test-rust test-python ## build everything and run all tests (cargo and pytest)
 
 test-rust: ## only the tests of the Rust core; needs no Python
-	cargo test --locked --no-fail-fast
+	cargo test --release --locked --no-fail-fast
 
 test-python: .venv/.udd ## only the tests of the Python package
 	$(PY) -m pytest -n auto --dist loadfile

@@ -98,6 +98,7 @@ fn what_a_known_parameter_removes_is_left_out() {
     assert_eq!((plain.steps().len(), plain.held().len()), (4, 1));
     assert_eq!(damped.steps().len(), 6);
     assert!(plain.is_unrolled(), "rust/tape/known.rs has another tape for the DLE than is recorded");
+    assert!(damped.is_unrolled(), "rust/tape/known.rs has another tape for the damped DLE than is recorded");
     let effect = Effect::new(Kind::EccentricMass);
     let disk = |effects| DiskFamily { effects, edge: false };
     let without = Tape::record(&disk(vec![]), &[]).unwrap();
@@ -425,6 +426,23 @@ fn a_disks_written_series_has_the_same_bits() {
         );
         assert_eq!(tangents.map(|x| x.re.to_bits()), alone.map(f64::to_bits), "{isa:?}");
         assert_eq!(packet.map(|x| x.lane(1).to_bits()), alone.map(f64::to_bits), "{isa:?}");
+    }
+}
+
+/// What is left out where it vanishes changes no bit, nor does it change which series is written out: a run's bits do
+/// not depend on the runs beside it.
+#[test]
+fn what_vanishes_changes_no_bit() {
+    const N: usize = HIGH + 1;
+    let open = Tape::record(&DleFamily, &[]).unwrap();
+    for (w, fixed) in [(7.1, [None, Some(0.0)]), (0.0, [Some(0.0), None]), (0.0, [Some(0.0), Some(0.0)])] {
+        let p = [w, 0.0];
+        let tape = Tape::record(&DleFamily, &fixed).unwrap();
+        assert!(tape.is_unrolled());
+        let [some, all] = [&tape, &open].map(|tape| {
+            run::<f64, 3, N>(tape, &DleFamily.build(&p), (&p, [1.0, 1.0, 0.01], 20.0), (1e-9, Isa::best()))
+        });
+        assert_eq!(some.map(f64::to_bits), all.map(f64::to_bits), "w = {w}, {fixed:?}");
     }
 }
 

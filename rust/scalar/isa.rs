@@ -19,17 +19,20 @@ pub enum Isa {
 /// Instructions as a type, for [packets](super::Packet) that are made of them.
 ///
 /// Those beyond the [`Plain`] ones cannot be named outside of this crate: they are given to [`Work`] where
-/// the machine has them.
+/// the machine has them. The type is empty, and aligned as a register of the set is.
 pub trait Instructions: Copy + Debug + PartialEq + Send + Sync + 'static {
     const ISA: Isa;
 }
 
 /// What the compiler makes of plain loops, on any machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(16))]
 pub struct Plain;
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(32))]
 pub struct Avx2;
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
 pub struct Avx512;
 
 impl Instructions for Plain {

@@ -1,14 +1,11 @@
 //! The Taylor coefficients of a solution.
 
-use std::array::from_fn;
-
-use super::disk;
-use super::known::{Dle, Known, MOST_HELD, Program};
+use super::known::Known;
 use super::node::{INVERSE, hold};
-use super::{Step, Tape};
+use super::{Step, Tape, disk, dle};
 use crate::model::Sides;
-use crate::scalar::{Fan, Instructions, Isa, Mask, Packet, Real, Scalar, Work};
-use crate::unroll::{unroll, vector};
+use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
+use crate::unroll::unroll;
 
 /// The orders whose programs are unrolled, which takes long to compile.
 pub const LOW: usize = 10;
@@ -71,11 +68,10 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let Self { work, held, order, .. } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
-        if const { D == 3 } && tape.known == Known::Dle {
-            if const { S::FANS && N == HIGH + 1 && !matches!(V::ISA, Isa::Baseline) } {
-                return fanned::<Dle, V, S, D, N>(work, order, held, t, x, sides);
-            }
-            return known::<Dle, S, D, N>(work, order, held, t, x, sides);
+        if const { D == 3 }
+            && let Known::Dle { damped } = tape.known
+        {
+            return dle::expand::<V, S, D, N>(work, order, held, x, damped);
         }
         if const { D == 4 } && tape.known == Known::Disk {
             return disk::expand::<V, S, D, N>(work, order, held, x, sides);
@@ -105,66 +101,6 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
     #[inline(always)]
     fn run<V: Instructions>(self) {
         self.jets.expand_here::<V>(self.tape, self.t, self.x, self.sides);
-    }
-}
-
-/// The body for every step of a program, with its number known when the program is compiled.
-macro_rules! every {
-    ($P:ident, $i:ident => $body:block) => {
-        every!(@ $P, $i, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
-    };
-    (@ $P:ident, $i:ident, $body:block, $($k:literal)+) => {
-        $(if $k < $P::STEPS.len() {
-            let $i: usize = $k;
-            $body
-        })+
-    };
-}
-
-/// Whether a known tape's orders are unrolled too: not where tangents make every operation long.
-const fn worthwhile<S: Scalar, const N: usize>() -> bool {
-    N == HIGH + 1 && size_of::<S>() <= 2 * size_of::<S::Real>()
-}
-
-/// A known tape: its operations are unrolled, and its orders where that is worthwhile.
-#[inline(always)]
-fn known<P: Program, S: Scalar, const D: usize, const N: usize>(
-    work: &mut [[S; N]],
-    order: usize,
-    held: &[S],
-    t: S,
-    x: &[S; D],
-    sides: &Sides<S>,
-) {
-    let work = &mut work[..P::SLOTS];
-    if const { !worthwhile::<S, N>() } {
-        return rolled::<P, S, D, N>(work, order, held, t, x, sides);
-    }
-    match order {
-        LOW => unrolled::<P, S, D, N, LOW>(held, t, x, sides, |n, k, c| work[n][k] = c),
-        HIGH => unrolled::<P, S, D, N, HIGH>(held, t, x, sides, |n, k, c| work[n][k] = c),
-        _ => rolled::<P, S, D, N>(work, order, held, t, x, sides),
-    }
-}
-
-/// The same for a number with a few derivatives, computed with as a [`Fan`] where orders are unrolled.
-#[inline(always)]
-fn fanned<P: Program, V: Instructions, S: Scalar, const D: usize, const N: usize>(
-    work: &mut [[S; N]],
-    order: usize,
-    held: &[S],
-    t: S,
-    x: &[S; D],
-    sides: &Sides<S>,
-) {
-    let fans: [Fan<V>; MOST_HELD] = from_fn(|i| held.get(i).map_or(Fan::zero(), |&value| value.fan()));
-    let (time, from) = (t.fan(), vector!(Fan<V>, D; n => x[n].fan()));
-    let on = sides.map(|side| Packet::mask(side.lane(0)));
-    let keep = |n: usize, k: usize, c: Fan<V>| work[n][k] = S::from_fan(c);
-    match order {
-        LOW => unrolled::<P, Fan<V>, D, N, LOW>(&fans, time, &from, &on, keep),
-        HIGH => unrolled::<P, Fan<V>, D, N, HIGH>(&fans, time, &from, &on, keep),
-        _ => known::<P, S, D, N>(work, order, held, t, x, sides),
     }
 }
 
@@ -198,60 +134,4 @@ fn begin<S: Scalar, const N: usize>(steps: &[Step], work: &mut [[S; N]], held: &
     for step in steps {
         step.start(work, held, t, sides);
     }
-}
-
-/// With all operations unrolled.
-#[inline(always)]
-fn rolled<P: Program, S: Scalar, const D: usize, const N: usize>(
-    work: &mut [[S; N]],
-    order: usize,
-    held: &[S],
-    t: S,
-    x: &[S; D],
-    sides: &Sides<S>,
-) {
-    unroll!(n in 0..D => { work[n][0] = x[n]; });
-    every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
-    unroll!(n in 0..D => { work[n][1] = work[usize::from(P::RATES[n])][0]; });
-    for k in 1..order.min(N - 1) {
-        every!(P, i => { P::STEPS[i].next(work, held, sides, k); });
-        unroll!(n in 0..D => {
-            work[n][k + 1] = work[usize::from(P::RATES[n])][k].scale(INVERSE[k + 1]);
-        });
-    }
-}
-
-/// With everything unrolled, up to the order `TO` or all; `keep` is given each component's coefficients.
-#[inline(always)]
-fn unrolled<P: Program, S: Scalar, const D: usize, const N: usize, const TO: usize>(
-    held: &[S],
-    t: S,
-    x: &[S; D],
-    sides: &Sides<S>,
-    mut keep: impl FnMut(usize, usize, S),
-) {
-    // Room whose places are all known, for what the compiler may keep in registers or forget.
-    let mut room = [[S::zero(); N]; 24];
-    let work = &mut room[..P::SLOTS];
-    unroll!(n in 0..D => {
-        work[n][0] = x[n];
-        keep(n, 0, x[n]);
-    });
-    every!(P, i => { P::STEPS[i].start(work, held, t, sides); });
-    unroll!(n in 0..D => {
-        work[n][1] = work[usize::from(P::RATES[n])][0];
-        keep(n, 1, work[n][1]);
-    });
-    macro_rules! orders {
-        ($($k:literal)+) => {
-            $(if const { $k < TO && $k < N - 1 } {
-                every!(P, i => { P::STEPS[i].next(work, held, sides, $k); });
-                unroll!(n in 0..D => {
-                    work[n][$k + 1] = work[usize::from(P::RATES[n])][$k].scale(INVERSE[$k + 1]);
-                    keep(n, $k + 1, work[n][$k + 1]);
-                });
-            })+
-        };
-    }
-    orders!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
 }

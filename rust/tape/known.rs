@@ -1,4 +1,4 @@
-//! Tapes that the compiler knows: their series are computed by programs of their own, for speed.
+//! Tapes whose series are written out, for speed.
 
 use super::{Node, Step, Tape};
 
@@ -6,15 +6,17 @@ use super::{Node, Step, Tape};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Known {
     Not,
-    Dle,
+    Dle { damped: bool },
     Disk,
 }
 
 impl Known {
     pub(super) fn of<const D: usize>(tape: &Tape<D>) -> Self {
         let is = |steps: &[Step], rates: &[u16]| tape.steps == steps && tape.rates == *rates;
-        if is(Dle::STEPS, Dle::RATES) {
-            Known::Dle
+        if is(DLE, DLE_RATES) {
+            Known::Dle { damped: false }
+        } else if is(DAMPED_DLE, DAMPED_DLE_RATES) {
+            Known::Dle { damped: true }
         } else if is(DISK, DISK_RATES) {
             Known::Disk
         } else {
@@ -23,29 +25,25 @@ impl Known {
     }
 }
 
-/// Known tapes hold no more values than this.
-pub(super) const MOST_HELD: usize = 8;
+/// The diffusionless Lorenz equations. Their [series](super::dle) is written out.
+const DLE: &[Step] = &[
+    Step { node: Node::Sub(1, 0), to: 3 },
+    Step { node: Node::Mul(0, 2), to: 4 },
+    Step { node: Node::Mul(0, 1), to: 5 },
+    Step { node: Node::From(0, 5), to: 6 },
+];
+const DLE_RATES: &[u16] = &[3, 4, 6];
 
-/// A tape as constants; see [`Tape`] for what they mean.
-pub(super) trait Program {
-    const STEPS: &'static [Step];
-    const RATES: &'static [u16];
-    const SLOTS: usize;
-}
-
-/// The diffusionless Lorenz equations without damping.
-pub(super) struct Dle;
-
-impl Program for Dle {
-    const STEPS: &'static [Step] = &[
-        Step { node: Node::Sub(1, 0), to: 3 },
-        Step { node: Node::Mul(0, 2), to: 4 },
-        Step { node: Node::Mul(0, 1), to: 5 },
-        Step { node: Node::From(0, 5), to: 6 },
-    ];
-    const RATES: &'static [u16] = &[3, 4, 6];
-    const SLOTS: usize = 7;
-}
+/// And with damping.
+const DAMPED_DLE: &[Step] = &[
+    DLE[0],
+    DLE[1],
+    DLE[2],
+    DLE[3],
+    Step { node: Node::Scale(2, 2), to: 7 },
+    Step { node: Node::Sub(6, 7), to: 8 },
+];
+const DAMPED_DLE_RATES: &[u16] = &[3, 4, 8];
 
 /// The disk without effects, as recorded. Its [series](super::disk) is written out.
 const DISK: &[Step] = &[

@@ -5,6 +5,7 @@
 //! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
 
 mod disk;
+mod dle;
 mod jet;
 mod known;
 mod node;

@@ -18,7 +18,7 @@ pub struct Unrecordable;
 
 impl<const D: usize> Tape<D> {
     /// Records the rates of the family's systems. Parameters whose value is `fixed` become constants,
-    /// and what they make vanish is left out; not from the disk without effects, whose series is written out.
+    /// and what they make vanish is left out; from a series that is written out only where that is written, too.
     ///
     /// What is fixed does not change a bit of the series, so that a run's bits do not depend on the runs beside it.
     ///
@@ -26,13 +26,14 @@ impl<const D: usize> Tape<D> {
     /// Where the model looks at the value of a number, which a recording does not have.
     pub fn record<F: Family<D>>(family: &F, fixed: &[Option<f64>]) -> Result<Self, Unrecordable> {
         let open = Self::recorded(family, &[])?;
-        if open.known == Known::Disk || fixed.iter().all(Option::is_none) {
+        if fixed.iter().all(Option::is_none) {
             return Ok(open);
         }
         let mut tape = Self::recorded(family, fixed)?;
-        if tape.known == Known::Disk {
-            // A disk with effects that do nothing: its series is rounded as if they did.
-            tape.known = Known::Not;
+        match (open.known, tape.known) {
+            (Known::Not, _) => tape.known = Known::Not,
+            (_, Known::Not) => return Ok(open),
+            _ => {}
         }
         Ok(tape)
     }

@@ -19,7 +19,7 @@ pub trait Coefficient<S>: Copy {
 impl<S: Scalar> Coefficient<S> for S {
     #[inline(always)]
     fn nothing() -> S {
-        S::constant(-0.0)
+        -S::zero()
     }
     #[inline(always)]
     fn with(self, a: S, b: S) -> S {
@@ -52,11 +52,24 @@ pub fn inner<S: Copy, C: Coefficient<S>, const N: usize>(a: &[S; N], b: &[C; N],
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.
 #[inline(always)]
 pub fn inner_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
-    let pairs = k.saturating_sub(1) / 2;
-    let mut half = S::constant(-0.0);
-    for (&low, &high) in a[1..=pairs].iter().rev().zip(&a[k - pairs..k]) {
-        half = half.fused(low, high);
-    }
+    let half = pairs(a, k, S::nothing());
     let sum = half + half;
     if k >= 2 && k.is_multiple_of(2) { sum.fused(a[k / 2], a[k / 2]) } else { sum }
+}
+
+/// Half of it.
+#[inline(always)]
+pub fn half_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
+    let middle = k >= 2 && k.is_multiple_of(2);
+    pairs(a, k, if middle { a[k / 2].square().scale(0.5) } else { S::nothing() })
+}
+
+/// `a[j] a[k-j]` for `0 < j < k - j` added to `sum`, from the middle outwards.
+#[inline(always)]
+fn pairs<S: Scalar, const N: usize>(a: &[S; N], k: usize, mut sum: S) -> S {
+    let pairs = k.saturating_sub(1) / 2;
+    for (&low, &high) in a[1..=pairs].iter().rev().zip(&a[k - pairs..k]) {
+        sum = sum.fused(low, high);
+    }
+    sum
 }

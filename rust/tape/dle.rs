@@ -1,0 +1,120 @@
+//! The series of the diffusionless Lorenz equations, written out.
+//!
+//! ```text
+//! omega' = y - omega      y' = omega z      z' = w - omega y - B w z
+//! ```
+//!
+//! Since `y = omega + omega'`, the last one is `(z + omega^2/2)' = w - omega^2 - B w z`: of the two products one is
+//! a square, at half the cost.
+
+use super::jet::{HIGH, LOW};
+use super::node::INVERSE;
+use super::series::{half_square, inner};
+use crate::scalar::{Fan, Instructions, Isa, Scalar};
+use crate::unroll::{unroll, vector};
+
+/// The coefficients of the solution up to this order, for the tape's held values.
+#[inline(always)]
+pub(super) fn expand<V: Instructions, S: Scalar, const D: usize, const N: usize>(
+    work: &mut [[S; N]],
+    order: usize,
+    held: &[S],
+    x: &[S; D],
+    damped: bool,
+) {
+    let work: &mut [[S; N]; 3] = work.first_chunk_mut().expect("a slot for each component");
+    let x = [x[0], x[1], x[2]];
+    if damped {
+        return rolled(&mut Series::of(work, x, held[0], Some(held[2])), order);
+    }
+    if const { S::FANS && N == HIGH + 1 && !matches!(V::ISA, Isa::Baseline) } {
+        let mut room = [[Fan::<V>::zero(); N]; 3];
+        let series = &mut Series::of(&mut room, vector!(Fan<V>, 3; n => x[n].fan()), held[0].fan(), None);
+        let keep = |n: usize, k: usize, c: Fan<V>| work[n][k] = S::from_fan(c);
+        match order {
+            LOW => return unrolled::<_, N, LOW>(series, keep),
+            HIGH => return unrolled::<_, N, HIGH>(series, keep),
+            _ => {}
+        }
+    }
+    let series = &mut Series::of(work, x, held[0], None);
+    match order {
+        LOW if worthwhile::<S, N>() => unrolled::<_, N, LOW>(series, |_, _, _| {}),
+        HIGH if worthwhile::<S, N>() => unrolled::<_, N, HIGH>(series, |_, _, _| {}),
+        _ => rolled(series, order),
+    }
+}
+
+/// Whether orders are unrolled: not where tangents make every operation long.
+const fn worthwhile<S: Scalar, const N: usize>() -> bool {
+    N == HIGH + 1 && size_of::<S>() <= 2 * size_of::<S::Real>()
+}
+
+#[inline(always)]
+fn rolled<S: Scalar, const N: usize>(series: &mut Series<S, N>, order: usize) {
+    for k in 0..order.min(N - 1) {
+        series.next(k);
+    }
+}
+
+/// With every order's number known to the compiler, up to the order `TO`; `keep` is given each coefficient.
+#[inline(always)]
+fn unrolled<S: Scalar, const N: usize, const TO: usize>(
+    series: &mut Series<S, N>,
+    mut keep: impl FnMut(usize, usize, S),
+) {
+    unroll!(n in 0..3 => { keep(n, 0, series.x[n][0]); });
+    macro_rules! orders {
+        ($($k:literal)+) => {
+            $(if const { $k < TO && $k < N - 1 } {
+                series.next($k);
+                unroll!(n in 0..3 => { keep(n, $k + 1, series.x[n][$k + 1]); });
+            })+
+        };
+    }
+    orders!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
+}
+
+/// A series as far as it is known.
+struct Series<'a, S, const N: usize> {
+    /// The coefficients of omega, y and z.
+    x: &'a mut [[S; N]; 3],
+    w: S,
+    /// `B w`, where it is not zero.
+    damping: Option<S>,
+    /// The last coefficient of `omega^2/2`.
+    half: S,
+}
+
+impl<'a, S: Scalar, const N: usize> Series<'a, S, N> {
+    #[inline(always)]
+    fn of(x: &'a mut [[S; N]; 3], start: [S; 3], w: S, damping: Option<S>) -> Self {
+        unroll!(n in 0..3 => { x[n][0] = start[n]; });
+        let half = start[0].square().scale(0.5);
+        Self { x, w, damping, half }
+    }
+
+    /// The coefficients `k + 1`.
+    #[inline(always)]
+    fn next(&mut self, k: usize) {
+        let [omega, y, z] = &mut *self.x;
+        let part = INVERSE[k + 1];
+        omega[k + 1] = (y[k] - omega[k]).scale(part);
+        y[k + 1] = if k == 0 {
+            omega[0] * z[0]
+        } else {
+            inner(omega, z, k).fused(omega[k], z[0]).fused(omega[0], z[k]).scale(part)
+        };
+        let half = half_square(omega, k + 1).fused(omega[0], omega[k + 1]);
+        z[k + 1] = match self.damping {
+            Some(damping) => {
+                (-half).fused_times((self.half + self.half).fused(damping, z[k]), S::Real::constant(-part))
+            }
+            None => (-half).fused_times(self.half, S::Real::constant(-2.0 * part)),
+        };
+        if k == 0 {
+            z[1] += self.w;
+        }
+        self.half = half;
+    }
+}
