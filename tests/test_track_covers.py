@@ -154,6 +154,15 @@ def test_errors_along_streaks_and_across_are_told_apart() -> None:
     assert np.abs(covers(off, covariance(tracks, LOOK)) - 1).max() < 0.12
 
 
+def test_marks_that_sit_elsewhere_are_no_noise() -> None:
+    tracks, _ = rolled(np.random.default_rng(2), 0.02, 0.01, 0.0)
+    placed_well = covariance(tracks, LOOK)
+    for k, left in enumerate(tracks.leftover):
+        elsewhere = 0.05 * np.array([1, -1, 1, -1]) * np.exp(1j * tracks.angle[k])
+        tracks.leftover[k] = left + np.stack([elsewhere.real, elsewhere.imag], axis=-1)
+    np.testing.assert_allclose(covariance(tracks, LOOK), placed_well, rtol=1e-9, atol=1e-15)
+
+
 def test_what_a_path_is_bent_by_has_errors_of_its_own() -> None:
     tracks, _ = rolled(np.random.default_rng(3), 0.01, 0.01, 0.0)
     own = np.tile(np.eye(3), (len(tracks.t), 1, 1))

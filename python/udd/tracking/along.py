@@ -14,11 +14,22 @@ OUTLIER = 6.0  # times the median square; a mark beyond does not speak for the o
 LEAST = 0.05  # share of the misfit that either direction has at least
 
 
-def unit_covariance(tracks: Tracks, look: Look, group: NDArray[np.int_]) -> Array:
+def left_over(tracks: Tracks) -> Array:
+    """What each mark is off, (n, marks, 2), without what it is off in all frames: that is its place."""
+    turn = np.exp(1j * np.array(tracks.angle))[:, None]
+    off = np.array(tracks.leftover) @ np.array([1, 1j]) / turn
+    seen = np.isfinite(off).any(axis=0)
+    off[:, seen] -= np.nanmedian(off[:, seen].real, axis=0) + 1j * np.nanmedian(off[:, seen].imag, axis=0)
+    off *= turn
+    return np.stack([off.real, off.imag], axis=-1)
+
+
+def unit_covariance(tracks: Tracks, look: Look, off: Array, group: NDArray[np.int_]) -> Array:
     """Covariance (n, 3, 3) of (u, v, beta) for a misfit of 1 per coordinate that is left over.
 
     Along its streak a mark fades over many pixels, and errors that many pixels share, as those of
     compression, light and blur are, move it further there than the noise of single pixels lets expect.
+    `off` is what the marks leave over.
     `group` numbers the frames (below 0: none) whose streaks are so alike that the ratio is taken to be, too.
     """
     out = np.full((len(tracks.t), 3, 3), np.nan)
@@ -26,14 +37,14 @@ def unit_covariance(tracks: Tracks, look: Look, group: NDArray[np.int_]) -> Arra
     held = np.isfinite(np.array(tracks.information)).all(axis=(1, 2))
     for number in np.unique(group[group >= 0]):
         members = [int(k) for k in np.flatnonzero((group == number) & held)]
-        frames = [_marks(tracks, look, around, k) for k in members]
+        frames = [_marks(tracks, look, off, around, k) for k in members]
         ratio = _ratio([f for f in frames if f is not None])
         for k, frame in zip(members, frames, strict=True):
             out[k] = np.linalg.inv(tracks.information[k]) if frame is None else _covariance(frame[0], ratio)
     return out
 
 
-def _marks(tracks: Tracks, look: Look, around: Around, k: int) -> tuple[Array, Array] | None:
+def _marks(tracks: Tracks, look: Look, off: Array, around: Around, k: int) -> tuple[Array, Array] | None:
     """How the pose moves a frame's marks, (2 marks, 3), and what they are off, (2 marks,).
 
     Each mark has a row along its streak and one across, both in units of the noise assumed. None where it is
@@ -52,7 +63,7 @@ def _marks(tracks: Tracks, look: Look, around: Around, k: int) -> tuple[Array, A
     values, vectors = np.linalg.eigh(axes @ tracks.marks[k][used].astype(float) @ axes.transpose(0, 2, 1))
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :] @ vectors.transpose(0, 2, 1) @ axes
     design = (root @ moved_by_pose(arm)).reshape(-1, 3)
-    return design, (root @ tracks.leftover[k][used][..., None]).ravel()
+    return design, (root @ off[k][used][..., None]).ravel()
 
 
 def _left(design: Array) -> Array:

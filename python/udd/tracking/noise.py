@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .along import unit_covariance
+from .along import left_over, unit_covariance
 from .look import Look
 from .loop import Tracks
 
@@ -24,14 +24,14 @@ def covariance(tracks: Tracks, look: Look) -> Array:
     are neither; the marks' disagreement shows by how much, along their streaks and across: a rigid disk
     leaves 2 m - 3 of the 2 m coordinates of m marks over.
     """
-    chi2 = np.array(tracks.chi2)
-    marks = np.isfinite(chi2).sum(axis=1)
-    spare = np.maximum(2 * marks - 3, 0)
-    total = np.nansum(chi2, axis=1)
+    off, used = left_over(tracks), np.isfinite(np.array(tracks.chi2))
+    spare = np.maximum(2 * used.sum(axis=1) - 3, 0)
+    chi2 = np.einsum("nmi,nmij,nmj->nm", off, np.array(tracks.marks, dtype=float), off)
+    total = np.where(used, chi2, 0.0).sum(axis=1)
     usual, belief, group = _usual(total, spare, np.array(tracks.streak))
     # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
     inflation = (belief * usual + total) / (belief + spare)
-    return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, group))
+    return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, off, group))
 
 
 def with_causes(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
