@@ -194,6 +194,18 @@ def test_slip_is_no_error_that_all_marks_share() -> None:
     assert np.median(in_common(slipped, covariance(tracks, LOOK), camera)) < 0.003
 
 
+@pytest.mark.parametrize(
+    ("pivot", "drive"), [(PIVOT + 1.7, 0.034j), (PIVOT + 1.7j, 0.034j), (PIVOT - 2, 0.039j)]
+)
+def test_a_law_of_rolling_that_fails_is_no_noise(pivot: complex, drive: complex) -> None:
+    # As where the wheels slip by a law of their own: no contact and no drive explain the motion.
+    tracks, _ = rolled(np.random.default_rng(6), 0.01, 0.01, 0.0)
+    found = in_common(
+        tracks, covariance(tracks, LOOK), Camera(SCALE, 1.0, "given", pivot, 0.0, "given", drive)
+    )
+    assert found.max() < 0.008  # by second differences alone 0.1
+
+
 def test_an_exposure_is_found_from_a_first_estimate_of_a_third() -> None:
     rng = np.random.default_rng(6)
     frames = []

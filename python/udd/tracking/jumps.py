@@ -13,12 +13,12 @@ from .result import Camera
 
 Array = NDArray[np.float64]
 GROUP = 80  # frames with like streaks that share as much
-CLOSE = 2.5  # usual intervals that three frames may span
+CLOSE = 2.5  # usual intervals that three frames in a row may span
 OUTLIER = 6.0  # times the median; a jump beyond is cut down to that: the disk may have slipped or been let go
 CUT = 1 - 2**-OUTLIER  # of their mean that squares of two normal coordinates keep so
-# standard error of such a mean, times the root of their number: second differences that overlap go together,
-# so that there are half as many
-SCATTER = 2**0.5
+# standard error of such a mean, times the root of their number: fourth differences that overlap go together,
+# so that there are 2.6 times fewer
+SCATTER = 2.6**0.5
 
 
 def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
@@ -26,7 +26,10 @@ def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
 
     Codecs move all that goes the same way alike, by a vector or by leaving out what changes little. A disk
     that rolls keeps (see `pivot`)  (c - p) exp(-i angle) - d * integral exp(-i angle) dt ; over three frames
-    in a row slip changes that evenly, and its second difference is what the frames' own errors make it.
+    in a row slip changes that evenly, so that its second difference is what the frames' own errors make it.
+    Where the law of rolling itself fails, by a slip that depends on where the disk is, or for a contact taken
+    elsewhere, that difference is not noise, but seen from the wheels it changes little from frame to frame:
+    therefore the second difference of the second differences is what counts.
     """
     out = np.zeros(len(tracks.t))
     if not np.isfinite(camera.drive):
@@ -44,7 +47,7 @@ def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
 
 
 def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array]:
-    """Squares of second differences and what is expected [pixels^2], per frame; NaN where there is none."""
+    """Squares of differences and what is expected, for unit weights [pixels^2], per frame; NaN for none."""
     t, angle = np.array(tracks.t), np.array(tracks.angle)
     away = np.array(tracks.centre) - camera.pivot
     drive = complex(np.conj(camera.drive)) * camera.scale
@@ -52,16 +55,25 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     maps = moved_by_pose(-away)  # of a pose's error to that of c - p where the angle is taken out
     own = np.einsum("nij,njk,nik->n", maps, covariance, maps)
     usual = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-    seen, expected = np.full(len(t), np.nan), np.full(len(t), np.nan)
+    second, weights = np.full(len(t), np.nan + 0j), np.zeros((len(t), 3), dtype=complex)
     for k in range(1, len(t) - 1):
         three = slice(k - 1, k + 2)
         if not good[three].all() or t[k + 1] - t[k - 1] > CLOSE * usual:
             continue
         near = np.flatnonzero(good[max(0, k - 2) : k + 3]) + max(0, k - 2)
         swept = CubicSpline(t[near], np.exp(-1j * (angle[near] - angle[k]))).antiderivative()(t[three])
-        rest = away[three] * np.exp(-1j * (angle[three] - angle[k])) - drive * swept
-        seen[k] = abs(rest[0] - 2 * rest[1] + rest[2]) ** 2 / 6
-        expected[k] = own[three] @ np.array([1, 4, 1]) / 6
+        weights[k] = np.array([1, -2, 1]) * np.exp(-1j * (angle[three] - angle[k]))
+        second[k] = weights[k] @ away[three] - drive * (swept[0] - 2 * swept[1] + swept[2])
+    seen, expected = np.full(len(t), np.nan), np.full(len(t), np.nan)
+    for k in range(2, len(t) - 2):
+        each = np.zeros(5, dtype=complex)
+        for start, (times, row) in enumerate(zip((1, -2, 1), weights[k - 1 : k + 2], strict=True)):
+            each[start : start + 3] += times * row
+        size = np.abs(each) ** 2
+        difference = second[k - 1] - 2 * second[k] + second[k + 1]
+        if np.isfinite(difference):
+            seen[k] = abs(difference) ** 2 / size.sum()
+            expected[k] = size @ own[k - 2 : k + 3] / size.sum()
     return seen, expected
 
 
