@@ -17,7 +17,7 @@ LEAST = 0.05  # share of the misfit that either direction has at least
 def left_over(tracks: Tracks) -> Array:
     """What each mark is off, (n, marks, 2), without what it is off in all frames: that is its place."""
     turn = np.exp(1j * np.array(tracks.angle))[:, None]
-    off = np.array(tracks.leftover) @ np.array([1, 1j]) / turn
+    off = np.array(tracks.leftover) @ np.array([1, 1j]) * turn.conj()
     seen = np.isfinite(off).any(axis=0)
     off[:, seen] -= np.nanmedian(off[:, seen].real, axis=0) + 1j * np.nanmedian(off[:, seen].imag, axis=0)
     off *= turn
