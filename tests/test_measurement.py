@@ -86,6 +86,11 @@ def test_covariance_has_the_given_sigmas_and_correlations() -> None:
     assert np.allclose(c[:, 0, 2], m.rho[:, 1] * m.sigma[:, 0] * m.sigma[:, 2], rtol=1e-15)
 
 
+def test_a_slice_may_be_empty() -> None:
+    nothing = disk().slice(1e3, 2e3)
+    assert len(nothing) == 0 and nothing.rho is not None and nothing.rho.shape == (0, 3)
+
+
 def test_slice_and_seen() -> None:
     m = disk()
     assert not m.seen[7] and not m.seen[9] and m.seen.sum() == N - 2
