@@ -10,7 +10,7 @@
 
 use super::jet::{HIGH, LOW};
 use super::node::INVERSE;
-use super::series::{Coefficient, inner};
+use super::series::{Coefficient, inner, orders};
 use crate::model::Sides;
 use crate::scalar::{Instructions, Isa, Packet, Real, Scalar};
 use crate::unroll::unroll;
@@ -60,14 +60,7 @@ fn unrolled<V: Instructions, S: Scalar, const N: usize, const TO: usize>(
     work: &mut [[S; N]; SLOTS],
 ) {
     let mut series = Series { last: start.x, omega: [0.0; N], factors: [Lanes::<V>::nothing(); N] };
-    macro_rules! orders {
-        ($($k:literal)+) => {
-            $(if const { $k < TO && $k < N - 1 } {
-                series.step(start, work, $k);
-            })+
-        };
-    }
-    orders!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
+    orders!(k below TO => { series.step(start, work, k); });
 }
 
 /// The series of a single trajectory, whose sums are computed side by side.

@@ -9,7 +9,7 @@
 
 use super::jet::{HIGH, LOW};
 use super::node::INVERSE;
-use super::series::{half_square, inner};
+use super::series::{half_square, inner, orders};
 use crate::scalar::{Fan, Instructions, Isa, Scalar};
 use crate::unroll::{unroll, vector};
 
@@ -38,11 +38,14 @@ pub(super) fn expand<V: Instructions, S: Scalar, const D: usize, const N: usize>
         }
     }
     let series = &mut Series::of(work, x, held[0], None);
-    match order {
-        LOW if worthwhile::<S, N>() => unrolled::<_, N, LOW>(series, |_, _, _| {}),
-        HIGH if worthwhile::<S, N>() => unrolled::<_, N, HIGH>(series, |_, _, _| {}),
-        _ => rolled(series, order),
+    if const { worthwhile::<S, N>() } {
+        match order {
+            LOW => return unrolled::<_, N, LOW>(series, |_, _, _| {}),
+            HIGH => return unrolled::<_, N, HIGH>(series, |_, _, _| {}),
+            _ => {}
+        }
     }
+    rolled(series, order);
 }
 
 /// Whether orders are unrolled: not where tangents make every operation long.
@@ -64,15 +67,10 @@ fn unrolled<S: Scalar, const N: usize, const TO: usize>(
     mut keep: impl FnMut(usize, usize, S),
 ) {
     unroll!(n in 0..3 => { keep(n, 0, series.x[n][0]); });
-    macro_rules! orders {
-        ($($k:literal)+) => {
-            $(if const { $k < TO && $k < N - 1 } {
-                series.next($k);
-                unroll!(n in 0..3 => { keep(n, $k + 1, series.x[n][$k + 1]); });
-            })+
-        };
-    }
-    orders!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
+    orders!(k below TO => {
+        series.next(k);
+        unroll!(n in 0..3 => { keep(n, k + 1, series.x[n][k + 1]); });
+    });
 }
 
 /// A series as far as it is known.

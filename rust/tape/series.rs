@@ -7,6 +7,20 @@
 
 use crate::scalar::Scalar;
 
+/// The body for every order `k` below `to`, with its number known when the program is compiled.
+macro_rules! orders {
+    ($k:ident below $to:expr => $body:block) => {
+        $crate::tape::series::orders!(@ $k $to, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23)
+    };
+    (@ $k:ident $to:expr, $body:block, $($n:literal)+) => {
+        $(if const { $n < $to } {
+            let $k: usize = $n;
+            $body
+        })+
+    };
+}
+pub(super) use orders;
+
 /// A coefficient, or several side by side, that numbers multiply.
 pub trait Coefficient<S>: Copy {
     /// -0 : adding to it changes nothing, not even the sign of a zero.

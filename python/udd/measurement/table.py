@@ -103,8 +103,8 @@ class Measurement:
         put(self, "t", times)
         put(self, "values", table)
         put(self, "sigma", None if sigma is None else _columns(sigma, names))
-        together = None if rho is None else np.array(rho, dtype=np.float64)
-        put(self, "rho", together[:, None] if together is not None and together.ndim == 1 else together)
+        pairs = -1 if n else m * (m - 1) // 2  # of no rows numpy cannot tell
+        put(self, "rho", None if rho is None else np.array(rho, dtype=np.float64).reshape(n, pairs))
         put(self, "flag", flags)
         put(self, "meta", dict(meta or {}))
         put(self, "names", names)

@@ -16,6 +16,7 @@ GROUP = 80  # frames with like streaks that share as much
 CLOSE = 2.5  # usual intervals that three frames in a row may span
 OUTLIER = 6.0  # times the median; a jump beyond is cut down to that: the disk may have slipped or been let go
 CUT = 1 - 2**-OUTLIER  # of their mean that squares of two normal coordinates keep so
+SECOND = np.array([1.0, -2.0, 1.0])  # difference
 # standard error of such a mean, times the root of their number: fourth differences that overlap go together,
 # so that there are 2.6 times fewer
 SCATTER = 2.6**0.5
@@ -62,15 +63,15 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
             continue
         near = np.flatnonzero(good[max(0, k - 2) : k + 3]) + max(0, k - 2)
         swept = CubicSpline(t[near], np.exp(-1j * (angle[near] - angle[k]))).antiderivative()(t[three])
-        weights[k] = np.array([1, -2, 1]) * np.exp(-1j * (angle[three] - angle[k]))
-        second[k] = weights[k] @ away[three] - drive * (swept[0] - 2 * swept[1] + swept[2])
+        weights[k] = SECOND * np.exp(-1j * (angle[three] - angle[k]))
+        second[k] = weights[k] @ away[three] - drive * (SECOND @ swept)
     seen, expected = np.full(len(t), np.nan), np.full(len(t), np.nan)
     for k in range(2, len(t) - 2):
         each = np.zeros(5, dtype=complex)
-        for start, (times, row) in enumerate(zip((1, -2, 1), weights[k - 1 : k + 2], strict=True)):
+        for start, (times, row) in enumerate(zip(SECOND, weights[k - 1 : k + 2], strict=True)):
             each[start : start + 3] += times * row
         size = np.abs(each) ** 2
-        difference = second[k - 1] - 2 * second[k] + second[k + 1]
+        difference = SECOND @ second[k - 1 : k + 2]
         if np.isfinite(difference):
             seen[k] = abs(difference) ** 2 / size.sum()
             expected[k] = size @ own[k - 2 : k + 3] / size.sum()
