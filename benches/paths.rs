@@ -141,7 +141,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
         tolerance: tolerance(1e-8),
     };
     let work = move |_| {
-        let set = Set { model: model.clone(), camera: vec![0.0; 9], clock: 0.0 };
+        let set = Set { model: model.clone(), camera: vec![0.0; 11], clock: 0.0 };
         let start = Point { states: states.clone(), sets: vec![set] };
         black_box(estimator.solve(start, &Options::default(), &Stop::new()).unwrap());
     };

@@ -76,7 +76,7 @@ fn free(role: Role, mean: f64, sd: f64) -> Free {
 
 /// One film's point.
 fn point(states: Vec<[f64; 4]>, model: Vec<f64>) -> Point<4> {
-    Point { states, sets: vec![Set { model, camera: vec![0.0; 9], clock: 0.0 }] }
+    Point { states, sets: vec![Set { model, camera: vec![0.0; 11], clock: 0.0 }] }
 }
 
 #[test]
@@ -144,13 +144,13 @@ proptest! {
         let values = [PAPER.as_slice(), &[4.0]].concat();
         let (record, _) = film(&family, &values, 2, 3);
         let mut roles: Vec<Role> = (0..7).map(Role::Model).collect();
-        roles.extend((0..9).map(Role::Camera));
+        roles.extend((0..11).map(Role::Camera));
         roles.push(Role::Clock);
         let mut estimator = problem(family, record, Vec::new());
         // Tight, so that the differences see the flow and not the integrator.
         estimator.tolerance = Tolerance { rtol: 1e-13, atol: 1e-14 };
         let states = vec![[omega, y, z, beta], [omega, y, z, beta]];
-        let camera = vec![y0, 1e-3, tilt, 5e-3, 1e-3, -5e-4, lag, row, 0.01];
+        let camera = vec![y0, 1e-3, tilt, 5e-3, 1e-3, -5e-4, lag, row, 0.01, 0.02, -0.01];
         let point = Point { states, sets: vec![Set { model: values, camera, clock: 1e-3 }] };
         estimator.free = roles.iter().map(|&role| free(role, 0.0, f64::INFINITY)).collect();
         let linear = estimator.linearise(&point).unwrap();

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,6 +13,7 @@ import simulated
 import udd
 from udd.errors import FitError
 from udd.fitting import record_of
+from udd.fitting.fit import _afresh
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +63,32 @@ def test_the_noise_is_found(fits):
         truth = camera.noise + camera.per_speed * speed
         # A thousand frames give 3 %; the law is a sum in the truth and a root of squares in the model.
         np.testing.assert_allclose(found, truth, rtol=0.25)
+
+
+def test_a_lens_bends_about_the_picture_s_middle():
+    middle, bent = np.array([0.03, -0.02]), 0.02  # at 0.1 m from the middle
+    measured, _states = simulated.film(udd.Disk(0.05), np.random.default_rng(3), 60.0, simulated.Camera())
+    away = measured.values[:, :2] - middle
+    values = measured.values.copy()
+    values[:, :2] += bent / 0.1**2 * (away**2).sum(axis=1)[:, None] * away
+    known = replace(measured, values=values, meta={"middle": middle.tolist()})
+    fit = udd.fit(known, udd.Disk(0.05), priors={"lens": (0.0, 0.02)})
+    for name, value in (("lens", bent), ("y0", 1e-3), ("z0", -7e-4)):
+        assert abs(fit.parameters[name] - value) < 4 * fit.errors[name], name
+    assert fit.errors["lens"] < bent / 4
+    with pytest.raises(FitError, match="two numbers"):
+        udd.fit(replace(measured, meta={"middle": 0.1}), udd.Disk(0.05))
+
+
+def test_a_model_is_first_held_with_what_was_known_of_it(fits):
+    """One in fifty noisy records makes friction flat (k1 near k0) while states follow the frames."""
+    model, _camera, fit = fits[0]
+    (values, camera, clock), *_ = _afresh(fit).sets
+    known = {f.name: f.mean for f in fit.problem.free if f.name in ("k0", "k1", "k2", "W")}
+    found = dict(zip(model.parameters, values, strict=True))
+    assert {name: found[name] for name in known} == known
+    assert found["relaxation.b"] == fit.parameters["relaxation.b"] != 0.0  # of which nothing was known
+    assert (camera, clock) == fit.point.sets[0][1:]
 
 
 def test_gaps_and_outliers_do_not_hurt():

@@ -9,6 +9,8 @@ use crate::run::Stop;
 
 /// Trials of one step, ever shorter.
 const MOST_TRIALS: i32 = 12;
+/// The shortest part of a full step that is tried before its parameters are damped.
+const SHORTEST: f64 = 0.25;
 /// Damping beyond which parameters no longer move.
 const MOST_DAMPING: f64 = 1e4;
 /// So many steps in a row without gain are the end.
@@ -148,14 +150,14 @@ where
             let reduced = system.eliminate(&self.record.t)?;
             let mut gained = 0.0;
             let mut easy = false;
-            // A step that does not lower the cost is damped more strongly and tried again.
+            // A step that does not lower the cost is shortened: along what the data hardly determine, the misfits'
+            // curvature makes it too long, and damping would all but stop it. Then it is damped ever more strongly.
+            let mut part = 1.0;
             for shorter in 0..MOST_TRIALS {
                 let (states, parameters) = self.step(&reduced, damping)?;
-                if reduced.promise(&parameters) < options.decrease {
-                    easy = true;
-                }
+                easy |= reduced.promise(&parameters) < options.decrease;
                 // Where damped parameters do not help it is the states that go too far.
-                let length = if damping > MOST_DAMPING { 0.5_f64.powi(shorter) } else { 1.0 };
+                let length = if damping > MOST_DAMPING { 0.5_f64.powi(shorter) } else { part };
                 let trial = self.moved(&here.point, &states, &parameters, length);
                 let new = self.look(trial).ok().filter(|new| new.cost.total() <= here.cost.total());
                 if let Some(new) = new {
@@ -168,6 +170,11 @@ where
                 if easy && damping == 0.0 {
                     break;
                 }
+                if damping == 0.0 && part > SHORTEST {
+                    part *= 0.5;
+                    continue;
+                }
+                part = 1.0;
                 damping = if damping == 0.0 { 1e-2 } else { damping * 10.0 };
             }
             // At a kink of the law the cost has one too: there full steps keep promising more than they hold.

@@ -20,13 +20,14 @@ const ARM: f64 = 0.1;
 /// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
 ///
 /// ```text
-/// (Y, Z)_seen = (1 + scale + lens r^2/A^2) Rot(tilt) [(Y, Z) + Rot(beta) (right, up)] + (y0, z0)
+/// p = (1 + scale) Rot(tilt) [(Y, Z) + Rot(beta) (right, up)] + (y0, z0)
+/// (Y, Z)_seen = p + lens |p - m|^2/A^2 (p - m),   m = (middle_y, middle_z)
 /// beta_seen = beta + tilt - lag Omega
 /// ```
 ///
 /// `y0, z0` is where the pivot really is in the measurement's coordinates, `tilt` turns the picture
-/// clockwise, `lens` is how much larger than in the middle a lens shows what lies at the distance A = 0.1 m
-/// from there, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
+/// clockwise, `lens` is how much farther from the picture's middle `m` a lens shows what lies at the distance
+/// A = 0.1 m from there, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
 /// (marks are glued by hand), `lag` is how much later than the position the orientation is seen, and with a rolling
 /// shutter a point at height `Z` is exposed at `t - row Z`.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +44,8 @@ impl Sensor<4, 3> for DiskCamera {
         ("lag", "s"),
         ("row", "s/m"),
         ("lens", ""),
+        ("middle_y", "m"),
+        ("middle_z", "m"),
     ];
 
     fn is_angle(&self, channel: usize) -> bool {
@@ -51,17 +54,19 @@ impl Sensor<4, 3> for DiskCamera {
 
     #[inline(always)]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
-        let &[y0, z0, tilt, scale, right, up, lag, row, lens] =
-            camera.first_chunk().expect("nine camera parameters");
+        let &[y0, z0, tilt, scale, right, up, lag, row, lens, middle_y, middle_z] =
+            camera.first_chunk().expect("eleven camera parameters");
         let late = -(row * x[2]);
         let beta = x[3] + late * rate[3];
         let (sin, cos) = (beta.sin(), beta.cos());
         let y = x[1] + late * rate[1] + right * cos + up * sin;
         let z = x[2] + late * rate[2] + up * cos - right * sin;
         let beta = beta - lag * rate[3];
-        let (sin, cos) = (tilt.sin(), tilt.cos());
-        let size = S::one() + scale + lens * (y.square() + z.square()).scale(1.0 / (ARM * ARM));
-        [size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0, beta + tilt]
+        let (sin, cos, size) = (tilt.sin(), tilt.cos(), S::one() + scale);
+        let (y, z) = (size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0);
+        let (across, upward) = (y - middle_y, z - middle_z);
+        let bent = lens * (across.square() + upward.square()).scale(1.0 / (ARM * ARM));
+        [y + bent * across, z + bent * upward, beta + tilt]
     }
 }
 

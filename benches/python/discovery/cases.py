@@ -96,7 +96,10 @@ def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
             return Record(world, motion, camera, multiples, known, filmed(motion, duration, rng))
         stated, seen = film(camera, motion, duration, rng)
         sigma = np.tile([camera.noise, camera.noise, camera.angle_noise], (len(stated), 1))
-        return Record(world, motion, camera, multiples, known, udd.Measurement(stated, seen, sigma=sigma))
+        # A picture's middle is where it is, in coordinates that count from where the pivot is taken to be.
+        meta = {"middle": [m + off for m, off in zip(camera.middle, camera.offset, strict=True)]}
+        measured = udd.Measurement(stated, seen, sigma=sigma, meta=meta)
+        return Record(world, motion, camera, multiples, known, measured)
     raise RuntimeError(f"{case.title}: the disk leaves the wheels in every draw")
 
 

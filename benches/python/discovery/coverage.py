@@ -17,6 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # the jobs are what runs in paral
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from camera import PICTURE
 from cases import Case, Record, draw
 from scipy import stats
 
@@ -24,6 +25,7 @@ import udd
 
 SEED = 20261122
 DURATION = 120.0
+ARM = 0.1  # m from the picture's middle, where a fit tells the lens
 
 
 def truth(record: Record) -> dict[str, float]:
@@ -31,7 +33,8 @@ def truth(record: Record) -> dict[str, float]:
     device, camera = record.world.device, record.camera
     return {
         **{name: float(getattr(device, name)) for name in ("k0", "k1", "k2", "W")},
-        **{name: float(getattr(camera, name)) for name in ("tilt", "scale", "lag", "row", "clock", "lens")},
+        **{name: float(getattr(camera, name)) for name in ("tilt", "scale", "lag", "row", "clock")},
+        "lens": camera.lens * (ARM / PICTURE) ** 2,
         "y0": float(camera.offset[0]),
         "z0": float(camera.offset[1]),
         "right": float(camera.marks[0]),

@@ -81,6 +81,8 @@ def _seen(
     omega, y, z, beta = x.T
     n, zero, one = len(x), np.zeros(len(x)), np.ones(len(x))
     rate = (motion(t + 1e-5) - motion(t - 1e-5)) / 2e-5
+    across, upward = y - camera.middle[0], z - camera.middle[1]
+    away = (across**2 + upward**2) / 0.01  # told at 0.1 m from the picture's middle
     moves = {
         "y0": (one, zero, zero),
         "z0": (zero, one, zero),
@@ -90,7 +92,7 @@ def _seen(
         "up": (np.sin(beta), np.cos(beta), zero),
         "lag": (zero, zero, -omega),
         "row": tuple(-z * r for r in rate.T[1:]),
-        "lens": (y * (y**2 + z**2) / 0.01, z * (y**2 + z**2) / 0.01, zero),
+        "lens": (across * away, upward * away, zero),
     }
     known = assumed.camera
     camera_columns = [np.column_stack(moves[name]) for name in known]

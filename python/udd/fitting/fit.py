@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from udd import _core
 from udd.effects import Effect
 from udd.errors import FitError
 from udd.measurement import Measurement
@@ -16,7 +15,7 @@ from udd.own_models import OwnModel
 
 from .noise import estimated, stated
 from .own import levels_of
-from .parameters import Free, free_parameters
+from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .solve import solve, tighten
@@ -109,13 +108,15 @@ def fit_record(
     models = _models(model, measurements)
     kind = models[0].kind
     parameters = free_parameters(models, free, camera, priors, each)
-    cameras = [0.0] * len(_core.camera_parameters(kind))
     if isinstance(models[0], OwnModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
     else:
         schedule = levels(kind)[: SEARCHED.get(kind) if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
-    sets = tuple((list(own.parameters.values()), list(cameras), 0.0) for own in models)
+    sets = tuple(
+        (list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
+        for own, film in zip(models, measurements, strict=True)
+    )
     return _anneal(measurements, problem, Point(record.states, sets))
 
 
@@ -213,10 +214,25 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
         problem = replace(problem, diffusion=diffusion, noise=as_stated)
         shown, problem, point = _estimate_noise(measurements, problem, point)
         if shown:
-            return tighten(measurements, problem, point, problem.schedule[number:])
+            loose = tighten(measurements, problem, point, problem.schedule[number : number + 1])
+            return tighten(measurements, loose.problem, _afresh(loose), problem.schedule[number + 1 :], loose)
     # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
     believed = as_stated.everywhere(len(problem.record.t))
     return tighten(measurements, replace(problem, noise=believed), first, problem.schedule)
+
+
+def _afresh(fitted: Fit) -> Point:
+    """The states of a fit, with those of the model's parameters that have a prior at its mean.
+
+    Where states follow the frames a law that bends with the speed, as the friction's does, may come out
+    flat, and would then stay so.
+    """
+    sets = [([*values], camera, clock) for values, camera, clock in fitted.point.sets]
+    for free in fitted.problem.free:
+        if free.role == "model" and np.isfinite(free.sd):
+            for values, _camera, _clock in sets if free.film is None else [sets[free.film]]:
+                values[free.index] = free.mean
+    return Point(fitted.states, tuple(sets))
 
 
 def _estimate_noise(

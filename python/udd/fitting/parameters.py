@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from udd.models import Disk, Model, Pendulum
 #: What is known of a camera beforehand, as standard deviations around zero: a pivot found to a few
 #: millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose centre is off by a millimetre,
 #: an orientation that lags the position by milliseconds, a shutter that may roll (a frame's time over a
-#: picture 0.4 m high), a lens that distorts by 1 % at 0.1 m from the middle, a clock good to 0.3 %. A
+#: picture 0.4 m high), a lens that distorts by 1 % at 0.2 m from the middle, a clock good to 0.3 %. A
 #: pendulum's pivot is known to 1 % of its length.
 CAMERA = {
     "disk": {
@@ -26,7 +27,7 @@ CAMERA = {
         "up": 1e-3,
         "lag": 0.01,
         "row": 0.05,
-        "lens": 0.01,
+        "lens": 0.0025,
     },
     "pendulum": {"theta0": 0.1, "aside": 0.01, "above": 0.01},
 }
@@ -134,6 +135,25 @@ def free_parameters(
             label = f"{name}[{film}]" if several else name
             result.append(Free(label, role, index, 0.0, known[name], film if several else None))
     return _with_priors(result, dict(priors or {}))
+
+
+def known_camera(kind: str, meta: Mapping[str, Any]) -> list[float]:
+    """The camera's parameters before a fit: it gets nothing wrong, and its picture's middle is as said.
+
+    Raises
+    ------
+    FitError
+        ``middle`` is said, but is not two numbers.
+    """
+    known = dict.fromkeys((name for name, _unit in _core.camera_parameters(kind)), 0.0)
+    if "middle_y" in known and meta.get("middle") is not None:
+        try:
+            known["middle_y"], known["middle_z"] = (float(x) for x in meta["middle"])
+        except (TypeError, ValueError):
+            raise FitError(f"the picture's middle must be two numbers [m], not {meta['middle']!r}") from None
+        if not np.isfinite(list(known.values())).all():
+            raise FitError(f"the picture's middle must be two finite numbers [m], not {meta['middle']!r}")
+    return list(known.values())
 
 
 def _amplitudes(model: Model) -> list[str]:

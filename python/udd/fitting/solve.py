@@ -140,12 +140,13 @@ def tighten(
     problem: Problem,
     point: Point,
     schedule: Sequence[tuple[float, ...]],
+    best: Fit | None = None,
 ) -> Fit:
     """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
 
     Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
+    `best` is a fit that was held more loosely, and stands where nothing tighter does.
     """
-    best: Fit | None = None
     for diffusion in schedule:
         problem = replace(problem, diffusion=diffusion)
         result = solve(measurements, problem, point, _STEPS)

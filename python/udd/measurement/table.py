@@ -45,7 +45,8 @@ class Measurement:
         Why a frame is not usable; the empty string is a good frame. One that begins with ``gap`` (frames are
         missing before this one) or ``degraded`` is a remark: the row counts, with its standard errors.
     meta : mapping, optional
-        What else is known: ``R`` [m], ``W`` [m/s], ``source``, ``fps``, ...
+        What else is known: ``R`` [m], ``W`` [m/s], ``source``, ``fps``, ``middle`` (Y and Z [m] of the
+        picture's middle, about which a lens bends it), ...
     names : tuple of str, optional
         Column names; found from the number of columns if not given.
     quality : mapping, optional
