@@ -92,6 +92,8 @@ def meta_of(
             stacklevel=5,
         )
     look = known.look
+    height, width = known.view.shape
+    middle = (complex(width / 2, height / 2) - camera.pivot) / camera.scale
     return {
         "source": film.path.name,
         "R": setup.radius,
@@ -110,6 +112,7 @@ def meta_of(
         "pivot_v": camera.pivot.imag,
         "pivot_sigma": camera.pivot_sigma,
         "pivot_from": camera.pivot_from,
+        "middle": [float(middle.real), float(-middle.imag)],
         "drive_seen": float(camera.drive.imag),
         "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
         "marks_px": [[m.place.real, m.place.imag] for m in look.marks],

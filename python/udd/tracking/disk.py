@@ -13,6 +13,9 @@ from .look import Look, Motion, Pose
 
 RAYS = 180
 SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
+SHIFT = 0.3  # pixels by which a rim may seem to be shifted in the picture
+ROUNDS = 20
+LEAST = 0.01  # pixels: the radius is known no better
 SMEAR = 3.0  # pixels each side of the rim that lens and compression blur
 
 
@@ -37,13 +40,13 @@ def outline(
 ) -> Outline:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
-    Where the background or a shadow shifts an edge, it does so in the picture; the turning disk
-    averages it out of the centre. The rim is looked for within `span` of the marks' reach. `short` is by how
-    much each frame's disk is stretched (below 0: foreshortened) in the direction `across`.
+    Where light, shadow or lens shift the whole rim, they do so in the picture; as the disk turns this is told
+    from its centre. The rim is looked for within `span` of the marks' reach. `short` is by how much each
+    frame's disk is stretched (below 0: foreshortened) in the direction `across`.
     """
     angles = np.arange(RAYS) * (2 * np.pi / RAYS)
     rays = np.exp(1j * angles)
-    points, group = [], []
+    points, turns, group = [], [], []
     for number, (picture, pose, motion) in enumerate(frames):
         late = _late(pose.centre + sum(span) / 2 * look.reach * rays, look, picture.y.shape[0])
         r = _rim(picture.y, view, np.asarray(pose.centre + motion.rate * late), rays, look, span)
@@ -53,40 +56,57 @@ def outline(
         if short:
             seen = seen - short[number] / (1 + short[number]) * (seen * np.conj(across)).real * across
         points.append(seen * np.exp(-1j * turn))
+        turns.append(np.exp(1j * turn))
         group.append(np.full(int(ok.sum()), number))
     z = np.concatenate(points) if points else np.empty(0, dtype=complex)
     if len(z) < 60:
         raise TrackError("the disk's rim cannot be told from the background, so the film has no scale")
-    weight = np.ones(len(z))
-    centre, radius, rest = 0j, float(np.median(np.abs(z))), np.zeros(len(z))
-    for _ in range(20):
-        arm = z - centre
-        rest = np.abs(arm) - radius
-        spread = max(1.48 * float(np.median(np.abs(rest - np.median(rest)))), 0.02)
-        weight = 1 / (1 + (rest / (2 * spread)) ** 2)
-        design = np.column_stack([arm.real / np.abs(arm), arm.imag / np.abs(arm), np.ones(len(z))])
-        change = np.linalg.lstsq(design * weight[:, None], rest * weight, rcond=None)[0]
-        centre += complex(change[0], change[1])
-        radius += float(change[2])
+    return turning_circle(z, np.concatenate(turns), np.concatenate(group))
+
+
+def turning_circle(
+    points: NDArray[np.complex128], turned: NDArray[np.complex128], frame: NDArray[np.int_]
+) -> Outline:
+    """Circle through points of a body, given by how far (as a unit number) it had turned in each one's frame.
+
+    All of a frame's points may be shifted alike in the picture, by as much in every frame.
+    """
+    found = np.array([0.0, 0.0, 0.0, 0.0, np.median(np.abs(points))])  # centre, shift in the picture, radius
+    known = np.diag([0.0, 0.0, SHIFT**-2, SHIFT**-2, 0.0])
+    for _ in range(ROUNDS):
+        design, rest, spread = _radial(points, turned, found)
+        far = (rest / (2 * spread)) ** 2
+        pull = (rest / (1 + far) / spread**2)[:, None] * design  # what is far off pulls less
+        normal = design.T @ (design / (1 + far[:, None])) / spread**2 + known
+        change = np.linalg.solve(normal, pull.sum(axis=0) - known @ found)
+        found = found + change
         if np.abs(change).max() < 1e-6:
             break
     # frames are the independent pieces: edges within one share the light and the compression
-    groups = [g for g in _groups(np.concatenate(group)) if g.any()]
-    means = np.array([np.average(rest[g], weights=weight[g]) for g in groups])
-    sigma = float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else 0.5
-    pulls = [2 * np.average(rest[g] * arm[g] / np.abs(arm[g]), weights=weight[g]) for g in groups]
-    off = float(np.std(pulls, ddof=1) / np.sqrt(2 * len(pulls))) if len(pulls) > 1 else 0.5
-    return Outline(centre, radius, max(sigma, 0.01), off, len(z))
+    frames = np.unique(frame)
+    pulls = np.array([pull[frame == k].sum(axis=0) for k in frames])
+    stiff = (1 - far) / (1 + far) ** 2 / spread**2  # how a point's pull changes with its distance
+    inverse = np.linalg.inv(design.T @ (stiff[:, None] * design) + known)
+    variance = np.diag(inverse @ (pulls.T @ pulls + known) @ inverse) if len(frames) > 1 else np.full(5, 0.25)
+    off, sigma = float(np.sqrt(variance[:2].mean())), max(float(np.sqrt(variance[4])), LEAST)
+    return Outline(complex(found[0], found[1]), float(found[4]), sigma, off, len(points))
+
+
+def _radial(
+    points: NDArray[np.complex128], turned: NDArray[np.complex128], found: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """How centre, shift and radius move each point's distance from the circle; that distance; its scatter."""
+    arm = points - complex(found[0], found[1]) - complex(found[2], found[3]) / turned
+    body = arm / np.abs(arm)
+    picture, rest = body * turned, np.abs(arm) - found[4]
+    design = np.column_stack([body.real, body.imag, picture.real, picture.imag, np.ones(len(rest))])
+    return design, rest, max(1.48 * float(np.median(np.abs(rest - np.median(rest)))), 0.02)
 
 
 def _late(plane: NDArray[np.complex128], look: Look, height: int) -> NDArray[np.float64]:
     """How much later than the middle row the rows of points of the plane are exposed [s]."""
     rows = look.lens.picture(plane).imag
     return np.asarray(look.readout * ((rows + 0.5) / height - 0.5))
-
-
-def _groups(number: NDArray[np.int_]) -> list[NDArray[np.bool_]]:
-    return [number == k for k in np.unique(number)]
 
 
 def _rim(
