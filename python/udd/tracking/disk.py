@@ -13,7 +13,7 @@ from .look import Look, Motion, Pose
 
 RAYS = 180
 SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
-SHIFT = 0.1  # pixels by which light or lens may shift a rim in the picture
+SHIFT = 0.2  # pixels by which light or lens may shift a rim in the picture
 ROUNDS = 20
 LEAST = 0.01  # pixels: the radius is known no better
 SMEAR = 3.0  # pixels each side of the rim that lens and compression blur
