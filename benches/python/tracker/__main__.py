@@ -7,6 +7,11 @@ of 255, MPEG-4 as OpenCV writes it, exposure 10 ms, the support before the disk;
 and kept in the folder. Nothing about them is told to udd but the disk's radius; the other trackers are told
 colours, scale and pivot. Errors are those of the table as it stands, "shape" those after a shift and a common
 factor; a row is wrong where it is off by 2 mm or 0.1 rad without a flag, or stands where no disk is.
+
+trackpy and CSRT, which OpenCV 5 has no longer, come from a folder of their own:
+
+    pip install --target build/peers --no-deps trackpy looseversion "opencv-contrib-python-headless<5"
+    PYTHONPATH=build/peers python benches/python/tracker --only standard --trackers udd,HSV,trackpy,CSRT
 """
 
 from __future__ import annotations
