@@ -100,6 +100,9 @@ def test_scale_and_contact_come_out_of_the_film(measured: Measurement) -> None:
     assert meta["pivot_from"] == "rolling constraint"
     # 0.3 mm is what the fit can be given without harm; a camera pixel is 1 mm here
     assert abs(float(meta["pivot_u"]) - PIVOT[0]) < 0.1 and abs(float(meta["pivot_v"]) - PIVOT[1]) < 0.1
+    # of the picture's middle, in metres from the contact, Z upward; half a pixel is a matter of words
+    middle = (WIDTH / 2 - PIVOT[0]) / SCALE, (PIVOT[1] - HEIGHT / 2) / SCALE
+    assert meta["middle"] == pytest.approx(middle, abs=1e-3)
     assert float(meta["drive_seen"]) == pytest.approx(0.012, rel=0.02)
     # measured again in the second pass; edges are known to 0.12 pixels of streaks of some twenty
     assert float(meta["exposure"]) == pytest.approx(EXPOSURE, rel=0.06)
