@@ -19,13 +19,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from camera import PICTURE
 from cases import Case, Record, draw
+from information import ARM
 from scipy import stats
 
 import udd
 
 SEED = 20261122
 DURATION = 120.0
-ARM = 0.1  # m from the picture's middle, where a fit tells the lens
 
 
 def truth(record: Record) -> dict[str, float]:

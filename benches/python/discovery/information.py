@@ -17,6 +17,7 @@ from motion import Run, World
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+ARM = 0.1  # m from the picture's middle, where a fit tells the lens
 _SMALL = np.array([1e-4, 1e-7, 1e-7, 1e-6])  # steps of finite differences, per state
 DEVICE = ("k0", "k1", "k2", "W")
 
@@ -82,7 +83,7 @@ def _seen(
     n, zero, one = len(x), np.zeros(len(x)), np.ones(len(x))
     rate = (motion(t + 1e-5) - motion(t - 1e-5)) / 2e-5
     across, upward = y - camera.middle[0], z - camera.middle[1]
-    away = (across**2 + upward**2) / 0.01  # told at 0.1 m from the picture's middle
+    away = (across**2 + upward**2) / ARM**2
     moves = {
         "y0": (one, zero, zero),
         "z0": (zero, one, zero),

@@ -49,6 +49,15 @@ def size(e: Array, percentile: bool) -> float:
     return float(np.percentile(np.abs(e), 95) if percentile else np.sqrt((e**2).mean()))
 
 
+def shape_errors(e: Array, truth: Array, sigma: Array) -> Array:
+    """Errors (n, 3) without the shift, and for Y and Z the factor, that frames so sure of themselves tell."""
+    out = e.copy()
+    for k, w in enumerate((1 / sigma).T):
+        design = np.column_stack([np.ones(len(w)), truth[:, k]] if k < 2 else [np.ones(len(w))])
+        out[:, k] -= design @ np.linalg.lstsq(design * w[:, None], e[:, k] * w, rcond=None)[0]
+    return out
+
+
 def score(
     case: Case,
     film: Film,
@@ -79,20 +88,12 @@ def score(
     wrong = int((np.abs(e[seen]) > WRONG).any(axis=1).sum())
     invented = max(0, int((seen & ~film.held[row]).sum()) - SAID_WITHIN)
     fair = np.abs(e[use]).copy()
-    free = e[use].copy()
-    for k in range(2):
-        design = np.column_stack([np.ones(int(use.sum())), truth[use, k]])
-        free[:, k] -= design @ np.linalg.lstsq(design, free[:, k], rcond=None)[0]
-    free[:, 2] -= free[:, 2].mean()
+    free = shape_errors(e[use], truth[use], np.ones((int(use.sum()), 3)))
     cover = math.nan
     if covariance is not None:
         c = covariance[use]
-        # the shift and the factor as frames tell them by their standard errors: fast ones by much less
-        even = e[use].copy()
-        for k in range(3):
-            w = 1 / np.sqrt(c[:, k, k])
-            design = np.column_stack([np.ones(len(w)), truth[use, k]] if k < 2 else [np.ones(len(w))])
-            even[:, k] -= design @ np.linalg.lstsq(design * w[:, None], even[:, k] * w, rcond=None)[0]
+        # fast frames tell the shift and the factor much less
+        even = shape_errors(e[use], truth[use], np.sqrt(np.diagonal(c, axis1=1, axis2=2)))
         z2 = np.einsum("ni,nij,nj->n", even, np.linalg.inv(c), even) / 3
         # the first exposure begins before the run, and until then the film maker lets the disk move evenly
         z2 = z2[np.flatnonzero(use) > 0]

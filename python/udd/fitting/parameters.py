@@ -143,16 +143,19 @@ def known_camera(kind: str, meta: Mapping[str, Any]) -> list[float]:
     Raises
     ------
     FitError
-        ``middle`` is said, but is not two numbers.
+        ``middle`` is said, but is not two finite numbers.
     """
     known = dict.fromkeys((name for name, _unit in _core.camera_parameters(kind)), 0.0)
     if "middle_y" in known and meta.get("middle") is not None:
         try:
-            known["middle_y"], known["middle_z"] = (float(x) for x in meta["middle"])
+            y, z = (float(x) for x in meta["middle"])
         except (TypeError, ValueError):
-            raise FitError(f"the picture's middle must be two numbers [m], not {meta['middle']!r}") from None
-        if not np.isfinite(list(known.values())).all():
-            raise FitError(f"the picture's middle must be two finite numbers [m], not {meta['middle']!r}")
+            y = z = np.nan
+        if not np.isfinite([y, z]).all():
+            raise FitError(
+                f"the picture's middle must be two numbers [m], both finite, not {meta['middle']!r}"
+            )
+        known |= {"middle_y": y, "middle_z": z}
     return list(known.values())
 
 

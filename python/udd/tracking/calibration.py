@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decode import Film, TrackError
-from .lens import Lens
+from .lens import Lens, middle_of
 from .loop import Known, Tracks
 from .pivot import pivot as rolling
 from .pivot import support
@@ -92,8 +92,7 @@ def meta_of(
             stacklevel=5,
         )
     look = known.look
-    height, width = known.view.shape
-    middle = (complex(width / 2, height / 2) - camera.pivot) / camera.scale
+    middle = (middle_of(known.view.shape) - camera.pivot) / camera.scale
     return {
         "source": film.path.name,
         "R": setup.radius,

@@ -98,6 +98,11 @@ PLAIN = Lens()
 SQUARE = np.array([-1j, 1, 1j, -1])
 
 
+def middle_of(shape: tuple[int, int]) -> complex:
+    """Where the middle of a picture (height, width) is, about which its lens bends it [pixels]."""
+    return complex(shape[1] / 2, shape[0] / 2)
+
+
 def calibrate(
     points: Complexes,
     shape: tuple[int, int],
@@ -120,7 +125,7 @@ def calibrate(
     from scipy.optimize import least_squares
 
     points = points[np.isfinite(points).sum(axis=1) >= 3]
-    middle, size = complex(shape[1] / 2, shape[0] / 2), float(np.hypot(*shape) / 2)
+    middle, size = middle_of(shape), float(np.hypot(*shape) / 2)
     fixed = np.array([0.0 if curve is None else curve, 0, 0, 0, 0])
     as_given = Lens(middle, size, *(float(v) for v in fixed)) if fixed.any() else PLAIN
     free = np.array([curve is None, *[tilt is None] * 4])
