@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicUsize;
 use criterion::{Criterion, Throughput};
 use nalgebra::{SMatrix, SVector};
 use rayon::ThreadPoolBuilder;
-use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, Set};
+use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, Sensor, Set};
 use udd::formula::{Expression, Names};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
@@ -141,7 +141,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
         tolerance: tolerance(1e-8),
     };
     let work = move |_| {
-        let set = Set { model: model.clone(), camera: vec![0.0; 11], clock: 0.0 };
+        let set = Set { model: model.clone(), camera: vec![0.0; DiskCamera::PARAMETERS.len()], clock: 0.0 };
         let start = Point { states: states.clone(), sets: vec![set] };
         black_box(estimator.solve(start, &Options::default(), &Stop::new()).unwrap());
     };

@@ -11,10 +11,11 @@ import pytest
 import discovered
 import simulated
 import udd
+from udd.discovery import bearing
 from udd.discovery.candidates import ripples
 from udd.discovery.scan import scan, scan_ripples, strongest_ripple
-from udd.discovery.search import Search
 from udd.errors import FitError
+from udd.fitting import extend, fit_record, record_of
 
 E = udd.effects
 
@@ -85,11 +86,29 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.ratio == (1.0, 1.0, 1.0)
 
 
-@pytest.mark.parametrize(("ratio", "found"), [((0.99, 0.97, 1.01), True), ((1.01, 0.99, 1.03), False)])
-def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, found):
-    # With all parameters held, their errors may hide what the held-out frames gain; fitted too, they show it.
-    monkeypatch.setattr(Search, "_held_ratio", lambda *_: ratio)
+@pytest.mark.parametrize(
+    ("ratio", "expected", "found"),
+    [
+        # With all parameters held, their errors may hide what the frames gain; fitted too, they show it.
+        ((0.99, 0.97, 1.01), 100.0, True),
+        ((1.01, 0.99, 1.03), 100.0, False),
+        # Frames that could not show the effect are no witnesses against it.
+        ((1.01, 0.99, 1.03), 5.0, True),
+    ],
+)
+def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, found):
+    monkeypatch.setattr(bearing, "_held_ratio", lambda *_: ratio)
+    monkeypatch.setattr(bearing, "_expected", lambda *_: expected)
     assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=20.0).effects) == found
+
+
+@pytest.mark.parametrize("c", [5e-4, 0.0])
+def test_both_halves_of_a_record_must_want_an_effect(c):
+    truth = udd.Disk(0.045, effects=[E.quadratic_drag(c=c)])
+    measured, _states = simulated.film(truth, np.random.default_rng(12), 20.0)
+    before = fit_record(measured, record_of(measured), udd.Disk(0.045), search=True)
+    after = extend(before, [E.quadratic_drag()], [0.0])
+    assert bearing._crosswise(bearing.same_level(before, after), 1.0) == (c > 0)
 
 
 def test_a_shape_between_those_tried_is_found():
@@ -169,7 +188,7 @@ def test_ripples_from_one_response_equal_those_scored_singly():
 def test_the_strongest_ripple_is_found_between_lines_too(shift):
     # Lines are 1/duration apart; a quarter off is the farthest from those that are looked at.
     f = (30.0 + shift) / 20.0
-    truth = udd.Disk(0.08, effects=[E.drive_ripple(a=6e-3, b=0.0, f=f)])
+    truth = udd.Disk(0.08, effects=[E.drive_ripple(a=8e-3, b=0.0, f=f)])
     measured, _states = simulated.film(truth, np.random.default_rng(3), 20.0)
     fitted = udd.fit(measured, udd.Disk(0.08))
     listed = ripples(fitted.model, fitted.record.t)

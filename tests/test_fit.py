@@ -80,6 +80,20 @@ def test_a_lens_bends_about_the_picture_s_middle():
         udd.fit(replace(measured, meta={"middle": 0.1}), udd.Disk(0.05))
 
 
+def test_means_over_an_exposure_lie_off_the_middle():
+    """The film's frames are means of eight looks while the shutter is open."""
+    camera = simulated.Camera(exposure=0.03, noise=1e-4, angle_noise=1e-3)
+    z = []
+    for rng in np.random.default_rng(11).spawn(6):
+        measured, _states = simulated.film(udd.Disk(0.05), rng, 40.0, camera)
+        fit = udd.fit(measured, udd.Disk(0.05))
+        truth = {"shutter": camera.exposure**2 / 24, "row": camera.row}
+        assert fit.errors["shutter"] < truth["shutter"] / 4
+        z += [(fit.parameters[name] - value) / fit.errors[name] for name, value in truth.items()]
+    assert np.abs(z).max() < 4.5
+    assert np.sqrt(np.mean(np.square(z))) < 1.6  # twelve of them: 1 +- 0.2
+
+
 def test_a_model_is_first_held_with_what_was_known_of_it(fits):
     """One in fifty noisy records makes friction flat (k1 near k0) while states follow the frames."""
     model, _camera, fit = fits[0]

@@ -35,7 +35,8 @@ impl<const D: usize> Bordered<D> {
         Self::empty().anew(linear, columns, record, precision)
     }
 
-    fn empty() -> Self {
+    /// Room for none yet.
+    pub(super) fn empty() -> Self {
         let none = || Rows::zeros(0, 0);
         Self { diagonal: Vec::new(), below: Vec::new(), border: none(), corner: none() }
     }

@@ -63,11 +63,16 @@ where
     C: Sensor<D, M>,
 {
     /// The rows of the free parameters at the links' ends.
-    pub(super) fn own_state_rows(&self, point: &Point<D>, flow: &[Link<D>]) -> Result<Rows, EstimateError> {
+    pub(super) fn own_state_rows(
+        &self,
+        point: &Point<D>,
+        flow: &[Link<D>],
+        rows: &mut Rows,
+    ) -> Result<(), EstimateError> {
         let p = self.free.len();
-        let mut rows = Rows::zeros(flow.len() * D, p);
+        rows.become_zeros(flow.len() * D, p);
         if p == 0 {
-            return Ok(rows);
+            return Ok(());
         }
         let films = 0..point.sets.len();
         let models: Vec<_> = films.clone().map(|film| acting(&self.free, film, model)).collect();
@@ -98,6 +103,7 @@ where
                     Ok(last.map(|x| x.d))
                 },
                 || [[0.0; WIDTH]; D],
+                Vec::new(),
             )?;
             for (i, slopes) in slopes.iter().enumerate() {
                 for (k, &column) in columns[self.record.film[i]].iter().enumerate() {
@@ -105,7 +111,7 @@ where
                 }
             }
         }
-        Ok(rows)
+        Ok(())
     }
 
     /// The laws of all films over numbers that are differentiated by the state and, behind it, by the first of

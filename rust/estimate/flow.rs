@@ -61,11 +61,12 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// Every link; those of frames that are not linked are all zero.
+    /// Every link, kept where `room` was; those of frames that are not linked are all zero.
     pub(super) fn flow(
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<Wide>, Wide>],
+        room: Vec<Link<D>>,
     ) -> Result<Vec<Link<D>>, EstimateError> {
         let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
         let zero = SVector::zeros();
@@ -81,7 +82,7 @@ where
                 arrival: SVector::from(arrival),
             })
         };
-        self.each_link(point, laws, one, none)
+        self.each_link(point, laws, one, none, room)
     }
 
     /// What acts on every link; all zero where frames are not linked.
@@ -105,18 +106,7 @@ where
             });
             Ok(Places { switched, places })
         };
-        self.each_link(point, &laws, one, none)
-    }
-
-    /// The links' defects alone.
-    pub(super) fn defects(&self, point: &Point<D>) -> Result<Vec<SVector<f64, D>>, EstimateError> {
-        let laws: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
-        let one = |follower: &mut Follower<'_, _, f64, D>, i: usize, (_, start, end): Span| {
-            let x = point.states[i];
-            let (there, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
-            Ok(SVector::from_fn(|k, _| point.states[i + 1][k] - there[k]))
-        };
-        self.each_link(point, &laws, one, SVector::zeros)
+        self.each_link(point, &laws, one, none, Vec::new())
     }
 }
 

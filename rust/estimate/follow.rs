@@ -135,13 +135,15 @@ where
         Tape::record(&self.family, &known).ok()
     }
 
-    /// What `one` makes of every link, given its number and its span; `none` for frames that are not linked.
+    /// What `one` makes of every link, given its number and its span; `none` for frames that are not linked. It is
+    /// kept where `found` was.
     pub(super) fn each_link<S, T: Send>(
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<S>, S>],
         one: impl Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span) -> Result<T, Failure> + Sync,
         none: impl Fn() -> T + Sync,
+        mut found: Vec<T>,
     ) -> Result<Vec<T>, EstimateError>
     where
         S: Scalar<Real = f64, Mask = bool>,
@@ -159,7 +161,8 @@ where
             *found = one(follower, i, link).map_err(|source| EstimateError::Integration { t, source })?;
             Ok(())
         };
-        let mut found: Vec<T> = self.record.linked.iter().map(|_| none()).collect();
+        found.clear();
+        found.extend(self.record.linked.iter().map(|_| none()));
         let links = found.par_iter_mut().enumerate().with_min_len(TOGETHER);
         links.try_for_each_init(|| None, each)?;
         Ok(found)

@@ -71,12 +71,17 @@ pub struct Solution<const D: usize, const M: usize> {
     pub defect: Vec<SVector<f64, D>>,
 }
 
-/// A point and what is off there.
-struct Look<const D: usize, const M: usize> {
+/// A point, the record linearised around it, and its cost.
+struct Here<const D: usize, const M: usize> {
     point: Point<D>,
-    misfit: Vec<SVector<f64, M>>,
-    defect: Vec<SVector<f64, D>>,
+    linear: Linear<D, M>,
     cost: Cost,
+}
+
+/// A step of the states and the free parameters.
+struct Step<const D: usize> {
+    states: Vec<SVector<f64, D>>,
+    parameters: DVector<f64>,
 }
 
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
@@ -90,12 +95,12 @@ where
         steps.map(|dt| SVector::from_fn(|k, _| (self.diffusion[k].powi(2) * dt).recip())).collect()
     }
 
-    /// The cost of residuals at a point.
-    fn cost(&self, point: &Point<D>, misfit: &[SVector<f64, M>], defect: &[SVector<f64, D>]) -> Cost {
-        let mut cost = Cost { misfit: self.misfit_cost(misfit), ..Cost::default() };
-        for ((r, q), &linked) in defect.iter().zip(&self.precision()).zip(&self.record.linked) {
+    /// The cost at a point around which the record is linearised.
+    fn cost(&self, point: &Point<D>, linear: &Linear<D, M>) -> Cost {
+        let mut cost = Cost { misfit: self.misfit_cost(&linear.misfits()), ..Cost::default() };
+        for ((link, q), &linked) in linear.flow.iter().zip(&self.precision()).zip(&self.record.linked) {
             if linked {
-                cost.defect += r.component_mul(r).dot(q);
+                cost.defect += link.defect.component_mul(&link.defect).dot(q);
             }
         }
         for free in &self.free {
@@ -104,19 +109,10 @@ where
         cost
     }
 
-    fn look(&self, point: Point<D>) -> Result<Look<D, M>, EstimateError> {
-        let (misfit, defect) = self.residuals(&point)?;
-        Ok(self.looked(point, misfit, defect))
-    }
-
-    fn looked(
-        &self,
-        point: Point<D>,
-        misfit: Vec<SVector<f64, M>>,
-        defect: Vec<SVector<f64, D>>,
-    ) -> Look<D, M> {
-        let cost = self.cost(&point, &misfit, &defect);
-        Look { point, misfit, defect, cost }
+    fn look(&self, point: Point<D>, room: Linear<D, M>) -> Result<Here<D, M>, EstimateError> {
+        let linear = self.linearise_in(&point, room)?;
+        let cost = self.cost(&point, &linear);
+        Ok(Here { point, linear, cost })
     }
 
     /// Adds the free parameters' priors to normal equations at a point.
@@ -133,102 +129,99 @@ where
         options: &Options,
         stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
-        let mut linear = self.linearise(&start)?;
-        let mut here = self.looked(start, linear.misfits(), linear.defects());
-        let (precision, mut room) = (self.precision(), None);
+        let mut here = self.look(start, Linear::default())?;
+        let (precision, mut room, mut spare) = (self.precision(), Bordered::empty(), Linear::default());
         let mut damping = 0.0;
         let mut still = 0;
         let mut iteration = 0;
         loop {
             iteration += 1;
             stop.check().map_err(|_| EstimateError::Cancelled)?;
-            let mut system = match room.take() {
-                Some(room) => Bordered::anew(room, &linear, &linear.columns, &self.record, &precision),
-                None => Bordered::new(&linear, &linear.columns, &self.record, &precision),
-            };
+            let linear = &here.linear;
+            let mut system = room.anew(linear, &linear.columns, &self.record, &precision);
             self.add_priors(&here.point, &mut system);
             let reduced = system.eliminate(&self.record.t)?;
-            let mut gained = 0.0;
-            let mut easy = false;
-            // A step that does not lower the cost is shortened: along what the data hardly determine, the misfits'
-            // curvature makes it too long, and damping would all but stop it. Then it is damped ever more strongly.
-            let mut part = 1.0;
-            for shorter in 0..MOST_TRIALS {
-                let (states, parameters) = self.step(&reduced, damping)?;
-                easy |= reduced.promise(&parameters) < options.decrease;
-                // Where damped parameters do not help it is the states that go too far.
-                let length = if damping > MOST_DAMPING { 0.5_f64.powi(shorter) } else { part };
-                let trial = self.moved(&here.point, &states, &parameters, length);
-                let new = self.look(trial).ok().filter(|new| new.cost.total() <= here.cost.total());
-                if let Some(new) = new {
-                    gained = here.cost.total() - new.cost.total();
-                    easy &= damping == 0.0;
-                    here = new;
-                    damping = if damping < 1e-2 { 0.0 } else { damping * 0.1 };
-                    break;
-                }
-                if easy && damping == 0.0 {
-                    break;
-                }
-                if damping == 0.0 && part > SHORTEST {
-                    part *= 0.5;
-                    continue;
-                }
-                part = 1.0;
-                damping = if damping == 0.0 { 1e-2 } else { damping * 10.0 };
+            let full = self.step(&reduced, 0.0)?;
+            let promise = reduced.promise(&full.parameters);
+            let done = promise < options.decrease || still == ENOUGH;
+            if done || iteration > options.iterations {
+                return self.finish(here, &reduced, (iteration, done));
             }
+            let Some(lower) = self.lower(&here, &reduced, full, &mut damping, spare)? else {
+                return self.finish(here, &reduced, (iteration, true));
+            };
             // At a kink of the law the cost has one too: there full steps keep promising more than they hold.
+            let gained = here.cost.total() - lower.cost.total();
             still = if gained < options.decrease { still + 1 } else { 0 };
-            let converged = (easy && gained < options.decrease) || still == ENOUGH;
-            if converged || iteration >= options.iterations {
-                return self.finish(here, &linear, &reduced, (iteration, converged));
-            }
-            room = Some(reduced.into_room());
-            linear = self.linearise(&here.point)?;
+            spare = std::mem::replace(&mut here, lower).linear;
+            room = reduced.into_room();
         }
     }
 
-    /// The step to the minimum of the linearised problem; the parameters damped.
-    #[allow(clippy::type_complexity)]
-    fn step(
+    /// A point of lower cost, on the way of the full step.
+    ///
+    /// A step that does not lower the cost is shortened: along what the data hardly determine, the misfits'
+    /// curvature makes it too long, and damping would all but stop it. Then it is damped ever more strongly.
+    fn lower(
         &self,
+        here: &Here<D, M>,
         reduced: &Eliminated<D>,
-        damping: f64,
-    ) -> Result<(Vec<SVector<f64, D>>, DVector<f64>), EstimateError> {
+        full: Step<D>,
+        damping: &mut f64,
+        mut room: Linear<D, M>,
+    ) -> Result<Option<Here<D, M>>, EstimateError> {
+        let mut step = if *damping == 0.0 { full } else { self.step(reduced, *damping)? };
+        let mut length = 1.0;
+        for trial in 0..MOST_TRIALS {
+            match self.look(self.moved(&here.point, &step, length), std::mem::take(&mut room)) {
+                Ok(new) if new.cost.total() <= here.cost.total() => {
+                    *damping = if *damping < 1e-2 { 0.0 } else { *damping * 0.1 };
+                    return Ok(Some(new));
+                }
+                Ok(new) => room = new.linear,
+                Err(_) => {}
+            }
+            if *damping == 0.0 && length > SHORTEST {
+                length *= 0.5;
+                continue;
+            }
+            *damping = if *damping == 0.0 { 1e-2 } else { *damping * 10.0 };
+            step = self.step(reduced, *damping)?;
+            // Where damped parameters do not help it is the states that go too far.
+            length = if *damping > MOST_DAMPING { 0.5_f64.powi(trial) } else { 1.0 };
+        }
+        Ok(None)
+    }
+
+    /// The step to the minimum of the linearised problem; the parameters damped.
+    fn step(&self, reduced: &Eliminated<D>, damping: f64) -> Result<Step<D>, EstimateError> {
         let mut information = reduced.schur.clone();
         for j in 0..information.nrows() {
             information[(j, j)] *= 1.0 + damping;
         }
         let inverse = invert(&information).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
         let parameters = inverse * &reduced.gradient;
-        Ok((reduced.states(&parameters), parameters))
+        Ok(Step { states: reduced.states(&parameters), parameters })
     }
 
     /// A point moved by a part of a step.
-    fn moved(
-        &self,
-        point: &Point<D>,
-        states: &[SVector<f64, D>],
-        parameters: &DVector<f64>,
-        length: f64,
-    ) -> Point<D> {
+    fn moved(&self, point: &Point<D>, step: &Step<D>, length: f64) -> Point<D> {
         let mut moved = point.clone();
-        for (x, change) in moved.states.iter_mut().zip(states) {
+        for (x, change) in moved.states.iter_mut().zip(&step.states) {
             for k in 0..D {
                 x[k] += length * change[k];
             }
         }
-        for (free, &change) in self.free.iter().zip(parameters.iter()) {
+        for (free, &change) in self.free.iter().zip(step.parameters.iter()) {
             moved.shift(free, length * change);
         }
         moved
     }
 
-    /// The covariances at the minimum, by the equations of the last step to it.
+    /// The covariances at the minimum.
     fn finish(
         &self,
-        Look { point, misfit, defect, cost }: Look<D, M>,
-        linear: &Linear<D, M>,
+        Here { point, linear, cost }: Here<D, M>,
         reduced: &Eliminated<D>,
         (iterations, converged): (usize, bool),
     ) -> Result<Solution<D, M>, EstimateError> {
@@ -242,9 +235,9 @@ where
             evidence: self.evidence(&cost, reduced.log_determinant, &reduced.schur),
             covariance,
             state_covariance: uncertain.covariance(),
-            seen_variance: uncertain.seen(linear),
-            misfit,
-            defect,
+            seen_variance: uncertain.seen(&linear),
+            misfit: linear.misfits(),
+            defect: linear.defects(),
         })
     }
 }

@@ -8,7 +8,7 @@ use super::flow::Link;
 use super::follow::{Law, variable};
 use super::rows::Rows;
 use super::{EstimateError, Estimator, Point, Sensor};
-use crate::model::{Family, System, sides_of};
+use crate::model::Family;
 use crate::scalar::{Instructions, Isa, Scalar, Work};
 
 /// A frame's residual `misfit = seen - h`, and `dh/dx`.
@@ -19,7 +19,7 @@ pub struct Sight<const D: usize, const M: usize> {
 }
 
 /// Residuals and derivatives, frame by frame and link by link; the columns are those of parameters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Linear<const D: usize, const M: usize> {
     pub sights: Vec<Sight<D, M>>,
     pub flow: Vec<Link<D>>,
@@ -28,12 +28,12 @@ pub struct Linear<const D: usize, const M: usize> {
 
 impl<const D: usize, const M: usize> Linear<D, M> {
     /// The residuals of what was seen.
-    pub(super) fn misfits(&self) -> Vec<SVector<f64, M>> {
+    pub fn misfits(&self) -> Vec<SVector<f64, M>> {
         self.sights.iter().map(|sight| sight.misfit).collect()
     }
 
     /// The residuals of the links.
-    pub(super) fn defects(&self) -> Vec<SVector<f64, D>> {
+    pub fn defects(&self) -> Vec<SVector<f64, D>> {
         self.flow.iter().map(|link| link.defect).collect()
     }
 }
@@ -45,18 +45,35 @@ where
 {
     /// Linearises the record around a point with respect to the states and to the free parameters.
     pub fn linearise(&self, point: &Point<D>) -> Result<Linear<D, M>, EstimateError> {
+        self.linearise_in(point, Linear::default())
+    }
+
+    /// The same, in the room of another: fresh memory costs as much as what is done in it.
+    pub(super) fn linearise_in(
+        &self,
+        point: &Point<D>,
+        room: Linear<D, M>,
+    ) -> Result<Linear<D, M>, EstimateError> {
+        let Linear { mut sights, flow, columns: Columns { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
-        let flow = self.flow(point, &laws)?;
-        let state = self.own_state_rows(point, &flow)?;
-        let (sights, seen) = self.sights(point, &laws);
+        let flow = self.flow(point, &laws, flow)?;
+        self.own_state_rows(point, &flow, &mut state)?;
+        self.sights(point, &laws, &mut sights, &mut seen);
         Ok(Linear { sights, flow, columns: Columns { seen, state } })
     }
 
     /// What is seen of every frame, and its rows of the free parameters.
-    fn sights(&self, point: &Point<D>, laws: &[Law<F::Built<Wide>, Wide>]) -> (Vec<Sight<D, M>>, Rows) {
+    fn sights(
+        &self,
+        point: &Point<D>,
+        laws: &[Law<F::Built<Wide>, Wide>],
+        sights: &mut Vec<Sight<D, M>>,
+        seen: &mut Rows,
+    ) {
         let (n, p) = (self.record.t.len(), self.free.len());
-        let mut seen = Rows::zeros(n * M, p);
-        let mut sights = vec![Sight { misfit: SVector::zeros(), h: SMatrix::zeros() }; n];
+        seen.become_zeros(n * M, p);
+        sights.clear();
+        sights.resize(n, Sight { misfit: SVector::zeros(), h: SMatrix::zeros() });
         let beyond = self.beyond(point);
         let views: Vec<View> = (0..laws.len())
             .map(|film| {
@@ -81,7 +98,6 @@ where
             let (of, law, view) = (self, &laws[film], &views[film]);
             Isa::best().run(Look { of, point, law, view, beyond: &beyond, i, sight, rows });
         });
-        (sights, seen)
     }
 
     /// What was seen in frame `i` less what should have been.
@@ -91,25 +107,6 @@ where
             let difference = self.record.seen[i][m] - expected[m];
             if self.sensor.is_angle(m) { wrap(difference) } else { difference }
         })
-    }
-
-    /// Residuals alone: `(misfit, defect)`.
-    #[allow(clippy::type_complexity)]
-    pub fn residuals(
-        &self,
-        point: &Point<D>,
-    ) -> Result<(Vec<SVector<f64, M>>, Vec<SVector<f64, D>>), EstimateError> {
-        let systems: Vec<F::Built<f64>> =
-            point.sets.iter().map(|set| self.family.build(&set.model)).collect();
-        let one = |i: usize| {
-            let film = self.record.film[i];
-            let set = &point.sets[film];
-            let (x, t) = (&point.states[i], self.record.t[i] * set.pace());
-            let rate = systems[film].rates(t, x, &sides_of(&systems[film], t, x));
-            self.misfit(i, &self.sensor.observe(&set.camera, x, &rate))
-        };
-        let misfits = (0..self.record.t.len()).into_par_iter().map(one).collect();
-        Ok((misfits, self.defects(point)?))
     }
 }
 

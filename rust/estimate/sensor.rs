@@ -20,16 +20,17 @@ const ARM: f64 = 0.1;
 /// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
 ///
 /// ```text
-/// p = (1 + scale) Rot(tilt) [(Y, Z) + Rot(beta) (right, up)] + (y0, z0)
+/// p = (1 + scale) Rot(tilt) [(Y, Z) + shutter (Y, Z)'' + Rot(beta) (right, up)] + (y0, z0)
 /// (Y, Z)_seen = p + lens |p - m|^2/A^2 (p - m),   m = (middle_y, middle_z)
-/// beta_seen = beta + tilt - lag Omega
+/// beta_seen = beta + shutter Omega' + tilt - lag Omega
 /// ```
 ///
 /// `y0, z0` is where the pivot really is in the measurement's coordinates, `tilt` turns the picture
 /// clockwise, `lens` is how much farther from the picture's middle `m` a lens shows what lies at the distance
 /// A = 0.1 m from there, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
 /// (marks are glued by hand), `lag` is how much later than the position the orientation is seen, and with a rolling
-/// shutter a point at height `Z` is exposed at `t - row Z`.
+/// shutter a point at height `Z` is exposed at `t - row Z`. What is a mean over an exposure of duration `e` lies off
+/// the middle of a curved path: `shutter` is then `e^2/24`.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskCamera;
 
@@ -43,6 +44,7 @@ impl Sensor<4, 3> for DiskCamera {
         ("up", "m"),
         ("lag", "s"),
         ("row", "s/m"),
+        ("shutter", "s^2"),
         ("lens", ""),
         ("middle_y", "m"),
         ("middle_z", "m"),
@@ -54,14 +56,16 @@ impl Sensor<4, 3> for DiskCamera {
 
     #[inline(always)]
     fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
-        let &[y0, z0, tilt, scale, right, up, lag, row, lens, middle_y, middle_z] =
-            camera.first_chunk().expect("eleven camera parameters");
+        let &[y0, z0, tilt, scale, right, up, lag, row, shutter, lens, middle_y, middle_z] =
+            camera.first_chunk().expect("twelve camera parameters");
         let late = -(row * x[2]);
         let beta = x[3] + late * rate[3];
         let (sin, cos) = (beta.sin(), beta.cos());
-        let y = x[1] + late * rate[1] + right * cos + up * sin;
-        let z = x[2] + late * rate[2] + up * cos - right * sin;
-        let beta = beta - lag * rate[3];
+        // The disk turns about a contact that the drive moves at its own steady speed.
+        let curved = [rate[0] * x[2] + x[0] * rate[2], -(rate[0] * x[1] + x[0] * rate[1])];
+        let y = x[1] + late * rate[1] + shutter * curved[0] + right * cos + up * sin;
+        let z = x[2] + late * rate[2] + shutter * curved[1] + up * cos - right * sin;
+        let beta = beta + shutter * rate[0] - lag * rate[3];
         let (sin, cos, size) = (tilt.sin(), tilt.cos(), S::one() + scale);
         let (y, z) = (size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0);
         let (across, upward) = (y - middle_y, z - middle_z);

@@ -34,6 +34,7 @@ def truth(record: Record) -> dict[str, float]:
     return {
         **{name: float(getattr(device, name)) for name in ("k0", "k1", "k2", "W")},
         **{name: float(getattr(camera, name)) for name in ("tilt", "scale", "lag", "row", "clock")},
+        "shutter": camera.exposure**2 / 24,
         "lens": camera.lens * (ARM / PICTURE) ** 2,
         "y0": float(camera.offset[0]),
         "z0": float(camera.offset[1]),

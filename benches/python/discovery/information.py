@@ -82,6 +82,7 @@ def _seen(
     omega, y, z, beta = x.T
     n, zero, one = len(x), np.zeros(len(x)), np.ones(len(x))
     rate = (motion(t + 1e-5) - motion(t - 1e-5)) / 2e-5
+    curve = (motion(t + 1e-3) - 2 * x + motion(t - 1e-3)) / 1e-6
     across, upward = y - camera.middle[0], z - camera.middle[1]
     away = (across**2 + upward**2) / ARM**2
     moves = {
@@ -93,6 +94,7 @@ def _seen(
         "up": (np.sin(beta), np.cos(beta), zero),
         "lag": (zero, zero, -omega),
         "row": tuple(-z * r for r in rate.T[1:]),
+        "shutter": tuple(curve.T[1:]),
         "lens": (across * away, upward * away, zero),
     }
     known = assumed.camera

@@ -49,11 +49,12 @@ def discover(
     0.1 % over all candidates together (in those 60 % for white noise, and in all data with the misfits' own
     colour), its amplitudes are physical, and the last 40 % bear it out: with all parameters held they are
     explained better, either beyond doubt (the 95 % interval of the costs' ratio excludes 1) or such that chi2
-    falls further by more than chance would once they are fitted too; and at no horizon do forecasts get
-    worse. All coefficients are refitted and the search goes on; effects that do not pass alone are tried in
-    twos and threes. Forms that the data cannot tell apart are named. Where no effect passes but the model
-    does not explain the data (chi2 per degree of freedom above 2.5), an effect is present that the library
-    does not hold.
+    falls further by more than chance would once they are fitted too; where they hold too little of the motion
+    that shows it, chi2 must so fall further with each half of the record, in alternate stretches, than with
+    the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
+    goes on; effects that do not pass alone are tried in twos and threes. Forms that the data cannot tell
+    apart are named. Where no effect passes but the model does not explain the data (chi2 per degree of
+    freedom above 2.5), an effect is present that the library does not hold.
 
     Parameters
     ----------

@@ -14,6 +14,8 @@ from udd.errors import FitError
 from udd.fitting import Fit, Record, filtered, predicted
 
 Array = NDArray[np.float64]
+#: A ratio and its 95 % interval.
+Ratio = tuple[float, float, float]
 
 #: Horizons of the free runs, s; those longer than a third of the held-out part are left out. Of a user's own
 #: model all times here count in units of its motion's pace, see :func:`pace`.
@@ -141,7 +143,7 @@ def held_out_errors(
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    blocks = _blocks(record, _BLOCK * unit)[starts]
+    blocks = stretches(record, _BLOCK * unit)[starts]
     columns = [samples[:, k : k + 1] for k in range(len(horizons))]
     low, high = np.array([_interval(blocks, column, _median, rng) for column in columns]).T
     return Errors(
@@ -154,12 +156,12 @@ def held_out_errors(
         samples=samples,
         blocks=blocks,
         run=_run(fit, record, held),
-        run_blocks=_blocks(record, _BLOCK * unit)[held],
+        run_blocks=stretches(record, _BLOCK * unit)[held],
     )
 
 
-def _blocks(record: Record, length: float) -> NDArray[np.int64]:
-    """The number of the stretch of time that each frame lies in, of each measurement its own."""
+def stretches(record: Record, length: float) -> NDArray[np.int64]:
+    """The number of the stretch of `length` s that each frame lies in, of each measurement its own."""
     own = ((record.t - record.t.min()) // length).astype(np.int64)
     result: NDArray[np.int64] = own + record.film * (int(own.max()) + 1)
     return result
@@ -175,33 +177,29 @@ def comparison_horizon(errors: Errors) -> float:
     return max((h for h in errors.horizons if h <= 1.0), default=errors.horizons[0])
 
 
-def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> tuple[float, float, float]:
+def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> Ratio:
     """The ratio of the median errors at a horizon, after over before, with its 95 % interval."""
     k = before.horizons.index(horizon)
     both = np.column_stack([after.samples[:, k], before.samples[:, k]])
     return _ratio(before.blocks, both, _median, seed)
 
 
-def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> tuple[float, float, float]:
+def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> Ratio:
     """The ratio of the errors of the free run over all held-out frames, with its 95 % interval."""
     return _ratio(before.run_blocks, np.column_stack([after.run, before.run]), _rms, seed)
 
 
-def cost_improvement(
-    before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0
-) -> tuple[float, float, float]:
+def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0) -> Ratio:
     """The ratio of two fits' costs on a record that neither saw, with its 95 % interval from paired blocks.
 
     The costs are those of :func:`udd.fitting.frame_costs`. They tell two models apart where
     their forecasts are still equally good.
     """
     costs = np.column_stack([after, before])
-    return _ratio(_blocks(record, _COST_BLOCK * unit), costs, _sum, seed)
+    return _ratio(stretches(record, _COST_BLOCK * unit), costs, _sum, seed)
 
 
-def _ratio(
-    blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], float], seed: int
-) -> tuple[float, float, float]:
+def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], float], seed: int) -> Ratio:
     def ratio(rows: Array) -> float:
         return measure(rows[:, :1]) / measure(rows[:, 1:])
 

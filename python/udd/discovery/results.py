@@ -13,7 +13,7 @@ from udd.measurement import Measurement
 from udd.models import Model
 
 from .curves import Curve
-from .heldout import Errors, comparison_horizon
+from .heldout import Errors, Ratio, comparison_horizon
 from .hint import Hint, hints
 from .scan import Scored
 
@@ -49,7 +49,7 @@ class Found:
     errors: dict[str, float]
     chi2: float
     p: float
-    ratio: tuple[float, float, float]
+    ratio: Ratio
     curve: Curve | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -139,7 +139,7 @@ class Discovery:
     alternatives: list[Alternative]
     error_before: Errors
     error_after: Errors
-    ratio: tuple[float, float, float]
+    ratio: Ratio
     scans: list[list[Scored]]
     curves: list[list[Curve]]
     looks: list[int]

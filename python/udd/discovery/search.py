@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, ncx2
 
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, extend, frame_costs, held, loosened
+from udd.fitting import Fit, Record, at_level, extend, loosened
 
+from .bearing import ALPHA, borne_out, same_level
 from .candidates import Candidate, library
 from .curves import Curve, scan_curves
 from .formulas import Formula, formulas_for
 from .heldout import (
     Errors,
+    Ratio,
     comparison_horizon,
-    cost_improvement,
     held_out_errors,
     improvement,
     whole_improvement,
@@ -30,8 +31,6 @@ from .results import Alternative
 from .scan import Scan, Scored, physical, scan, strongest_ripple
 from .together import together
 
-#: Chance that a record without any effect is said to have one, over all candidates together.
-ALPHA = 1e-3
 #: Forms of an effect whose fits differ by less than this many units of log-likelihood are not told apart.
 NATS = 10.0
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
@@ -65,7 +64,7 @@ class Step:
     curve: Curve | None
     chi2: float
     p: float
-    ratio: tuple[float, float, float]
+    ratio: Ratio
     alternatives: list[Alternative]
 
 
@@ -308,7 +307,7 @@ class Search:
         """Held-out errors of a fit of the first part."""
         return held_out_errors(fitted, self.record, self.held, unit=self.unit)
 
-    def improvement(self, before: Errors, after: Errors) -> tuple[float, float, float]:
+    def improvement(self, before: Errors, after: Errors) -> Ratio:
         """Held-out error after over before.
 
         Of the disk, which is chaotic, at the horizon of comparison; of a pendulum over the whole run.
@@ -447,7 +446,7 @@ class Search:
             found = self._accept(before, self._curves(before, [last.curve]), looks[k])
             if found is None:
                 continue
-            both, alone = self._level(states[-1].part, found[1].part)
+            both, alone = same_level(states[-1].part, found[1].part)
             more = sum(c.parameters for step in accepted[k:-1] for c in step.candidates)
             if alone.chi2 < both.chi2 + _price(both) * more * max(both.scatter, 1.0):
                 accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
@@ -468,18 +467,19 @@ class Search:
         least = trials[0].criterion(unit) + trials[0].handicap
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in trials if t.criterion(unit) + t.handicap - least <= 2 * NATS):
-            ratio = self._held_ratio(current.part, trial.fit)
-            whole = self._again(current.whole, trial) if ratio[0] < 1.0 else None
+            whole = self._again(current.whole, trial)
             if whole is None:
                 continue
-            before, after = self._level(current.whole, whole.fit)
-            if ratio[2] >= 1.0 and not self._borne_out(current, trial.fit, before, after):
-                continue
+            before, after = same_level(current.whole, whole.fit)
             inflation = after.inflation(before)
             fall = (before.chi2 - after.chi2) / inflation
             # What a film's faults make up is no sum of squares of chance alone.
             p = min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * look.looks, 1.0)
             if p >= ALPHA:
+                continue
+            part, rest = (current.part, trial.fit), self.record.part(self.held)
+            ratio, wanted = borne_out(part, (before, after), rest, trial.names, self.unit)
+            if not wanted:
                 continue
             try:
                 errors = self.errors(trial.fit)
@@ -498,27 +498,6 @@ class Search:
         if trial.formula is None:
             return _of_curve(whole, trial.curve)
         return _of_formula(whole, trial.curve, trial.formula)
-
-    def _level(self, one: Fit, other: Fit) -> tuple[Fit, Fit]:
-        """Two fits of the same data, held equally tightly."""
-        level = min(one.level, other.level)
-        return at_level(one, level), at_level(other, level)
-
-    def _held_ratio(self, before: Fit, after: Fit) -> tuple[float, float, float]:
-        """Cost of the held-out frames after over before, all parameters held, with its 95 % interval."""
-        record = self.record.part(self.held)
-        level = min(before.level, after.level)
-        costs = self._level(held(before, record, level), held(after, record, level))
-        return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), record, unit=self.unit)
-
-    def _borne_out(self, current: State, part: Fit, before: Fit, after: Fit) -> bool:
-        """Whether the held-out frames want the same effect: chi2 falls further once they are fitted too.
-
-        That tells more than their cost with all parameters held, in which those parameters' errors count.
-        """
-        one, other = at_level(current.part, after.level), at_level(part, after.level)
-        further = (before.chi2 - after.chi2) - (one.chi2 - other.chi2)
-        return bool(chi2.sf(further / after.inflation(before), 1) < ALPHA)
 
     def _worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""

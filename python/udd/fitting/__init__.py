@@ -5,7 +5,7 @@ from __future__ import annotations
 from .fit import extend, fit, fit_record, refit, widened
 from .problem import Fit, data_of
 from .record import Record, record_of
-from .solve import at_level, filtered, frame_costs, held, loosened, predicted
+from .solve import at_level, filtered, frame_costs, held, loosened, predicted, within
 
 __all__ = [
     "Fit",
@@ -23,4 +23,5 @@ __all__ = [
     "record_of",
     "refit",
     "widened",
+    "within",
 ]

@@ -57,7 +57,8 @@ def fit(
         ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects; all of a user's own model.
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
-        orientation, ``row`` time of a rolling shutter, ``clock``), or which of them.
+        orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
+        ``clock``), or which of them.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional

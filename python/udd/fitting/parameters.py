@@ -15,8 +15,8 @@ from udd.models import Disk, Model, Pendulum
 #: What is known of a camera beforehand, as standard deviations around zero: a pivot found to a few
 #: millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose centre is off by a millimetre,
 #: an orientation that lags the position by milliseconds, a shutter that may roll (a frame's time over a
-#: picture 0.4 m high), a lens that distorts by 1 % at 0.2 m from the middle, a clock good to 0.3 %. A
-#: pendulum's pivot is known to 1 % of its length.
+#: picture 0.4 m high), means over some 20 ms (of which a 24th of the square counts), a lens that distorts by
+#: 1 % at 0.2 m from the middle, a clock good to 0.3 %. A pendulum's pivot is known to 1 % of its length.
 CAMERA = {
     "disk": {
         "y0": 5e-3,
@@ -27,6 +27,7 @@ CAMERA = {
         "up": 1e-3,
         "lag": 0.01,
         "row": 0.05,
+        "shutter": 2e-5,
         "lens": 0.0025,
     },
     "pendulum": {"theta0": 0.1, "aside": 0.01, "above": 0.01},

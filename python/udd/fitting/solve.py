@@ -203,6 +203,13 @@ def at_level(fitted: Fit, level: int) -> Fit:
     return solve(fitted.measurements, problem, fitted.point)
 
 
+def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:
+    """The same model fitted to some of the frames (a mask), held as tightly, from where the fit ended."""
+    noise = replace(fitted.noise, weight=fitted.noise.weight[frames])
+    problem = replace(fitted.problem, record=fitted.record.part(frames), noise=noise)
+    return solve(fitted.measurements, problem, replace(fitted.point, states=fitted.states[frames]))
+
+
 def held(fitted: Fit, record: Record, level: int) -> Fit:
     """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
 

@@ -80,7 +80,7 @@ def threshold(discovery: Any, stage: int) -> float:
     """The chi2 that a candidate with one amplitude must reach, all candidates counted."""
     from scipy.stats import chi2
 
-    from udd.discovery.search import ALPHA
+    from udd.discovery.bearing import ALPHA
 
     return float(chi2.isf(ALPHA / discovery.looks[stage], 1))
 
