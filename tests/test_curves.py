@@ -18,7 +18,7 @@ from udd.discovery.curves import refined, scan_curves
 from udd.discovery.expressions import evaluate, read, sensible, simplify, write
 from udd.discovery.forcing import Score, responses, score_forcings
 from udd.discovery.formulas import Formula, formulas_for
-from udd.discovery.located import curve_effect, fit_curve, fit_formula
+from udd.discovery.located import fit_curve, fit_formula
 from udd.discovery.smoothing import chance, smooth
 from udd.discovery.splines import Spline, along, product, rough_product
 from udd.errors import FitError, UddError
@@ -384,10 +384,24 @@ def test_a_broken_power_can_be_fitted():
     assert fitted.parameters["k0"] == pytest.approx(unmodelled.K0, abs=4 * fitted.errors["k0"])
 
 
-def test_what_cannot_be_added_is_said(null):
-    only = scan_curves(null, only=lambda slot, own: slot.name == "torque" and own[0].name == "theta")
-    with pytest.raises(FitError, match="no word for theta"):
-        curve_effect(only.curves[0])
+def test_one_law_takes_the_place_of_several_that_come_near_it():
+    # A push at one angle at the contact: a constant torque, a tilt and a slip together explain most of it.
+    def push(theta):
+        return 0.01 * np.exp(-4 * (1 - np.cos(theta - 1)))
+
+    law = lambda t, o, y, z, b: (float(push(np.arctan2(y, z))), 0.0, 0.0)  # noqa: E731
+    told: list[str] = []
+    measured = unmodelled.record(law, 5, noise=(5e-4, 7e-3))
+    found = udd.discover(measured, udd.Disk(W), progress=told.append)
+    assert any("one law instead of" in line for line in told)
+    (effect,) = found.effects
+    assert effect.curve.name == ("torque", "theta")
+    theta = np.arange(-3, 3.1, 0.25)
+    curve = effect.curve
+    off = (curve.values(theta) - curve.beside(push(theta), theta)) / curve.errors(theta)
+    assert np.sqrt(np.mean(off**2)) < 2
+    k = found.error_after.horizons.index(1.0)
+    assert found.error_after.median[k] < 1.3 * found.error_after.floor[k]  # known to some 10 % each
 
 
 def test_a_surface_is_added_and_refitted():

@@ -30,15 +30,15 @@ class Coordinate:
         ``(states, rates) -> values``: how fast it changes along the motion.
     angle : bool
         Whether it counts modulo a turn.
-    text : str or None
-        What it is called in formulas; None where it cannot be said.
+    text : str
+        What it is in formulas.
     """
 
     name: str
     of: Callable[[Array, Array], Array]
     rate: Callable[[Array, Array], Array]
     angle: bool
-    text: str | None
+    text: str
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def coordinates(model: Model) -> tuple[Coordinate, ...]:
     if isinstance(model, Disk):
         own += [
             Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
-            Coordinate("theta", _azimuth, _azimuthal, True, None),
+            Coordinate("theta", _azimuth, _azimuthal, True, "atan2(Y, Z)"),
         ]
     own.append(Coordinate("t", _time, _passing, False, "t"))
     return tuple(own)

@@ -82,11 +82,6 @@ class Curve:
         return f"{self.slot.title} as a function of {' and '.join(c.name for c in self.coordinates)}"
 
     @property
-    def sayable(self) -> bool:
-        """Whether formulas have a word for all that it is a function of."""
-        return all(c.text is not None for c in self.coordinates)
-
-    @property
     def name(self) -> tuple[str, ...]:
         """Slot, momentum and coordinates, to compare by."""
         return (self.slot.title, *(c.name for c in self.coordinates))

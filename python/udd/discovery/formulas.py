@@ -220,7 +220,7 @@ def _formula(curve: Curve, fitted: _Fitted, free: Sequence[str]) -> Formula:
     order = {number: k for k, number in enumerate(numbers)}
     names = {number: free[k] for number, k in order.items()}
     own = curve.coordinates[0]
-    text = write(fitted.node, own.text or own.name, names)
+    text = write(fitted.node, own.text, names)
     parameters = {names[number]: fitted.values[number] for number in numbers}
     linear = tuple(names[number] for number in numbers if number in amplitudes(fitted.node))
     return Formula(text, parameters, linear, fitted.nats - curve.evidence, _renumbered(fitted.node, order))

@@ -9,13 +9,11 @@ import numpy as np
 
 from udd import effects
 from udd.effects import Effect
-from udd.errors import FitError
 from udd.fitting import Fit, widened
 from udd.fitting.parameters import Free
 from udd.fitting.solve import tighten
 
 from .absorbed import distinct
-from .coordinates import Coordinate
 from .curves import Curve, refined, rescored
 from .expressions import softened, write
 from .formulas import Formula
@@ -58,17 +56,12 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
     curve : Curve
     name : str
         What its parameters are called after.
-
-    Raises
-    ------
-    FitError
-        No formula says what its coordinate is.
     """
     spline, last = curve.splines[0], curve.splines[-1]
     if len(curve.coordinates) == 2:
         return effects.surface(
             curve.slot.name,
-            (_text(curve.coordinates[0]), _text(curve.coordinates[1])),
+            (curve.coordinates[0].text, curve.coordinates[1].text),
             (spline.low, last.low),
             (spline.high, last.high),
             curve.coefficients.reshape(spline.size, last.size),
@@ -78,7 +71,7 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
         )
     return effects.curve(
         curve.slot.name,
-        _text(curve.coordinates[0]),
+        curve.coordinates[0].text,
         spline.low,
         spline.high,
         curve.coefficients,
@@ -126,13 +119,8 @@ def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Eff
     """A formula for a curve as an effect that a model can have.
 
     Broken powers, whose slope at zero has no end, are rounded off within a thousandth of the curve's range.
-
-    Raises
-    ------
-    FitError
-        No formula says what the curve's coordinate is.
     """
-    variable = _text(curve.coordinates[0])
+    variable = curve.coordinates[0].text
     values: dict[str, Any] = dict(formula.parameters)
     node = softened(formula.node, _SOFT * float(np.ptp(curve.places[0])))
     return effects.formula(
@@ -162,12 +150,3 @@ def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula")
     more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
     problem = replace(problem, free=problem.free + more)
     return tighten(fit.measurements, problem, point, problem.schedule[1:])
-
-
-def _text(own: Coordinate) -> str:
-    """What a coordinate is called in formulas."""
-    if own.text is None:
-        raise FitError(
-            f"nothing over {own.name} can be added to a model: formulas have no word for {own.name}"
-        )
-    return own.text

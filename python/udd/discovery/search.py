@@ -58,6 +58,8 @@ class Step:
     ratio : tuple of float
         Cost of the held-out frames after over before, with its 95 % interval.
     alternatives : list of Alternative
+    price : float
+        What its freedom costs, in chi2; more for a formula, and for a curve, than for what physics knows.
     """
 
     candidates: list[Candidate]
@@ -66,6 +68,7 @@ class Step:
     p: float
     ratio: Ratio
     alternatives: list[Alternative]
+    price: float
 
 
 @dataclass(frozen=True)
@@ -334,6 +337,7 @@ class Search:
             accepted.append(found[0])
             states.append(found[1])
             self._prune(accepted, states, looks)
+        self._simplify(accepted, states, looks)
         end = states[-1]
         return Outcome(end.part, end.whole, end.errors, accepted, looks)
 
@@ -362,8 +366,7 @@ class Search:
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
         passing = look.passing()
-        # Of curves over angles for which formulas have no word another is about as likely.
-        curve = next((c for c in look.curves if c.sayable and len(c.coordinates) == 1), None)
+        curve = next((c for c in look.curves if len(c.coordinates) == 1), None)
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
@@ -452,6 +455,22 @@ class Search:
                 accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
                 return
 
+    def _simplify(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+        """Put one curve, or a formula for it, in the place of effects that explain the data no better.
+
+        Where no effect of the library is right, some of them together may come near.
+        """
+        if len(accepted) < 2 or any(step.curve for step in accepted):
+            return
+        self.tell(f"trying one law instead of {len(accepted)}")
+        found = self._located(states[0], looks[0])
+        if found is None:
+            return
+        several, one = same_level(states[-1].part, found[1].part)
+        unit = one.inflation(at_level(states[0].part, one.level))
+        if one.chi2 / unit + found[0].price < several.chi2 / unit + sum(step.price for step in accepted):
+            accepted[:], states[1:], looks[1:] = [found[0]], [found[1]], []
+
     def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
@@ -487,7 +506,8 @@ class Search:
                 continue
             if not self._worse(current.errors, errors):
                 others = self._alternatives(trial, trials, look.library, unit)
-                step = Step(trial.candidates, trial.curve, fall, p, ratio, others)
+                price = trial.price + trial.handicap
+                step = Step(trial.candidates, trial.curve, fall, p, ratio, others, price)
                 return step, State(trial.fit, whole.fit, errors)
         return None
 
