@@ -90,6 +90,18 @@ def test_the_page_can_be_read_aloud(pages: dict[str, str], name: str) -> None:
     assert "<&>" in page.words  # what came from outside is text, not markup
 
 
+@pytest.mark.parametrize(
+    ("ratio", "told"),
+    [
+        ((0.9, 0.85, 0.95), "interval 0.85 to 0.95)."),
+        ((0.99, 0.97, 1.01), "fitted too, they lowered"),
+        ((1.005, 1.001, 1.008), "Each half of the record"),
+    ],
+)
+def test_what_the_frames_held_back_say_is_told(ratio: tuple[float, float, float], told: str) -> None:
+    assert told in words.borne_out(ratio)
+
+
 def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:
     found, text = discovered.disk(), Page(pages["disk"]).words
     (effect,) = found.effects

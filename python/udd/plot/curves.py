@@ -27,7 +27,6 @@ _SLOTS: dict[str, tuple[str, str, float]] = {
 _COORDINATES: dict[str, tuple[str, str, float]] = {
     **AXES,
     "|Omega|": ("speed |Ω|", "rad/s", 1.0),
-    "theta": ("direction θ of the centre from the contact", "rad", 1.0),
 }
 _COLOURS = (BEFORE, FLOOR, ALIKE)
 _PLACES = 300

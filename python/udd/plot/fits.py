@@ -40,8 +40,8 @@ def residuals(
     equation : str, optional
         The state whose rate it is; by default the one with the clearest pattern.
     against : str, optional
-        ``"t"``, a state (beta modulo one turn), or ``"R"``; by default that, but for t, along which the
-        pattern is clearest.
+        ``"t"``, a state, ``"R"`` or the direction ``"theta"`` of a disk (angles modulo one turn); by default
+        that, but for t, along which the pattern is clearest.
     colour : str
         Of the means.
 
@@ -148,8 +148,9 @@ def coordinates(fit: Any) -> dict[str, Array]:
     result = {"t": fit.record.clock[:-1], **columns}
     if "beta" in columns:
         result["beta"] = np.mod(columns["beta"], 2 * np.pi)
-    if "Z" in columns:
+    if fit.model.kind == "disk":
         result["R"] = np.hypot(columns["Y"], columns["Z"])
+        result["theta"] = np.mod(np.arctan2(columns["Y"], columns["Z"]), 2 * np.pi)
     return result
 
 

@@ -27,7 +27,7 @@ AXES: dict[str, tuple[str, str, float]] = {
     "Y": ("Y (to the right)", "cm", 100.0),
     "Z": ("Z (up)", "cm", 100.0),
     "beta": ("orientation β", "rad", 1.0),
-    "theta": ("angle θ from hanging", "rad", 1.0),
+    "theta": ("direction θ from the pivot", "rad", 1.0),
     "omega": ("ω", "1", 1.0),
     "y": ("y", "1", 1.0),
     "z": ("z", "1", 1.0),

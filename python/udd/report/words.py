@@ -236,6 +236,23 @@ def probability(p: float) -> str:
     return f"{min(p, 1.0):.2g}"
 
 
+def borne_out(ratio: tuple[float, float, float]) -> str:
+    """What the frames that no fit saw say of an effect."""
+    value, low, high = ratio
+    told = (
+        "With all numbers held, the cost of the held-back frames (their squared misfits in units of the "
+        f"noise) became {value:.3g} of what it was (95 % interval {low:.3g} to {high:.3g})"
+    )
+    if high < 1.0:
+        return f"{told}."
+    if value < 1.0:
+        return f"{told}; fitted too, they lowered χ² by more than chance would."
+    return (
+        f"{told}: they hardly show it. Each half of the record, in alternate stretches, lowered χ² by more "
+        "than chance would beside the other half."
+    )
+
+
 def unit_words(unit: str) -> str:
     """A unit in a sentence: ``1/m`` becomes ``per metre``."""
     return {"1/m": "per metre", "1/s": "per second", "": ""}.get(unit, pretty(unit))
