@@ -20,15 +20,15 @@ const ARM: f64 = 0.1;
 /// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
 ///
 /// ```text
-/// p = (1 + scale) Rot(tilt) [(Y, Z) + shutter (Y, Z)'' + Rot(beta) (right, up)] + (y0, z0)
+/// p = (1 + scale) Rot(tilt) [(Y, Z)(t - row Z) + shutter (Y, Z)'' + Rot(beta) (right, up)] + (y0, z0)
 /// (Y, Z)_seen = p + lens |p - m|^2/A^2 (p - m),   m = (middle_y, middle_z)
-/// beta_seen = beta + shutter Omega' + tilt - lag Omega
+/// beta_seen = beta(t - row Z - lag) + shutter Omega' + tilt
 /// ```
 ///
 /// `y0, z0` is where the pivot really is in the measurement's coordinates, `tilt` turns the picture
 /// clockwise, `lens` is how much farther from the picture's middle `m` a lens shows what lies at the distance
 /// A = 0.1 m from there, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
-/// (marks are glued by hand), `lag` is how much later than the position the orientation is seen, and with a rolling
+/// (marks are glued by hand), the orientation is seen as it was `lag` before the position, and with a rolling
 /// shutter a point at height `Z` is exposed at `t - row Z`. What is a mean over an exposure of duration `e` lies off
 /// the middle of a curved path: `shutter` is then `e^2/24`.
 #[derive(Clone, Copy, Debug)]
@@ -59,13 +59,15 @@ impl Sensor<4, 3> for DiskCamera {
         let &[y0, z0, tilt, scale, right, up, lag, row, shutter, lens, middle_y, middle_z] =
             camera.first_chunk().expect("twelve camera parameters");
         let late = -(row * x[2]);
-        let beta = x[3] + late * rate[3];
-        let (sin, cos) = (beta.sin(), beta.cos());
-        // The disk turns about a contact that the drive moves at its own steady speed.
+        let later = late - lag;
+        // Paths are followed to the second order in time. The disk turns about a contact whose drive is steady.
+        let bend = |delay: S| shutter + delay.square().scale(0.5);
         let curved = [rate[0] * x[2] + x[0] * rate[2], -(rate[0] * x[1] + x[0] * rate[1])];
-        let y = x[1] + late * rate[1] + shutter * curved[0] + right * cos + up * sin;
-        let z = x[2] + late * rate[2] + shutter * curved[1] + up * cos - right * sin;
-        let beta = beta + shutter * rate[0] - lag * rate[3];
+        let turned = x[3] + late * rate[3];
+        let (sin, cos) = (turned.sin(), turned.cos());
+        let y = x[1] + late * rate[1] + bend(late) * curved[0] + right * cos + up * sin;
+        let z = x[2] + late * rate[2] + bend(late) * curved[1] + up * cos - right * sin;
+        let beta = x[3] + later * rate[3] + bend(later) * rate[0];
         let (sin, cos, size) = (tilt.sin(), tilt.cos(), S::one() + scale);
         let (y, z) = (size * (cos * y + sin * z) + y0, size * (cos * z - sin * y) + z0);
         let (across, upward) = (y - middle_y, z - middle_z);
