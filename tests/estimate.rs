@@ -7,7 +7,7 @@ use udd::estimate::{
 };
 use udd::integrate::{Tolerance, propagate};
 use udd::model::effects::{Effect, Kind, Momentum};
-use udd::model::{DiskFamily, Family};
+use udd::model::{DiskFamily, Family, System, sides_of};
 use udd::run::Stop;
 
 const PAPER: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
@@ -197,6 +197,36 @@ proptest! {
             let seen = (e_down[0] - e_up[0]) / (2.0 * h);
             prop_assert!((linear.sights[0].h.column(k) - seen).norm() < 1e-5, "h {k}");
         }
+    }
+}
+
+/// What the camera leaves out of a delay is of the third order in time, and of an exposure's mean of the fourth.
+#[test]
+fn a_camera_follows_paths_to_the_second_order() {
+    let disk = family(&[]).build(&PAPER);
+    let tolerance = Tolerance { rtol: 1e-13, atol: 1e-15 };
+    let from_frame = |t: f64| propagate(&disk, 0.0, 0.02 + t, [7.0, 0.02, 0.03, 0.5], &tolerance).unwrap();
+    let x = from_frame(0.0);
+    let rate = disk.rates(0.02, &x, &sides_of(&disk, 0.02, &x));
+    let look = |name: &str, value: f64| {
+        let own = |&(own, _): &(&str, _)| if own == name { value } else { 0.0 };
+        let camera: Vec<f64> = DiskCamera::PARAMETERS.iter().map(own).collect();
+        SVector::from(DiskCamera.observe(&camera, &x, &rate))
+    };
+    let seen = |state: [f64; 4]| SVector::from([state[1], state[2], state[3]]);
+    // By Gauss' rule at three places, exact to the fifth order.
+    let mean = |e: f64| {
+        let aside = e / 2.0 * 0.6f64.sqrt();
+        let sides = seen(from_frame(-aside)) + seen(from_frame(aside));
+        (sides * 5.0 + seen(x) * 8.0) / 18.0
+    };
+    let late = |h: f64| (look("row", -h / x[2]) - seen(from_frame(h))).norm();
+    let lagging = |h: f64| (look("lag", -h)[2] - from_frame(h)[3]).abs();
+    let blurred = |e: f64| (look("shutter", e * e / 24.0) - mean(e)).norm();
+    for (left, order) in
+        [(late(4e-3) / late(2e-3), 3), (lagging(4e-3) / lagging(2e-3), 3), (blurred(0.01) / blurred(5e-3), 4)]
+    {
+        approx::assert_relative_eq!(left.log2(), f64::from(order), epsilon = 0.2);
     }
 }
 
