@@ -16,6 +16,7 @@ from udd.fitting import Fit, Record, at_level, extend, loosened
 
 from .bearing import ALPHA, borne_out, same_level
 from .candidates import Candidate, library
+from .coordinates import Coordinate
 from .curves import Curve, scan_curves
 from .formulas import Formula, formulas_for
 from .heldout import (
@@ -264,9 +265,16 @@ def _one_of_each(trials: list[Trial]) -> list[Trial]:
 
 
 def _states_first(curves: list[Curve]) -> list[Curve]:
-    """The likeliest first, but curves over time, which take up anything slow, after those as likely."""
-    late = 2 * NATS
-    return sorted(curves, key=lambda c: -c.evidence + (late if c.coordinates[0].name == "t" else 0.0))
+    """The likeliest first, but after those as likely what stands for states in a roundabout way.
+
+    Curves over time take up anything slow, and curves over the direction can do much of what those over Y
+    and Z do.
+    """
+
+    def handicap(own: Coordinate) -> float:
+        return 2 * NATS if own.name == "t" else NATS if own.angle and own.text != own.name else 0.0
+
+    return sorted(curves, key=lambda c: -c.evidence + handicap(c.coordinates[0]))
 
 
 def _same(one: Fit, other: Fit) -> bool:
@@ -366,7 +374,7 @@ class Search:
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
         passing = look.passing()
-        curve = next((c for c in look.curves if len(c.coordinates) == 1), None)
+        curve = next((c for c in _states_first(look.curves) if len(c.coordinates) == 1), None)
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
