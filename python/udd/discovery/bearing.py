@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from udd.fitting import Fit, Record, at_level, frame_costs, held, within
 
 from .heldout import Ratio, cost_improvement, stretches
+from .results import Witness
 from .together import together
 
 Array = NDArray[np.float64]
@@ -26,7 +27,9 @@ _STRETCH = 3.0  # s; long beside what it takes to find a stretch's own start
 Pair = tuple[Fit, Fit]
 
 
-def borne_out(part: Pair, whole: Pair, rest: Record, names: Sequence[str], unit: float) -> tuple[Ratio, bool]:
+def borne_out(
+    part: Pair, whole: Pair, rest: Record, names: Sequence[str], unit: float
+) -> tuple[Ratio, Witness | None]:
     """Whether data that were not fitted want an effect too, and how much less they cost with it.
 
     They do where they cost less beyond doubt, all parameters held; or where chi2 falls further once they are
@@ -49,13 +52,17 @@ def borne_out(part: Pair, whole: Pair, rest: Record, names: Sequence[str], unit:
     -------
     ratio : tuple of float
         Cost of `rest` with the effect over cost without it, all parameters held, with its 95 % interval.
-    wanted : bool
+    witness : str or None
+        What bears it out, the first that does: the cost of the frames that were ``"held"``, these
+        ``"fitted"`` too, or the ``"halves"`` of the record.
     """
     ratio = _held_ratio(*part, rest, unit)
-    if ratio[2] < 1.0 or (ratio[0] < 1.0 and _falls_further(part, whole)):
-        return ratio, True
-    silent = bool(names) and _expected(part[1], whole, names) < _TELLING
-    return ratio, silent and _crosswise(whole, unit)
+    if ratio[2] < 1.0:
+        return ratio, "held"
+    if ratio[0] < 1.0 and _falls_further(part, whole):
+        return ratio, "fitted"
+    silent = names and _expected(part[1], whole, names) < _TELLING
+    return ratio, "halves" if silent and _crosswise(whole, unit) else None
 
 
 def same_level(one: Fit, other: Fit) -> Pair:

@@ -167,6 +167,7 @@ def _describe(step: Step, final: Fit) -> list[Found]:
                 chi2=step.chi2,
                 p=step.p,
                 ratio=step.ratio,
+                witness=step.witness,
                 curve=step.curve,
             )
         )

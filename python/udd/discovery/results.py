@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 from udd.effects import Effect
 from udd.fitting import Fit
@@ -16,6 +16,9 @@ from .curves import Curve
 from .heldout import Errors, Ratio, comparison_horizon
 from .hint import Hint, hints
 from .scan import Scored
+
+#: What bears an effect out, of data that were not fitted.
+Witness = Literal["held", "fitted", "halves"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,9 @@ class Found:
         Probability of so large a fall by chance, all candidates counted.
     ratio : tuple of float
         Cost of the held-out frames after over before, all parameters held, with its 95 % interval.
+    witness : {"held", "fitted", "halves"}
+        What bears it out: that cost, the held-out frames once they are fitted too, or each half of the record
+        in alternate stretches.
     curve : Curve or None
         Where it was located without a formula: the curve with its band. The effect is that, or a formula
         for it.
@@ -50,6 +56,7 @@ class Found:
     chi2: float
     p: float
     ratio: Ratio
+    witness: Witness
     curve: Curve | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -64,6 +71,7 @@ class Found:
             "chi2": self.chi2,
             "p": self.p,
             "held_out_cost_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+            "borne_out_by": self.witness,
         }
 
 

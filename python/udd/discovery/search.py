@@ -28,7 +28,7 @@ from .heldout import (
     whole_improvement,
 )
 from .located import fit_curve, fit_formula
-from .results import Alternative
+from .results import Alternative, Witness
 from .scan import Scan, Scored, physical, scan, strongest_ripple
 from .together import together
 
@@ -58,6 +58,8 @@ class Step:
         By how much chi2 fell, and the probability of that by chance.
     ratio : tuple of float
         Cost of the held-out frames after over before, with its 95 % interval.
+    witness : {"held", "fitted", "halves"}
+        What bears it out, see :func:`udd.discovery.bearing.borne_out`.
     alternatives : list of Alternative
     price : float
         What its freedom costs, in chi2; more for a formula, and for a curve, than for what physics knows.
@@ -68,6 +70,7 @@ class Step:
     chi2: float
     p: float
     ratio: Ratio
+    witness: Witness
     alternatives: list[Alternative]
     price: float
 
@@ -505,8 +508,8 @@ class Search:
             if p >= ALPHA:
                 continue
             part, rest = (current.part, trial.fit), self.record.part(self.held)
-            ratio, wanted = borne_out(part, (before, after), rest, trial.names, self.unit)
-            if not wanted:
+            ratio, witness = borne_out(part, (before, after), rest, trial.names, self.unit)
+            if witness is None:
                 continue
             try:
                 errors = self.errors(trial.fit)
@@ -515,7 +518,7 @@ class Search:
             if not self._worse(current.errors, errors):
                 others = self._alternatives(trial, trials, look.library, unit)
                 price = trial.price + trial.handicap
-                step = Step(trial.candidates, trial.curve, fall, p, ratio, others, price)
+                step = Step(trial.candidates, trial.curve, fall, p, ratio, witness, others, price)
                 return step, State(trial.fit, whole.fit, errors)
         return None
 

@@ -236,16 +236,16 @@ def probability(p: float) -> str:
     return f"{min(p, 1.0):.2g}"
 
 
-def borne_out(ratio: tuple[float, float, float]) -> str:
+def borne_out(effect: Any) -> str:
     """What the frames that no fit saw say of an effect."""
-    value, low, high = ratio
+    value, low, high = effect.ratio
     told = (
         "With all numbers held, the cost of the held-back frames (their squared misfits in units of the "
         f"noise) became {value:.3g} of what it was (95 % interval {low:.3g} to {high:.3g})"
     )
-    if high < 1.0:
+    if effect.witness == "held":
         return f"{told}."
-    if value < 1.0:
+    if effect.witness == "fitted":
         return f"{told}; fitted too, they lowered χ² by more than chance would."
     return (
         f"{told}: they hardly show it. Each half of the record, in alternate stretches, lowered χ² by more "
