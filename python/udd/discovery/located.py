@@ -10,8 +10,8 @@ import numpy as np
 from udd import effects
 from udd.effects import Effect
 from udd.fitting import Fit, widened
+from udd.fitting.annealing import tighten
 from udd.fitting.parameters import Free
-from udd.fitting.solve import tighten
 
 from .absorbed import distinct
 from .curves import Curve, refined, rescored

@@ -14,8 +14,9 @@ from scipy.stats import chi2 as chi2_distribution
 from udd import _core
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, fit_record, record_of
+from udd.fitting.annealing import tighten
 from udd.fitting.parameters import Free
-from udd.fitting.solve import solve, tighten
+from udd.fitting.solve import solve
 from udd.measurement import Measurement
 from udd.models import Model
 

@@ -292,6 +292,14 @@ def _unused(current: Fit, name: str) -> str:
     return next(n for n in (name, *(f"{name}{k}" for k in range(2, 9))) if n not in taken)
 
 
+def _cheaper(found: tuple[Step, State], steps: Sequence[Step], start: State, end: State) -> bool:
+    """Whether one step explains the data as well as several from the same start, their freedom paid for."""
+    step, state = found
+    several, one = same_level(end.part, state.part)
+    unit = one.inflation(at_level(start.part, one.level))
+    return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
+
+
 @dataclass(frozen=True)
 class Outcome:
     """Where a search ended: fits of the first part and of all data, errors, what was seen and done."""
@@ -460,9 +468,7 @@ class Search:
             found = self._accept(before, self._curves(before, [last.curve]), looks[k])
             if found is None:
                 continue
-            both, alone = same_level(states[-1].part, found[1].part)
-            more = sum(c.parameters for step in accepted[k:-1] for c in step.candidates)
-            if alone.chi2 < both.chi2 + _price(both) * more * max(both.scatter, 1.0):
+            if _cheaper(found, accepted[k:], states[k], states[-1]):
                 accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
                 return
 
@@ -475,11 +481,7 @@ class Search:
             return
         self.tell(f"trying one law instead of {len(accepted)}")
         found = self._located(states[0], looks[0])
-        if found is None:
-            return
-        several, one = same_level(states[-1].part, found[1].part)
-        unit = one.inflation(at_level(states[0].part, one.level))
-        if one.chi2 / unit + found[0].price < several.chi2 / unit + sum(step.price for step in accepted):
+        if found is not None and _cheaper(found, accepted, states[0], states[-1]):
             accepted[:], states[1:], looks[1:] = [found[0]], [found[1]], []
 
     def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:

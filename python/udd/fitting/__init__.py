@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from .annealing import at_level, held, loosened
 from .fit import extend, fit, fit_record, refit, widened
 from .problem import Fit, data_of
 from .record import Record, record_of
-from .solve import at_level, filtered, frame_costs, held, loosened, predicted, within
+from .solve import filtered, frame_costs, predicted, within
 
 __all__ = [
     "Fit",

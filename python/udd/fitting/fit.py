@@ -13,15 +13,15 @@ from udd.measurement import Measurement
 from udd.models import Model
 from udd.own_models import OwnModel
 
+from .annealing import ROUGH, rough, tighten
 from .noise import estimated, stated
 from .own import levels_of
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
 from .record import Record, record_of
-from .solve import solve, tighten
+from .solve import solve
 
 _NOISE_ROUNDS = 12
-_ROUGH = 1.0  # fall of chi2 below which the misfits no longer change what they say of the noise
 #: In a search a pendulum's angle that states no error is not taken for better than this part of what is
 #: typical: frames may scatter less, but perspective bends the angle by as much.
 _FAITHFUL = {"pendulum": 0.5}
@@ -215,7 +215,7 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
         problem = replace(problem, diffusion=diffusion, noise=as_stated)
         shown, problem, point = _estimate_noise(measurements, problem, point)
         if shown:
-            loose = tighten(measurements, problem, point, problem.schedule[number : number + 1])
+            loose = rough(measurements, problem, point)
             return tighten(measurements, loose.problem, _afresh(loose), problem.schedule[number + 1 :], loose)
     # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
     believed = as_stated.everywhere(len(problem.record.t))
@@ -241,7 +241,7 @@ def _estimate_noise(
 ) -> tuple[bool, Problem, Point]:
     """Fit and estimate the noise in turns; whether the misfits show it, and what was found."""
     for _ in range(_NOISE_ROUNDS):
-        result = solve(measurements, problem, point, decrease=_ROUGH)
+        result = solve(measurements, problem, point, decrease=ROUGH)
         point, before = result.point, problem.noise
         if result.leverage > FOLLOWS:
             return False, problem, point

@@ -1,4 +1,4 @@
-"""One minimum, and chains of them."""
+"""One minimum."""
 
 from __future__ import annotations
 
@@ -13,18 +13,13 @@ from udd.errors import FitError, ModelError
 from udd.measurement import Measurement
 from udd.models import Model
 
-from .noise import estimated, remembered
 from .problem import Fit, Point, Problem, Values, data_of
 from .record import Record
 
 Array = NDArray[np.float64]
 
-_STEPS = 30  # a right model converges in three to seven, but for kinks of its law
-_DONE = 0.01  # a tenth of a standard error
-#: Nats by which the evidence may fall when the model is held more tightly.
-LESS = 3.0
-_LOOSE = 0.3  # leverage from which on misfits are not the noise
-_SAME = 0.03  # autocorrelations that differ by less need no other fit
+#: A step that promises to lower chi2 by less is the last: it moves nothing by a tenth of a standard error.
+DONE = 0.01
 
 
 def solve(
@@ -32,7 +27,7 @@ def solve(
     problem: Problem,
     point: Point,
     iterations: int = 40,
-    decrease: float = _DONE,
+    decrease: float = DONE,
 ) -> Fit:
     """Minimise once, for the problem's assumed model error, from a point.
 
@@ -135,90 +130,11 @@ def filtered(
     return _core.filter(fitted.model, data, (record.states, list(fitted.point.sets)), list(diffusion), pairs)
 
 
-def tighten(
-    measurements: tuple[Measurement, ...],
-    problem: Problem,
-    point: Point,
-    schedule: Sequence[tuple[float, ...]],
-    best: Fit | None = None,
-) -> Fit:
-    """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
-
-    Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
-    `best` is a fit that was held more loosely, and stands where nothing tighter does.
-    """
-    for diffusion in schedule:
-        problem = replace(problem, diffusion=diffusion)
-        result = solve(measurements, problem, point, _STEPS)
-        if problem.likeliest:
-            result = remembering(result)
-        if best is not None and not result.converged:
-            break
-        if best is not None and problem.likeliest and result.evidence < best.evidence - LESS:
-            break
-        best, point = result, result.point
-        problem = replace(problem, noise=result.noise)
-    if best is None:
-        raise FitError("the fit has no level to solve at")
-    return best
-
-
-def remembering(fitted: Fit) -> Fit:
-    """The same with noise that remembers itself, where the record makes that likelier.
-
-    Frames whose noise goes together are worth less than independent ones: without this the model would be
-    held too loosely, to follow the noise, and standard errors would be too small.
-    """
-    if fitted.leverage > _LOOSE:
-        return fitted
-    sd = fitted.noise.sd(fitted.record, fitted.blurring)
-    memory = remembered(fitted.record, fitted.misfit, sd, fitted.noise.weight)
-    if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
-        return fitted
-    noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
-    problem = replace(fitted.problem, noise=replace(noise, memory=memory))
-    result = solve(fitted.measurements, problem, fitted.point, _STEPS)
-    return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
-
-
-def loosened(fitted: Fit, scatter: float) -> Fit:
-    """The tightest fit, of those that led to this one, whose scatter is below a limit; else the loosest.
-
-    A wrong model that is held tightly bends everything to obey it; where it is held less tightly it shows
-    what is missing.
-    """
-    problem, result = fitted.problem, fitted
-    for diffusion in reversed(problem.schedule[: fitted.level]):
-        if result.scatter < scatter:
-            break
-        result = solve(fitted.measurements, replace(problem, diffusion=diffusion), result.point)
-    return result
-
-
-def at_level(fitted: Fit, level: int) -> Fit:
-    """The same model, held as tightly as a level of the schedule says."""
-    if level == fitted.level:
-        return fitted
-    problem = replace(fitted.problem, diffusion=fitted.problem.schedule[level])
-    return solve(fitted.measurements, problem, fitted.point)
-
-
 def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:
     """The same model fitted to some of the frames (a mask), held as tightly, from where the fit ended."""
     noise = replace(fitted.noise, weight=fitted.noise.weight[frames])
     problem = replace(fitted.problem, record=fitted.record.part(frames), noise=noise)
     return solve(fitted.measurements, problem, replace(fitted.point, states=fitted.states[frames]))
-
-
-def held(fitted: Fit, record: Record, level: int) -> Fit:
-    """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
-
-    A wrong model may not get that far: the level of the result says how far it got.
-    """
-    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
-    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
-    start = replace(fitted.point, states=record.states)
-    return tighten(fitted.measurements, problem, start, problem.schedule[: level + 1])
 
 
 def frame_costs(fitted: Fit) -> Array:

@@ -1,0 +1,147 @@
+"""Minima one after the other, the model held ever more tightly, or more loosely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from udd.errors import FitError
+from udd.measurement import Measurement
+
+from .noise import estimated, remembered
+from .problem import Fit, Point, Problem
+from .record import Record
+from .solve import DONE, solve
+
+_STEPS = 30  # a right model converges in three to seven, but for kinks of its law
+_LEAP, _FEW = 3, 12  # levels that a right model takes at once, and the most steps that it then needs
+#: Fall of chi2 below which a fit no longer changes what it says of the noise and of its likelihood.
+ROUGH = 1.0
+#: Nats by which the evidence may fall when the model is held more tightly.
+LESS = 3.0
+_LOOSE = 0.3  # leverage from which on misfits are not the noise
+_SAME = 0.03  # autocorrelations that differ by less need no other fit
+
+
+def tighten(
+    measurements: tuple[Measurement, ...],
+    problem: Problem,
+    point: Point,
+    schedule: Sequence[tuple[float, ...]],
+    best: Fit | None = None,
+) -> Fit:
+    """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
+
+    Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
+    `best` is a fit that was held more loosely, and stands where nothing tighter does.
+    """
+    levels = list(schedule)
+    if best is None:
+        if not levels:
+            raise FitError("the fit has no level to solve at")
+        best = rough(measurements, replace(problem, diffusion=levels.pop(0)), point)
+        point = best.point
+    far = _leaps(best, point, levels) if problem.likeliest else best
+    if far is not best:
+        best = _eased(far, levels)
+        levels, point = levels[levels.index(far.problem.diffusion) + 1 :], best.point
+    for diffusion in levels if best is far else ():
+        result = rough(measurements, replace(best.problem, diffusion=diffusion), point)
+        if not _stands(result, best):
+            break
+        best, point = result, result.point
+    is_last = best.problem.diffusion == problem.schedule[-1]
+    return best if is_last else solve(measurements, best.problem, best.point)
+
+
+def rough(
+    measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = _STEPS
+) -> Fit:
+    """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
+    # At the last level it is the end, and to be had at once.
+    decrease = DONE if problem.diffusion == problem.schedule[-1] else ROUGH
+    result = solve(measurements, problem, point, iterations, decrease)
+    return remembering(result) if problem.likeliest else result
+
+
+def _stands(tighter: Fit, looser: Fit) -> bool:
+    """Whether a fit that is held more tightly takes the place of a looser one."""
+    less_likely = tighter.problem.likeliest and tighter.evidence < looser.evidence - LESS
+    return tighter.converged and not less_likely
+
+
+def _leaps(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit:
+    """Levels far apart on the way to the last: a right model gets from one to the next in few steps."""
+    for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
+        try:
+            result = rough(best.measurements, replace(best.problem, diffusion=diffusion), point, _FEW)
+        except FitError:
+            break
+        if not _stands(result, best):
+            break
+        best, point = result, result.point
+    return best
+
+
+def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
+    """The fit held more loosely again, level by level, as long as that is likelier."""
+    for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
+        problem = replace(fitted.problem, diffusion=diffusion)
+        looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
+        if _stands(fitted, looser):
+            break
+        fitted = looser
+    return fitted
+
+
+def remembering(fitted: Fit) -> Fit:
+    """The same with noise that remembers itself, where the record makes that likelier.
+
+    Frames whose noise goes together are worth less than independent ones: without this the model would be
+    held too loosely, to follow the noise, and standard errors would be too small.
+    """
+    if fitted.leverage > _LOOSE:
+        return fitted
+    sd = fitted.noise.sd(fitted.record, fitted.blurring)
+    memory = remembered(fitted.record, fitted.misfit, sd, fitted.noise.weight)
+    if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
+        return fitted
+    noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
+    problem = replace(fitted.problem, noise=replace(noise, memory=memory))
+    result = solve(fitted.measurements, problem, fitted.point, _STEPS)
+    return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
+
+
+def loosened(fitted: Fit, scatter: float) -> Fit:
+    """The tightest fit, of those that led to this one, whose scatter is below a limit; else the loosest.
+
+    A wrong model that is held tightly bends everything to obey it; where it is held less tightly it shows
+    what is missing.
+    """
+    problem, result = fitted.problem, fitted
+    for diffusion in reversed(problem.schedule[: fitted.level]):
+        if result.scatter < scatter:
+            break
+        result = solve(fitted.measurements, replace(problem, diffusion=diffusion), result.point)
+    return result
+
+
+def at_level(fitted: Fit, level: int) -> Fit:
+    """The same model, held as tightly as a level of the schedule says."""
+    if level == fitted.level:
+        return fitted
+    problem = replace(fitted.problem, diffusion=fitted.problem.schedule[level])
+    return solve(fitted.measurements, problem, fitted.point)
+
+
+def held(fitted: Fit, record: Record, level: int) -> Fit:
+    """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
+
+    A wrong model may not get that far: the level of the result says how far it got.
+    """
+    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
+    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
+    start = replace(fitted.point, states=record.states)
+    return tighten(fitted.measurements, problem, start, problem.schedule[: level + 1])
