@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, SVector};
 
-use super::{Cost, Estimator, Sensor};
+use super::{Estimator, Sensor};
 use crate::model::Family;
 
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
@@ -39,7 +39,7 @@ where
     ///
     /// The determinants are those of the states' part of the normal equations, and of what remains for the
     /// parameters.
-    pub(super) fn evidence(&self, cost: &Cost, states: f64, schur: &DMatrix<f64>) -> f64 {
+    pub(super) fn evidence(&self, cost: f64, states: f64, schur: &DMatrix<f64>) -> f64 {
         let record = &self.record;
         let mut given = 0.0;
         let mut before = [false; M];
@@ -62,6 +62,6 @@ where
             Some(lower) => 2.0 * lower.l().diagonal().iter().map(|v| v.ln()).sum::<f64>(),
             None => f64::INFINITY,
         };
-        0.5 * (given - cost.total() - states - parameters)
+        0.5 * (given - cost - states - parameters)
     }
 }

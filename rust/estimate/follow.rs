@@ -5,11 +5,14 @@ use std::array::from_fn;
 use rayon::prelude::*;
 
 use super::{EstimateError, Estimator, Point, Role, Sensor, Set};
-use crate::integrate::{Driver, Failure, MOST_STEPS, Method, Taylor, Tolerance, order};
+use crate::integrate::{Driver, Failure, Method, Taylor, Tolerance, order};
 use crate::model::{Family, System};
 use crate::scalar::{Dual, Isa, Scalar};
 use crate::tape::Tape;
 
+/// A link takes a few steps; where a fit's numbers have gone astray, as near a formula's pole, it would take
+/// very many, and the fit had better turn back at once.
+const MOST_STEPS: u64 = 1000;
 /// Links are taken by so many at least: what follows them is made once for all.
 const TOGETHER: usize = 64;
 

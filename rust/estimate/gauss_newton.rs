@@ -55,8 +55,8 @@ pub struct Solution<const D: usize, const M: usize> {
     pub cost: Cost,
     pub converged: bool,
     pub iterations: usize,
-    /// Logarithm of the likelihood of the record, states and free parameters integrated out around this
-    /// point; a constant that depends on neither noise nor model is left out. Parameters without a prior count
+    /// Logarithm of the likelihood of the record, states and free parameters integrated out around the minimum
+    /// next to this point; a constant that depends on neither noise nor model is left out. Parameters without a prior count
     /// as with one of a standard deviation of 1.
     pub evidence: f64,
     /// Covariance of the free parameters.
@@ -144,11 +144,13 @@ where
             let full = self.step(&reduced, 0.0)?;
             let promise = reduced.promise(&full.parameters);
             let done = promise < options.decrease || still == ENOUGH;
+            // What is left to gain at the end; at a kink it is not to be had.
+            let left = if promise < options.decrease { promise } else { 0.0 };
             if done || iteration > options.iterations {
-                return self.finish(here, &reduced, (iteration, done));
+                return self.finish(here, &reduced, left, (iteration, done));
             }
             let Some(lower) = self.lower(&here, &reduced, full, &mut damping, spare)? else {
-                return self.finish(here, &reduced, (iteration, true));
+                return self.finish(here, &reduced, left, (iteration, true));
             };
             // At a kink of the law the cost has one too: there full steps keep promising more than they hold.
             let gained = here.cost.total() - lower.cost.total();
@@ -172,7 +174,7 @@ where
     ) -> Result<Option<Here<D, M>>, EstimateError> {
         let mut step = if *damping == 0.0 { full } else { self.step(reduced, *damping)? };
         let mut length = 1.0;
-        for trial in 0..MOST_TRIALS {
+        for trial in 1..=MOST_TRIALS {
             match self.look(self.moved(&here.point, &step, length), std::mem::take(&mut room)) {
                 Ok(new) if new.cost.total() <= here.cost.total() => {
                     *damping = if *damping < 1e-2 { 0.0 } else { *damping * 0.1 };
@@ -180,6 +182,9 @@ where
                 }
                 Ok(new) => room = new.linear,
                 Err(_) => {}
+            }
+            if trial == MOST_TRIALS {
+                break;
             }
             if *damping == 0.0 && length > SHORTEST {
                 length *= 0.5;
@@ -218,11 +223,12 @@ where
         moved
     }
 
-    /// The covariances at the minimum.
+    /// What is asked of the minimum, at a point that is above it by what is `left` to gain.
     fn finish(
         &self,
         Here { point, linear, cost }: Here<D, M>,
         reduced: &Eliminated<D>,
+        left: f64,
         (iterations, converged): (usize, bool),
     ) -> Result<Solution<D, M>, EstimateError> {
         let covariance = invert(&reduced.schur).ok_or_else(|| undetermined(&self.free, &reduced.schur))?;
@@ -232,7 +238,7 @@ where
             cost,
             converged,
             iterations,
-            evidence: self.evidence(&cost, reduced.log_determinant, &reduced.schur),
+            evidence: self.evidence(cost.total() - left, reduced.log_determinant, &reduced.schur),
             covariance,
             state_covariance: uncertain.covariance(),
             seen_variance: uncertain.seen(&linear),

@@ -21,7 +21,6 @@ pub use dop853::Dop853Scheme;
 pub use driver::{Counts, Driver, Ending, Progress};
 pub use landing::{TARGETS, WALL};
 pub use method::{MOST_PROBES, Method, Point, Trial};
-pub(crate) use propagate::MOST_STEPS;
 pub use propagate::propagate;
 pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};
 pub use saltation::pass;

@@ -6,7 +6,7 @@ use crate::model::System;
 use crate::scalar::Scalar;
 
 /// More steps than this within one propagation mean that something is wrong.
-pub(crate) const MOST_STEPS: u64 = 1_000_000;
+const MOST_STEPS: u64 = 1_000_000;
 
 /// The state at `t1` of the run that starts with `x0` at `t0`; `t1` may lie before `t0`.
 ///

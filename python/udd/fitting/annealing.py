@@ -17,8 +17,8 @@ from .solve import DONE, solve
 
 _STEPS = 30  # a right model converges in three to seven, but for kinks of its law
 _LEAP, _FEW = 3, 12  # levels that a right model takes at once, and the most steps that it then needs
-#: Fall of chi2 below which a fit no longer changes what it says of the noise and of its likelihood.
-ROUGH = 1.0
+#: Fall of chi2 below which a fit no longer changes what it says of the noise; its likelihood counts it.
+ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
 LESS = 3.0
 _LOOSE = 0.3  # leverage from which on misfits are not the noise
@@ -52,18 +52,20 @@ def tighten(
         if not _stands(result, best):
             break
         best, point = result, result.point
-    is_last = best.problem.diffusion == problem.schedule[-1]
-    return best if is_last else solve(measurements, best.problem, best.point)
+    return best if best.problem.diffusion == problem.schedule[-1] else _settled(best, schedule)
 
 
 def rough(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = _STEPS
 ) -> Fit:
     """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
-    # At the last level it is the end, and to be had at once.
-    decrease = DONE if problem.diffusion == problem.schedule[-1] else ROUGH
-    result = solve(measurements, problem, point, iterations, decrease)
+    result = solve(measurements, problem, point, iterations, _enough(problem))
     return remembering(result) if problem.likeliest else result
+
+
+def _enough(problem: Problem) -> float:
+    """How far a fit goes: to the end at the last level."""
+    return DONE if problem.diffusion == problem.schedule[-1] else ROUGH
 
 
 def _stands(tighter: Fit, looser: Fit) -> bool:
@@ -96,6 +98,17 @@ def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     return fitted
 
 
+def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
+    """The end of a rough fit, or where it has none in sight that of a looser one."""
+    own = fitted.problem.diffusion
+    for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
+        problem = replace(fitted.problem, diffusion=diffusion)
+        fitted = solve(fitted.measurements, problem, fitted.point, _STEPS)
+        if fitted.converged:
+            break
+    return fitted
+
+
 def remembering(fitted: Fit) -> Fit:
     """The same with noise that remembers itself, where the record makes that likelier.
 
@@ -110,7 +123,7 @@ def remembering(fitted: Fit) -> Fit:
         return fitted
     noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
     problem = replace(fitted.problem, noise=replace(noise, memory=memory))
-    result = solve(fitted.measurements, problem, fitted.point, _STEPS)
+    result = solve(fitted.measurements, problem, fitted.point, _STEPS, _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
 
 
