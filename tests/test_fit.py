@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 import simulated
 import udd
 from udd.errors import FitError
-from udd.fitting import record_of
+from udd.fitting import annealing, record_of
 from udd.fitting.fit import _afresh
 
 
@@ -43,6 +43,23 @@ def test_parameters_are_found_within_their_errors(fits):
     assert np.abs(z).max() < 4.5
     # Thirty z-scores, five to a record and correlated there: their rms scatters by about 20 %.
     assert 0.5 < np.sqrt(np.mean(z**2)) < 1.6
+
+
+@pytest.mark.parametrize("hidden", [[], [udd.effects.quadratic_drag(c=1e-5)]], ids=["right", "wrong"])
+def test_leaps_over_levels_end_where_single_steps_do(hidden, monkeypatch):
+    measured, _states = simulated.film(udd.Disk(0.05, effects=hidden), np.random.default_rng(5), 60.0)
+    start = udd.Disk(0.052, k0=0.009, k1=0.12, k2=0.065)
+    leapt = udd.fit(measured, start)
+    monkeypatch.setattr(annealing, "_leapt", lambda *_: None)
+    stepped = udd.fit(measured, start)
+    # A right model is held as tightly as it can be; one that is wrong only as tightly as is likely.
+    last = len(leapt.problem.schedule) - 1
+    assert leapt.level == last if not hidden else 0 < leapt.level < last
+    assert stepped.level == leapt.level
+    assert leapt.evidence == pytest.approx(stepped.evidence, abs=annealing.LESS)
+    for name, value in stepped.parameters.items():
+        # Both end within a tenth of a standard error of their minimum, of noise estimated on the way there.
+        assert abs(leapt.parameters[name] - value) < 0.2 * stepped.errors[name], name
 
 
 def test_the_camera_is_found(fits):

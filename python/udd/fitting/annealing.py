@@ -43,11 +43,10 @@ def tighten(
             raise FitError("the fit has no level to solve at")
         best = rough(measurements, replace(problem, diffusion=levels.pop(0)), point)
         point = best.point
-    far = _leaps(best, point, levels) if problem.likeliest else best
-    if far is not best:
-        best = _eased(far, levels)
-        levels, point = levels[levels.index(far.problem.diffusion) + 1 :], best.point
-    for diffusion in levels if best is far else ():
+    far = _leapt(best, point, levels) if problem.likeliest else None
+    if far:
+        best, levels = _eased(far, levels), []
+    for diffusion in levels:
         result = rough(measurements, replace(best.problem, diffusion=diffusion), point)
         if not _stands(result, best):
             break
@@ -60,7 +59,7 @@ def rough(
 ) -> Fit:
     """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
     result = solve(measurements, problem, point, iterations, _enough(problem))
-    return remembering(result) if problem.likeliest else result
+    return remembering(result) if problem.likeliest and result.converged else result
 
 
 def _enough(problem: Problem) -> float:
@@ -74,17 +73,20 @@ def _stands(tighter: Fit, looser: Fit) -> bool:
     return tighter.converged and not less_likely
 
 
-def _leaps(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit:
-    """Levels far apart on the way to the last: a right model gets from one to the next in few steps."""
+def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit | None:
+    """The fit at the last level, over a few others: a right model gets from one to the next in few steps.
+
+    None where it does not; what it came to on the way is then no good start.
+    """
     for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
         try:
             result = rough(best.measurements, replace(best.problem, diffusion=diffusion), point, _FEW)
         except FitError:
-            break
+            return None
         if not _stands(result, best):
-            break
+            return None
         best, point = result, result.point
-    return best
+    return best if levels else None
 
 
 def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
