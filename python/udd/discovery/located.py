@@ -10,7 +10,7 @@ import numpy as np
 from udd import effects
 from udd.effects import Effect
 from udd.fitting import Fit, widened
-from udd.fitting.annealing import tighten
+from udd.fitting.annealing import FEW, tighten
 from udd.fitting.parameters import Free
 
 from .absorbed import distinct
@@ -149,4 +149,5 @@ def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula")
     names = [f"{name}.{p}" for p in formula.parameters]
     more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
     problem = replace(problem, free=problem.free + more)
-    return tighten(fit.measurements, problem, point, problem.schedule[1:])
+    # Where its constants run away, or trade for each other, there is no end to come to.
+    return tighten(fit.measurements, problem, point, problem.schedule[1:], steps=FEW)

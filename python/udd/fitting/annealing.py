@@ -15,8 +15,10 @@ from .problem import Fit, Point, Problem
 from .record import Record
 from .solve import DONE, solve
 
-_STEPS = 30  # a right model converges in three to seven, but for kinks of its law
-_LEAP, _FEW = 3, 12  # levels that a right model takes at once, and the most steps that it then needs
+STEPS = 30  # a right model converges in three to seven, but for kinks of its law
+#: Steps in which a right model gets from one level to any other.
+FEW = 12
+_LEAP = 3  # levels that it takes at once
 #: Fall of chi2 below which a fit no longer changes what it says of the noise; its likelihood counts it.
 ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
@@ -31,31 +33,33 @@ def tighten(
     point: Point,
     schedule: Sequence[tuple[float, ...]],
     best: Fit | None = None,
+    steps: int = STEPS,
 ) -> Fit:
     """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
 
     Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
-    `best` is a fit that was held more loosely, and stands where nothing tighter does.
+    `best` is a fit that was held more loosely, and stands where nothing tighter does. At each level so many
+    `steps` are taken at most.
     """
     levels = list(schedule)
     if best is None:
         if not levels:
             raise FitError("the fit has no level to solve at")
-        best = rough(measurements, replace(problem, diffusion=levels.pop(0)), point)
+        best = rough(measurements, replace(problem, diffusion=levels.pop(0)), point, steps)
         point = best.point
     far = _leapt(best, point, levels) if problem.likeliest else None
     if far:
         best, levels = _eased(far, levels), []
     for diffusion in levels:
-        result = rough(measurements, replace(best.problem, diffusion=diffusion), point)
+        result = rough(measurements, replace(best.problem, diffusion=diffusion), point, steps)
         if not _stands(result, best):
             break
         best, point = result, result.point
-    return best if best.problem.diffusion == problem.schedule[-1] else _settled(best, schedule)
+    return best if best.problem.diffusion == problem.schedule[-1] else _settled(best, schedule, steps)
 
 
 def rough(
-    measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = _STEPS
+    measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = STEPS
 ) -> Fit:
     """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
     result = solve(measurements, problem, point, iterations, _enough(problem))
@@ -80,7 +84,7 @@ def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit 
     """
     for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
         try:
-            result = rough(best.measurements, replace(best.problem, diffusion=diffusion), point, _FEW)
+            result = rough(best.measurements, replace(best.problem, diffusion=diffusion), point, FEW)
         except FitError:
             return None
         if not _stands(result, best):
@@ -100,12 +104,12 @@ def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     return fitted
 
 
-def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
+def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fit:
     """The end of a rough fit, or where it has none in sight that of a looser one."""
     own = fitted.problem.diffusion
     for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
         problem = replace(fitted.problem, diffusion=diffusion)
-        fitted = solve(fitted.measurements, problem, fitted.point, _STEPS)
+        fitted = solve(fitted.measurements, problem, fitted.point, steps)
         if fitted.converged:
             break
     return fitted
@@ -125,7 +129,7 @@ def remembering(fitted: Fit) -> Fit:
         return fitted
     noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
     problem = replace(fitted.problem, noise=replace(noise, memory=memory))
-    result = solve(fitted.measurements, problem, fitted.point, _STEPS, _enough(problem))
+    result = solve(fitted.measurements, problem, fitted.point, STEPS, _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
 
 
