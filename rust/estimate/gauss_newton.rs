@@ -56,8 +56,8 @@ pub struct Solution<const D: usize, const M: usize> {
     pub converged: bool,
     pub iterations: usize,
     /// Logarithm of the likelihood of the record, states and free parameters integrated out around the minimum
-    /// next to this point; a constant that depends on neither noise nor model is left out. Parameters without a prior count
-    /// as with one of a standard deviation of 1.
+    /// next to this point; a constant that depends on neither noise nor model is left out. Parameters without a
+    /// prior count as with one of a standard deviation of 1.
     pub evidence: f64,
     /// Covariance of the free parameters.
     pub covariance: DMatrix<f64>,

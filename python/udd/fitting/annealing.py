@@ -15,7 +15,8 @@ from .problem import Fit, Point, Problem
 from .record import Record
 from .solve import DONE, solve
 
-STEPS = 30  # a right model converges in three to seven, but for kinks of its law
+#: Most steps at one level: a right model takes three to seven, but for kinks of its law.
+STEPS = 30
 #: Steps in which a right model gets from one level to any other.
 FEW = 12
 _LEAP = 3  # levels that it takes at once
@@ -49,13 +50,13 @@ def tighten(
         point = best.point
     far = _leapt(best, point, levels) if problem.likeliest else None
     if far:
-        best, levels = _eased(far, levels), []
-    for diffusion in levels:
+        best = _eased(far, levels)
+    for diffusion in () if far else levels:
         result = rough(measurements, replace(best.problem, diffusion=diffusion), point, steps)
         if not _stands(result, best):
             break
         best, point = result, result.point
-    return best if best.problem.diffusion == problem.schedule[-1] else _settled(best, schedule, steps)
+    return best if _is_last(best.problem) else _settled(best, schedule, steps)
 
 
 def rough(
@@ -66,9 +67,14 @@ def rough(
     return remembering(result) if problem.likeliest and result.converged else result
 
 
+def _is_last(problem: Problem) -> bool:
+    """Whether the model is held as tightly as it can be."""
+    return problem.diffusion == problem.schedule[-1]
+
+
 def _enough(problem: Problem) -> float:
     """How far a fit goes: to the end at the last level."""
-    return DONE if problem.diffusion == problem.schedule[-1] else ROUGH
+    return DONE if _is_last(problem) else ROUGH
 
 
 def _stands(tighter: Fit, looser: Fit) -> bool:
