@@ -139,6 +139,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
         free: free.to_vec(),
         diffusion: [3e-3, 1e-5, 1e-5, 1e-4].map(|q: f64| q / 0.2),
         tolerance: tolerance(1e-8),
+        known: None,
     };
     let work = move |_| {
         let set = Set { model: model.clone(), camera: vec![0.0; DiskCamera::PARAMETERS.len()], clock: 0.0 };

@@ -1,9 +1,11 @@
 //! The estimator against dense linear algebra, finite differences and a simulated truth.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 use udd::estimate::{
-    Bordered, Candidate, DiskCamera, Estimator, Free, Options, Point, Record, Role, Rows, Sensor, Set,
+    Bordered, Candidate, DiskCamera, Estimator, Free, Known, Options, Point, Record, Role, Rows, Sensor, Set,
 };
 use udd::integrate::{Tolerance, propagate};
 use udd::model::effects::{Effect, Kind, Momentum};
@@ -67,7 +69,7 @@ fn film(family: &DiskFamily, values: &[f64], n: usize, seed: u64) -> (Record<3>,
 fn problem(family: DiskFamily, record: Record<3>, free: Vec<Free>) -> Problem {
     let diffusion = [3e-3, 1e-5, 1e-5, 1e-4].map(|q: f64| q / 0.04f64.sqrt());
     let tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
-    Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance }
+    Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance, known: None }
 }
 
 fn free(role: Role, mean: f64, sd: f64) -> Free {
@@ -298,4 +300,26 @@ fn the_score_foretells_the_fit() {
     assert!((estimate - b).abs() < 0.1 * b.abs().max(score.information[(0, 0)].powf(-0.5)), "{estimate} {b}");
     let gained = fitted.cost.total() - refitted.cost.total();
     assert!((drop - gained).abs() < 0.1 * gained.max(1.0), "{drop} {gained}");
+}
+
+/// What a solve leaves is taken where the next one starts, and only there.
+#[test]
+fn a_known_linearisation_is_not_made_again() {
+    let (record, states) = film(&family(&[]), &PAPER, 100, 6);
+    let free: Vec<Free> = [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
+    let mut estimator = problem(family(&[]), record, free);
+    let solve = |estimator: &Estimator<_, _, 4, 3>, from: &Point<4>| {
+        estimator.solve(from.clone(), &Options::default(), &Stop::new()).unwrap()
+    };
+    let end = solve(&estimator, &point(states, PAPER.to_vec()));
+    estimator.known = Some(Known { point: Arc::new(end.point.clone()), linear: end.linear.clone() });
+    let again = solve(&estimator, &end.point);
+    assert!(Arc::ptr_eq(&again.linear, &end.linear));
+    assert_eq!(again.covariance, end.covariance);
+
+    let mut elsewhere = end.point.clone();
+    elsewhere.sets[0].model[0] *= 1.001;
+    let other = solve(&estimator, &elsewhere);
+    estimator.known = None;
+    assert_eq!(other.point, solve(&estimator, &elsewhere).point);
 }

@@ -114,7 +114,7 @@ fn what_a_known_parameter_removes_is_left_out() {
 /// A small system whose solution is known in closed form.
 #[derive(Clone, Copy)]
 struct Closed<S>([S; 2]);
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 struct ClosedFamily;
 
 impl<S: Scalar> System<S, 8> for Closed<S> {
@@ -447,7 +447,7 @@ fn what_vanishes_changes_no_bit() {
 }
 
 /// A law with a comparison of its own.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 struct Compares;
 impl<S: Scalar> System<S, 1> for Compares {
     fn rates(&self, _t: S, x: &[S; 1], _sides: &Sides<S>) -> [S; 1] {

@@ -17,7 +17,7 @@ from udd.discovery.coordinates import coordinate, coordinates, slots
 from udd.discovery.curves import refined, scan_curves
 from udd.discovery.expressions import evaluate, read, sensible, simplify, write
 from udd.discovery.forcing import Score, responses, score_forcings
-from udd.discovery.formulas import Formula, formulas_for
+from udd.discovery.formulas import Formula, _Target, formulas_for
 from udd.discovery.located import fit_curve, fit_formula
 from udd.discovery.smoothing import chance, smooth
 from udd.discovery.splines import Spline, along, product, rough_product
@@ -291,12 +291,36 @@ def test_what_parameters_absorb_is_left_out(null):
     assert np.abs(taken_back).mean() < 4e-4
 
 
+def test_a_wave_between_the_places_is_no_law(null):
+    """A wave of which each place of the curve shows the same phase looks like a constant there."""
+    spline, _x, score = _regression(0, lambda x: 2.0 + 0.0 * x)
+    straight = next(c for c in scan_curves(null).curves if not c.splines[0].periodic)
+    even = (np.linspace(0.0, 1.0, 4001),)
+    target = _Target(replace(straight, splines=(spline,), places=even, score=score), 400)
+    h = float(target.x[1] - target.x[0])
+    texts = ("1.9", f"1.9 * cos({2 * np.pi / h} * (x - {float(target.x[0])}))")
+    constant, wave = (target.fit(*read(text, {"x": ("x",)})) for text in texts)
+    assert constant is not None
+    assert constant.values[0] == pytest.approx(2.0, abs=4 * 0.3 / 400**0.5)
+    assert wave is None
+
+
+def test_a_curve_known_without_error_has_formulas_too(null):
+    """Where the free parameters can do all that a curve does at a place, it has no error there."""
+    curve = next(c for c in scan_curves(null).curves if not c.splines[0].periodic)
+    known = replace(curve, covariance=0.0 * curve.covariance)
+    assert formulas_for(known, 3000).formulas
+
+
 def test_formulas_are_read_by_a_whitelist():
     node, values = read("(0.5 + (1.3 * tanh((1.7 - (2.5 * X1)))))", {"X1": ("x",)})
     x = np.linspace(-1, 1, 9)
     np.testing.assert_allclose(evaluate(node, x, values), 0.5 + 1.3 * np.tanh(1.7 - 2.5 * x))
     simpler = simplify(node, values)
     np.testing.assert_allclose(evaluate(simpler, x, values), evaluate(node, x, values))
+    # Several rows at once, each with its own constants.
+    rows = evaluate(node, x, [np.array([[v], [2 * v]]) for v in values])
+    np.testing.assert_array_equal(rows[1], evaluate(node, x, [2 * v for v in values]))
     assert write(node, "Z", dict(enumerate("abcd"))) == "a + b * tanh(c - d * Z)"
     for bad in ("__import__('os')", "X1.real", "[X1]", "X2", "X1 if X1 else 1", "f(X1)", "X1 +"):
         with pytest.raises(ValueError, match="formula"):

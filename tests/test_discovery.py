@@ -7,6 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import discovered
 import simulated
@@ -16,6 +17,7 @@ from udd.discovery.candidates import ripples
 from udd.discovery.scan import scan, scan_ripples, strongest_ripple
 from udd.errors import FitError
 from udd.fitting import extend, fit_record, record_of
+from udd.report import words
 
 E = udd.effects
 
@@ -206,6 +208,38 @@ def test_a_result_is_data():
     assert json.dumps(pickle.loads(pickle.dumps(found)).to_dict(), allow_nan=True) == text
     assert json.loads(text)["effects"][0]["parameters"]["c"]["value"] == found.effects[0].parameters["c"]
     assert found.model is found.fit.model
+
+
+@pytest.mark.parametrize("duration", [20.0, 600.0])
+def test_ripples_lie_in_the_range_of_the_effect(duration):
+    t = np.arange(0, duration, 0.04)
+    found = [c.effect.parameters["f"] for c in ripples(udd.Disk(0.04), t)]
+    assert found[0] == pytest.approx(max(2 / t[-1], 0.01))  # two turns, or what the effect calls its slowest
+    assert found[1] - found[0] == pytest.approx(0.5 / t[-1])
+    assert 5.9 < found[-1] < 6.0
+
+
+def test_what_comes_nearest_is_told_but_not_added():
+    """Swings of the pendulum's own frequency that no law explains hide whether a drag is beyond chance."""
+    rng, length, dt = np.random.default_rng(1), 7.3, 1 / 6
+    t = np.arange(0, 94, dt)
+    truth = udd.Pendulum(length, k0=0.27, effects=[E.quadratic_drag(c=0.3)])
+    theta = udd.simulate(truth, t, [0.0, 1.4]).state[:, 1]
+    fade, turn = np.exp(-dt / 15.0), dt * np.sqrt(9.81 / length)
+    swings = lfilter([1], [1, -2 * fade * np.cos(turn), fade**2], rng.standard_normal(len(t) + 500))[500:]
+    noise = 5e-3 * rng.standard_normal(len(t)) + 0.02 * swings / swings.std()
+    found = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(length, k0=0.5))
+    assert found.verdict == "effect present, form not identified"
+    assert found.effects == []
+    assert found.ratio == (1.0, 1.0, 1.0)
+    assert "quadratic drag" in [near.title for near in found.refused]
+    for near in found.refused:
+        assert near.why == "chance"
+        assert near.p >= bearing.ALPHA
+        assert near.ratio[2] < 1.0
+        assert near.errors.whole < found.error_before.whole
+    assert [near["name"] for near in found.to_dict()["refused"]] == [n.effect.name for n in found.refused]
+    assert "would bring the held-out error" in words.refused(found)[0]
 
 
 def test_a_short_record_is_refused():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,10 @@ from scipy.optimize import least_squares
 import simulated
 import udd
 from udd.errors import FitError
-from udd.fitting import annealing, record_of
+from udd.fitting import annealing, fit_record, record_of, widened
 from udd.fitting.fit import _afresh
+from udd.fitting.parameters import Free
+from udd.fitting.solve import solve
 
 
 @pytest.fixture(scope="module")
@@ -205,3 +208,27 @@ def test_too_little_is_refused():
     values[:5] = 0.01
     with pytest.raises(FitError, match="5 usable frames"):
         udd.fit(udd.Measurement(t, values), udd.Disk(0.04))
+
+
+def test_what_a_solve_left_counts_only_where_it_was_left():
+    """The linearisation that goes with a point is for the same record, model and free parameters."""
+    truth = udd.Disk(0.04)
+    measured, _states = simulated.film(truth, np.random.default_rng(5), 8.0)
+    record = record_of(measured, truth)
+    fitted = fit_record(measured, record, truth)
+    left, bare = fitted.point, fitted.point.bare()
+    assert left.linear is not None
+    assert pickle.loads(pickle.dumps(left)).linear is None
+    assert udd.fit(measured, truth).point.linear is None
+    shifted = replace(record, seen=record.seen + 1e-4)
+    wider = widened(fitted, [udd.effects.slip()])[0]
+    for problem in (
+        fitted.problem,
+        replace(fitted.problem, record=shifted),
+        replace(fitted.problem, free=fitted.problem.free[1:]),
+        replace(wider, free=(*wider.free, Free("slip.c", "model", 6, 0.0, np.inf))),
+    ):
+        sets = tuple(([*v, 0.0][: len(problem.models[0].parameters)], c, k) for v, c, k in left.sets)
+        ends = [solve((measured,), problem, replace(p, sets=sets), 1) for p in (left, bare)]
+        assert ends[0].chi2 == ends[1].chi2
+        assert ends[0].parameters == ends[1].parameters

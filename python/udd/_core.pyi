@@ -95,14 +95,18 @@ class _Solution(TypedDict):
     evidence: float
     converged: bool
     iterations: int
+    linear: Linearised
 
 # Times, what was seen, its information, whether the next frame is linked, the film, how much of its noise a
 # channel remembers; the states, and for every film the model's, the camera's and the clock's parameters;
 # role, index, film, prior mean and standard deviation of each free parameter.
 _Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_], NDArray[np.int64], list[float]]
 _Values: TypeAlias = tuple[list[float], list[float], float]
-_Start: TypeAlias = tuple[_Floats, list[_Values]]
+_Start: TypeAlias = tuple[_Floats, list[_Values], Linearised | None]
 _Free: TypeAlias = list[tuple[str, int, int | None, float, float]]
+
+@final
+class Linearised: ...
 
 @final
 class Dense:
@@ -239,7 +243,6 @@ def score_columns(
     free: _Free,
     diffusion: list[float],
     at_end: _Floats,
-    in_sight: _Floats,
     groups: list[int],
 ) -> tuple[_Floats, _Floats, _Floats]: ...
 def filter(

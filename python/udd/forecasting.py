@@ -347,7 +347,7 @@ def _starts(
         model = own.with_parameters(values)
         try:
             sets = [(list(model.parameters.values()), camera, clock)]
-            _first, last, spread = _core.filter(model, data, (part.states, sets), diffusion, window)
+            _first, last, spread = _core.filter(model, data, (part.states, sets, None), diffusion, window)
         except ValueError as error:
             raise FitError(f"the state cannot be filtered from the window: {error}") from error
         models.append(model)

@@ -38,6 +38,7 @@ where
                 free: Vec::new(),
                 family: self.family.clone(),
                 sensor: self.sensor.clone(),
+                known: None,
                 ..*self
             };
             let start = Point { states: point.states[first..=last].to_vec(), ..point.clone() };

@@ -1,5 +1,7 @@
 //! The minimum, by Gauss-Newton with Levenberg-Marquardt damping.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::linearise::invert;
@@ -52,6 +54,8 @@ impl Cost {
 #[derive(Clone, Debug)]
 pub struct Solution<const D: usize, const M: usize> {
     pub point: Point<D>,
+    /// The record linearised around it.
+    pub linear: Arc<Linear<D, M>>,
     pub cost: Cost,
     pub converged: bool,
     pub iterations: usize,
@@ -74,7 +78,7 @@ pub struct Solution<const D: usize, const M: usize> {
 /// A point, the record linearised around it, and its cost.
 struct Here<const D: usize, const M: usize> {
     point: Point<D>,
-    linear: Linear<D, M>,
+    linear: Arc<Linear<D, M>>,
     cost: Cost,
 }
 
@@ -110,7 +114,7 @@ where
     }
 
     fn look(&self, point: Point<D>, room: Linear<D, M>) -> Result<Here<D, M>, EstimateError> {
-        let linear = self.linearise_in(&point, room)?;
+        let linear = Arc::new(self.linearise_in(&point, room)?);
         let cost = self.cost(&point, &linear);
         Ok(Here { point, linear, cost })
     }
@@ -129,7 +133,8 @@ where
         options: &Options,
         stop: &Stop,
     ) -> Result<Solution<D, M>, EstimateError> {
-        let mut here = self.look(start, Linear::default())?;
+        let linear = self.around(&start)?;
+        let mut here = Here { cost: self.cost(&start, &linear), point: start, linear };
         let (precision, mut room, mut spare) = (self.precision(), Bordered::empty(), Linear::default());
         let mut damping = 0.0;
         let mut still = 0;
@@ -155,7 +160,7 @@ where
             // At a kink of the law the cost has one too: there full steps keep promising more than they hold.
             let gained = here.cost.total() - lower.cost.total();
             still = if gained < options.decrease { still + 1 } else { 0 };
-            spare = std::mem::replace(&mut here, lower).linear;
+            spare = room_of(std::mem::replace(&mut here, lower).linear);
             room = reduced.into_room();
         }
     }
@@ -180,7 +185,7 @@ where
                     *damping = if *damping < 1e-2 { 0.0 } else { *damping * 0.1 };
                     return Ok(Some(new));
                 }
-                Ok(new) => room = new.linear,
+                Ok(new) => room = room_of(new.linear),
                 Err(_) => {}
             }
             if trial == MOST_TRIALS {
@@ -244,8 +249,14 @@ where
             seen_variance: uncertain.seen(&linear),
             misfit: linear.misfits(),
             defect: linear.defects(),
+            linear,
         })
     }
+}
+
+/// The room that a linearisation took, where nobody else has it.
+fn room_of<const D: usize, const M: usize>(linear: Arc<Linear<D, M>>) -> Linear<D, M> {
+    Arc::try_unwrap(linear).unwrap_or_default()
 }
 
 /// Where a matrix of information has no inverse: the parameters that can change together.

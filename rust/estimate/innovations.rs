@@ -22,7 +22,7 @@ where
     /// units of its standard deviation. `vague` is what is known of a state where a run starts.
     pub fn innovations(&self, point: &Point<D>, vague: &[f64; D]) -> Result<Vec<[f64; M]>, EstimateError> {
         let record = &self.record;
-        let linear = Self { free: Vec::new(), ..self.clone() }.linearise(point)?;
+        let linear = Self { free: Vec::new(), known: None, ..self.clone() }.linearise(point)?;
         let precision = self.precision();
         let mut at = DVector::zeros(D + M);
         let mut spread = DMatrix::zeros(D + M, D + M);

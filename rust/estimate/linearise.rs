@@ -1,5 +1,7 @@
 //! The record linearised around a point: residuals and their derivatives, from duals.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, SMatrix, SVector};
 use rayon::prelude::*;
 
@@ -26,6 +28,13 @@ pub struct Linear<const D: usize, const M: usize> {
     pub columns: Columns,
 }
 
+/// A record linearised around a point, shared by all who ask for more there.
+#[derive(Clone, Debug)]
+pub struct Known<const D: usize, const M: usize> {
+    pub point: Arc<Point<D>>,
+    pub linear: Arc<Linear<D, M>>,
+}
+
 impl<const D: usize, const M: usize> Linear<D, M> {
     /// The residuals of what was seen.
     pub fn misfits(&self) -> Vec<SVector<f64, M>> {
@@ -46,6 +55,14 @@ where
     /// Linearises the record around a point with respect to the states and to the free parameters.
     pub fn linearise(&self, point: &Point<D>) -> Result<Linear<D, M>, EstimateError> {
         self.linearise_in(point, Linear::default())
+    }
+
+    /// The same, shared; where it is [known](Estimator::known) it is not computed again.
+    pub(super) fn around(&self, point: &Point<D>) -> Result<Arc<Linear<D, M>>, EstimateError> {
+        match &self.known {
+            Some(known) if *known.point == *point => Ok(known.linear.clone()),
+            _ => self.linearise(point).map(Arc::new),
+        }
     }
 
     /// The same, in the room of another: fresh memory costs as much as what is done in it.

@@ -31,7 +31,7 @@ pub use columns::Columns;
 pub use flow::{Link, PLACES_PER_LINK, Place, Places};
 pub use forecast::Filtered;
 pub use gauss_newton::{Cost, Options, Solution};
-pub use linearise::{Linear, Sight};
+pub use linearise::{Known, Linear, Sight};
 pub use record::{Free, Point, Record, Role, Set};
 pub use rows::Rows;
 pub use score::{Candidate, Score};
@@ -57,6 +57,9 @@ where
     /// over an interval `dt` has variance `q^2 dt`.
     pub diffusion: [f64; D],
     pub tolerance: Tolerance,
+    /// The record linearised around some point already: this record as this sensor sees it, for this family, these
+    /// free parameters and this tolerance. Its noise, the priors and the diffusion may differ.
+    pub known: Option<Known<D, M>>,
 }
 
 /// Why an estimate failed.

@@ -119,7 +119,7 @@ impl Set {
 }
 
 /// A value of all unknowns.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Point<const D: usize> {
     /// The state at every frame.
     pub states: Vec<[f64; D]>,

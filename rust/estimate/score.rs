@@ -42,7 +42,7 @@ where
 {
     /// Scores candidates around a minimum, all together. The states and all free parameters are eliminated.
     pub fn score(&self, point: &Point<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
-        let linear = self.linearise(point)?;
+        let linear = self.around(point)?;
         let places = self.places(point)?;
         let more: Vec<Columns> = candidates
             .iter()
@@ -79,7 +79,7 @@ where
         columns: &Columns,
         groups: &[usize],
     ) -> Result<Vec<Score>, EstimateError> {
-        let linear = self.linearise(point)?;
+        let linear = self.around(point)?;
         let mut batches: Vec<(usize, Vec<usize>)> = Vec::new();
         let mut first = 0;
         for &size in groups {

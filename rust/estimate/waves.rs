@@ -47,7 +47,7 @@ where
         probe: &Probe<F>,
         frequencies: &[f64],
     ) -> Result<Vec<Score>, EstimateError> {
-        let linear = self.linearise(point)?;
+        let linear = self.around(point)?;
         let places = self.places(point)?;
         let responses = self.candidate_columns(point, &places, &probe.candidate, TimeOrigin::Frame);
         let steps = self.record.t.windows(2).zip(&self.record.linked).filter(|(_, linked)| **linked);

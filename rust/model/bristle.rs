@@ -15,7 +15,7 @@ use crate::scalar::Scalar;
 ///
 /// Steady sliding feels the friction itself; below it the contact gives way like a spring of stiffness `s`,
 /// and creeps (Canudas de Wit, Olsson, Åström & Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Bristled<M>(pub M);
 
 fn contact<S: Scalar>(bristle: S) -> Contact<S> {

@@ -223,7 +223,7 @@ impl<S: Scalar> System<S, 4> for Disk<S> {
 }
 
 /// Builds [`Disk`]: which effects it has and what it does at its edge.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DiskFamily {
     /// The effects and how each enters.
     pub effects: Vec<Effect>,

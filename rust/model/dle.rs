@@ -29,7 +29,7 @@ impl<S: Scalar> System<S, 3> for Dle<S> {
 }
 
 /// Builds [`Dle`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DleFamily;
 
 impl Family<3> for DleFamily {

@@ -148,7 +148,7 @@ pub struct Parameter {
 
 /// A model with its numbers left open, so that the same structure can be built over plain numbers
 /// and over duals that differentiate with respect to any of its parameters.
-pub trait Family<const D: usize>: Clone + Send + Sync {
+pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The system it builds.
     type Built<S: Scalar>: System<S, D>;
 

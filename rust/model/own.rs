@@ -58,7 +58,7 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 /// let system = family.build(&[4.0]);
 /// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; 4]), [1.0, -12.0]);
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct OwnFamily<const D: usize> {
     equations: Arc<[Expression; D]>,
     deep: bool,

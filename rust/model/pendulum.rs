@@ -120,7 +120,7 @@ impl<S: Scalar> System<S, 2> for Pendulum<S> {
 }
 
 /// Builds [`Pendulum`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PendulumFamily {
     /// The effects; each enters through torque or friction.
     pub effects: Vec<Effect>,

@@ -1,5 +1,7 @@
 //! The estimator's door to Python: arrays in, arrays out.
 
+use std::sync::Arc;
+
 use nalgebra::{SMatrix, SVector};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -8,10 +10,11 @@ use pyo3::types::PyDict;
 
 use super::errors::FitError;
 use super::interrupt;
+use super::linearised::Linearised;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, BASIS, Candidate, Columns, Direct, DiskCamera, EstimateError, Estimator, Free, Options,
-    PLACES_PER_LINK, Point, Probe, Record, Role, Rows, Sensor, Set,
+    AngleSensor, BASIS, Candidate, Columns, Direct, DiskCamera, EstimateError, Estimator, Free, Known,
+    Options, PLACES_PER_LINK, Point, Probe, Record, Role, Rows, Sensor, Set,
 };
 use crate::integrate::Tolerance;
 use crate::model::effects::Kind;
@@ -27,8 +30,8 @@ type Data<'py> = (
     PyReadonlyArray1<'py, i64>,
     Vec<f64>,
 );
-/// States; of each film the model's parameters, the camera's, and the clock's error.
-type Start<'py> = (PyReadonlyArray2<'py, f64>, Vec<SetTuple>);
+/// States; of each film the model's parameters, the camera's, and the clock's error; what a solve left there.
+type Start<'py> = (PyReadonlyArray2<'py, f64>, Vec<SetTuple>, Option<Py<Linearised>>);
 type SetTuple = (Vec<f64>, Vec<f64>, f64);
 /// Role, index, film (none: shared by all), prior mean and standard deviation.
 type FreeTuple = (String, usize, Option<usize>, f64, f64);
@@ -107,13 +110,17 @@ fn parameters<C: Sensor<D, M>, const D: usize, const M: usize>(
     Ok(sets.iter().cloned().map(|(model, camera, clock)| Set { model, camera, clock }).collect())
 }
 
-fn problem<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize>(
+fn problem<F, C, const D: usize, const M: usize>(
     (family, values, sensor): (F, Vec<f64>, C),
     data: &Data<'_>,
-    (states, sets): &Start<'_>,
+    (states, sets, linear): &Start<'_>,
     free: &[FreeTuple],
     diffusion: &[f64],
-) -> PyResult<(Estimator<F, C, D, M>, Point<D>)> {
+) -> PyResult<(Estimator<F, C, D, M>, Point<D>)>
+where
+    F: Family<D> + 'static,
+    C: Sensor<D, M> + 'static,
+{
     let diffusion = diffusion
         .try_into()
         .map_err(|_| PyValueError::new_err(format!("diffusion must have {D} numbers")))?;
@@ -135,7 +142,10 @@ fn problem<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize>(
             return Err(PyValueError::new_err(format!("there is no parameter {index} of {most}")));
         }
     }
-    Ok((Estimator { family, sensor, record, free, diffusion, tolerance: TOLERANCE }, point))
+    let mut estimator =
+        Estimator { family, sensor, record, free, diffusion, tolerance: TOLERANCE, known: None };
+    estimator.known = linear.as_ref().and_then(|linear| linear.get().known(&estimator));
+    Ok((estimator, point))
 }
 
 /// An array of `shape` from its numbers in C order.
@@ -211,7 +221,7 @@ fn solve<'py>(
         let (n, p) = (estimator.record.t.len(), estimator.free.len());
         let result = PyDict::new(py);
         result.set_item("states", array(py, [n, D], s.point.states.iter().flatten().copied())?)?;
-        let sets = s.point.sets.into_iter().map(|set| (set.model, set.camera, set.clock));
+        let sets = s.point.sets.iter().cloned().map(|set| (set.model, set.camera, set.clock));
         result.set_item("sets", sets.collect::<Vec<SetTuple>>())?;
         result.set_item("covariance", array(py, [p, p], s.covariance.iter().copied())?)?;
         result.set_item("state_covariance", array(py, [n, D, D], numbers(&s.state_covariance))?)?;
@@ -222,6 +232,8 @@ fn solve<'py>(
         result.set_item("evidence", s.evidence)?;
         result.set_item("converged", s.converged)?;
         result.set_item("iterations", s.iterations)?;
+        let known = Known { point: Arc::new(s.point), linear: s.linear };
+        result.set_item("linear", Py::new(py, Linearised::new(estimator, known))?)?;
         Ok(result)
     }
     let options = Options { iterations: until.0, decrease: until.1 };
@@ -367,9 +379,8 @@ fn responses<'py>(
 
 /// Gradient of each group of columns, its information, and the information were the free parameters known: the
 /// groups one after the other, the information flat. A column is what its amplitude adds to the state at
-/// every link's end (n - 1, d, c), and to what is seen in every frame (n, m, c).
+/// every link's end (n - 1, d, c); nothing to what is seen.
 #[pyfunction]
-#[pyo3(signature = (model, data, start, free, diffusion, at_end, in_sight, groups))]
 #[allow(clippy::too_many_arguments)]
 fn score_columns<'py>(
     py: Python<'py>,
@@ -379,16 +390,14 @@ fn score_columns<'py>(
     free: Vec<FreeTuple>,
     diffusion: Vec<f64>,
     at_end: PyReadonlyArray3<'py, f64>,
-    in_sight: PyReadonlyArray3<'py, f64>,
     groups: Vec<usize>,
 ) -> PyResult<Three<'py>> {
-    type Arrays<'a, 'py> = (&'a PyReadonlyArray3<'py, f64>, &'a PyReadonlyArray3<'py, f64>);
     fn columns(array: &PyReadonlyArray3<'_, f64>) -> Rows {
         let array = array.as_array();
         let (blocks, rows, width) = array.dim();
         let mut columns = Rows::zeros(blocks * rows, width);
-        for (i, j, k) in numpy::ndarray::indices((blocks, rows, width)) {
-            columns.row_mut(rows * i + j)[k] = array[[i, j, k]];
+        for (i, own) in array.rows().into_iter().enumerate() {
+            columns.row_mut(i).iter_mut().zip(own).for_each(|(to, &value)| *to = value);
         }
         columns
     }
@@ -398,16 +407,16 @@ fn score_columns<'py>(
         (data, start): (&Data<'py>, &Start<'py>),
         free: &[FreeTuple],
         diffusion: &[f64],
-        (at_end, in_sight): Arrays<'_, 'py>,
+        at_end: &PyReadonlyArray3<'py, f64>,
         groups: &[usize],
     ) -> PyResult<Three<'py>> {
         let (estimator, point) = problem(model, data, start, free, diffusion)?;
         let (n, c) = (estimator.record.t.len(), groups.iter().sum::<usize>());
-        if at_end.as_array().shape() != [n - 1, D, c] || in_sight.as_array().shape() != [n, M, c] {
-            let message = format!("columns must have the shapes ({}, {D}, {c}) and ({n}, {M}, {c})", n - 1);
+        if at_end.as_array().shape() != [n - 1, D, c] {
+            let message = format!("columns must have the shape ({}, {D}, {c})", n - 1);
             return Err(PyValueError::new_err(message));
         }
-        let columns = Columns { state: columns(at_end), seen: columns(in_sight) };
+        let columns = Columns { state: columns(at_end), seen: Rows::zeros(n * M, c) };
         let scores = interrupt::run(py, |_| estimator.score_groups(&point, &columns, groups))?;
         let squares = groups.iter().map(|size| size * size).sum();
         Ok((
@@ -417,7 +426,7 @@ fn score_columns<'py>(
         ))
     }
     let call = (&data, &start);
-    each_family!(AnyModel::to_fit(model)?, run(py, call, &free, &diffusion, (&at_end, &in_sight), &groups))
+    each_family!(AnyModel::to_fit(model)?, run(py, call, &free, &diffusion, &at_end, &groups))
 }
 
 /// From each window of frames alone: the state at its first frame, at its last, and the covariance there.
@@ -519,6 +528,7 @@ fn predict<'py>(
             free: Vec::new(),
             diffusion: [1.0; D],
             tolerance: TOLERANCE,
+            known: None,
         };
         let seen = interrupt::run(py, |_| estimator.predict(&sets, &starts, &times))?;
         array(py, [k, h, M], seen.into_iter().flatten().flatten())
@@ -538,6 +548,7 @@ fn camera_parameters(kind: &str) -> PyResult<Vec<(&'static str, &'static str)>> 
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Linearised>()?;
     module.add_function(wrap_pyfunction!(solve, module)?)?;
     module.add_function(wrap_pyfunction!(score, module)?)?;
     module.add_function(wrap_pyfunction!(score_ripples, module)?)?;

@@ -6,6 +6,7 @@ mod errors;
 mod estimate;
 mod interrupt;
 mod jobs;
+mod linearised;
 mod lyapunov;
 mod model;
 mod picture;

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from udd import _beside
 from udd.errors import UddError
 
 from .answer import Answer, telling
@@ -30,6 +32,8 @@ def add(commands: Any) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Do it."""
+    # Modules, fits and figures are many objects that stay: to search them for garbage takes a second.
+    gc.set_threshold(100_000, 20, 100)
     from udd.discovery import discover
 
     check_early(args)
@@ -37,6 +41,10 @@ def run(args: argparse.Namespace) -> Answer:
         raise UddError(f"{args.report}: there is no folder {args.report.parent}")
     measurement, film = measurement_of(args)
     model = model_of(args, measurement)
+    if args.report is not None:
+        _beside.importing(
+            "matplotlib.figure", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_agg"
+        )
     with telling() as tell:
         found = discover(measurement, model, progress=tell, **options(args))
         if args.report is not None:
@@ -65,19 +73,24 @@ def describe(found: Discovery) -> str:
             for name, value in effect.parameters.items()
         )
         lines.append(f"  {effect.title}: {effect.equation}" + ("" if is_spline else f", {values}"))
-    span = numbers.span.replace("\u00a0", " ")
-    at = numbers.floor_at.replace("\u00a0", " ")
+    span, at = plain(numbers.span), plain(numbers.floor_at)
     if found.effects:
         lines.append(f"  held-out error {span}: {numbers.before} -> {numbers.after}")
         lines.append(f"  ratio {numbers.ratio}, 95 % interval {numbers.interval}")
     else:
         lines.append(f"  held-out error {span}: {numbers.before}")
+    lines += [f"  nearest: {plain(sentence)}" for sentence in words.refused(found)]
     lines.append(f"  noise floor after {at}: {numbers.floor}")
     for other in found.alternatives:
         lines.append(f"  could equally be {other.title}: {other.effect.expression}. {words.limit(other)}")
     if found.hint is not None:
         lines.append(f"  to tell: {found.hint.text}")
     return "\n".join(lines)
+
+
+def plain(text: str) -> str:
+    """For terminals of any encoding."""
+    return text.replace("\u00a0", " ").replace("χ²", "chi2")
 
 
 def _with_error(value: float, error: float | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 import warnings
@@ -40,6 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 fine, 1 bad input, 130 on Ctrl-C, 141 where nobody reads the output. Wrong usage leaves by
         ``SystemExit(2)``, as argparse does.
     """
+    if argv is None:
+        atexit.register(gc.freeze)  # a process that ends need not be searched for garbage: half a second
     parser = make_parser()
     args = parser.parse_args(argv)
     try:

@@ -6,7 +6,18 @@ from .discover import discover
 from .heldout import Errors
 from .hint import Hint
 from .pruning import Pruned, prune
-from .results import Alternative, Discovery, Found
+from .results import Alternative, Discovery, Found, Refused
 from .scan import Scored
 
-__all__ = ["Alternative", "Discovery", "Errors", "Found", "Hint", "Pruned", "Scored", "discover", "prune"]
+__all__ = [
+    "Alternative",
+    "Discovery",
+    "Errors",
+    "Found",
+    "Hint",
+    "Pruned",
+    "Refused",
+    "Scored",
+    "discover",
+    "prune",
+]

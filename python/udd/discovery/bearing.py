@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
+from udd import _chi2
 from udd.fitting import Fit, Record, at_level, frame_costs, held, within
 
 from .heldout import Ratio, cost_improvement, stretches
@@ -83,7 +83,7 @@ def _falls_further(part: Pair, whole: Pair) -> bool:
     before, after = whole
     one, other = (at_level(fit, after.level) for fit in part)
     further = (before.chi2 - after.chi2) - (one.chi2 - other.chi2)
-    return bool(chi2.sf(further / after.inflation(before), 1) < ALPHA)
+    return bool(_chi2.sf(further / after.inflation(before), 1) < ALPHA)
 
 
 def _expected(part: Fit, whole: Pair, names: Sequence[str]) -> float:

@@ -82,7 +82,8 @@ def library(model: Model, given: Sequence[Candidate] = ()) -> list[Candidate]:
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     """A drive ripple at every frequency that a record can tell apart.
 
-    From two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart.
+    From two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart, within the
+    effect's own range.
 
     Parameters
     ----------
@@ -93,5 +94,6 @@ def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     if not isinstance(model, Disk) or model.W == 0 or "drive_ripple" in {e.name for e in model.effects}:
         return []
     duration, step = t[-1] - t[0], np.median(np.diff(t))
-    frequencies = np.arange(2.0 / duration, min(0.25 / step, 6.0), 0.5 / duration)
+    low, high = next(p.range for p in effects.drive_ripple().spec.parameters if p.role == "frequency")
+    frequencies = np.arange(max(2.0 / duration, low), min(0.25 / step, 6.0, high), 0.5 / duration)
     return [Candidate(effects.drive_ripple(f=float(f)), f"drive ripple at {f:.3g} Hz") for f in frequencies]

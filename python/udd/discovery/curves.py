@@ -20,7 +20,7 @@ from .together import together
 
 Array = NDArray[np.float64]
 
-#: Curves whose evidences differ by less are not told apart.
+#: Explanations whose likelihoods differ by less, in units of their logarithm, are not told apart.
 NATS = 10.0
 #: Intervals between knots along one coordinate, and along each of two.
 INTERVALS, INTERVALS_OF_TWO = 14, 3
@@ -241,7 +241,7 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     """The curve from the score around another fit, whose model holds the curve with coefficients `at`."""
     found = responses(fit)
     (score,) = score_splines(found, [curve.slot], curve.coordinates, curve.splines)
-    smoothed = smooth(score, curve.roughness, _observations(fit), at)
+    smoothed = smooth(score, curve.roughness, fit.observations, at)
     moved = replace(score, gradient=score.gradient + score.information @ at)
     return replace(
         curve,
@@ -303,7 +303,7 @@ def _curve(
     score: Score,
 ) -> Curve:
     roughness = _roughness(splines)
-    smoothed = smooth(score, roughness, _observations(found.fit))
+    smoothed = smooth(score, roughness, found.fit.observations)
     p, fall, number = chance(score, roughness)
     return Curve(
         slot,
@@ -324,7 +324,3 @@ def _curve(
 
 def _roughness(splines: tuple[Spline, ...]) -> Array:
     return splines[0].roughness if len(splines) == 1 else rough_product(*splines)
-
-
-def _observations(fit: Fit) -> int:
-    return int(np.isfinite(fit.misfit).sum())

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from udd import _beside
 from udd._expressions import Expression
 from udd.effects.own import is_spline
 from udd.errors import FitError
@@ -17,8 +18,8 @@ from udd.own_models import OwnModel
 
 from .candidates import Candidate
 from .heldout import pace
-from .results import Discovery, Found
-from .search import Search, Step
+from .results import Discovery, Found, Refused
+from .search import Search, State, Step
 from .terms import given_terms
 from .together import together
 
@@ -54,7 +55,8 @@ def discover(
     the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
     goes on; effects that do not pass alone are tried in twos and threes. Forms that the data cannot tell
     apart are named. Where no effect passes but the model does not explain the data (chi2 per degree of
-    freedom above 2.5), an effect is present that the library does not hold.
+    freedom above 2.5), an effect is present that these data do not name; what comes nearest is listed with
+    its held-out error, but not added.
 
     Parameters
     ----------
@@ -103,6 +105,7 @@ def discover(
     options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each, "search": True}
 
     tell("fitting the known model")
+    _beside.importing("scipy.stats", "pyoperon.sklearn")
     base, baseline = together(
         lambda frames: fit_record(measurement, frames, model, free, **options), (record.part(train), record)
     )
@@ -114,16 +117,19 @@ def discover(
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    if found:
-        unnamed = any(is_spline(f.effect) for f in found)
-        verdict = "effect present, form not identified" if doubtful or unnamed else "effect identified"
+    unexplained = not found and baseline.scatter > _UNEXPLAINED
+    refused: list[Refused] = []
+    if unexplained:
+        tell("trying what comes nearest")
+        refused = search.refused(State(base, baseline, before), end.looks[-1])
+    if unexplained or doubtful or any(is_spline(f.effect) for f in found):
+        verdict = "effect present, form not identified"
     else:
-        unexplained = baseline.scatter > _UNEXPLAINED
-        verdict = "effect present, form not identified" if unexplained else "nothing missing"
+        verdict = "effect identified" if found else "nothing missing"
     return Discovery(
         verdict=verdict,
-        baseline=baseline,
-        fit=final,
+        baseline=baseline.put_away(),
+        fit=final.put_away(),
         effects=found,
         alternatives=others,
         error_before=before,
@@ -133,7 +139,8 @@ def discover(
         curves=[look.curves for look in end.looks],
         looks=[look.looks for look in end.looks],
         split=float(record.clock[np.flatnonzero(~train)[0]]),
-        trained=end.part,
+        trained=end.part.put_away(),
+        refused=refused,
     )
 
 

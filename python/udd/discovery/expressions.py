@@ -83,19 +83,26 @@ def read(text: str, names: dict[str, Node]) -> tuple[Node, list[float]]:
     return walk(tree.body), values
 
 
-def evaluate(node: Node, x: Array, values: Sequence[float]) -> Array:
-    """The formula's values; not finite where it is not defined."""
+def evaluate(node: Node, x: Array, values: Sequence[float | Array]) -> Array:
+    """The formula's values; not finite where it is not defined.
+
+    Constants may be columns (rows, 1): each row of the result is then made with its own.
+    """
+    with np.errstate(all="ignore"):
+        found = _value(node, x, values)
+    result: Array = np.array(np.broadcast_to(found, np.broadcast_shapes(np.shape(found), x.shape)))
+    return result
+
+
+def _value(node: Node, x: Array, values: Sequence[float | Array]) -> Any:
+    """What a part of the formula comes to, a number where it is the same everywhere."""
     kind = node[0]
     if kind == "x":
         return x
-    if kind == "n":
-        return np.full(x.shape, node[1])
-    if kind == "c":
-        return np.full(x.shape, values[node[1]])
-    with np.errstate(all="ignore"):
-        inner = [evaluate(part, x, values) for part in node[1:]]
-        result: Array = _UNARY[kind](*inner) if kind in _UNARY else _BINARY[kind](*inner)
-    return result
+    if kind in ("n", "c"):
+        return node[1] if kind == "n" else values[node[1]]
+    inner = [_value(part, x, values) for part in node[1:]]
+    return (_UNARY.get(kind) or _BINARY[kind])(*inner)
 
 
 def constants(node: Node) -> list[int]:

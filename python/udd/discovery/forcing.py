@@ -111,10 +111,9 @@ def score_forcings(fit: Fit, columns: Sequence[Array], known: bool = False) -> l
     scores: list[Score] = []
     for some in _batches(columns):
         sizes = [c.shape[-1] for c in some]
-        sight = np.zeros((len(fit.record.t), fit.misfit.shape[1], sum(sizes)))
         at_end = np.ascontiguousarray(np.concatenate(some, axis=-1))
         gradient, information, alone = _core.score_columns(
-            model, data, start, [] if known else free, diffusion, at_end, sight, sizes
+            model, data, start, [] if known else free, diffusion, at_end, sizes
         )
         own, square = 0, 0
         for k in sizes:

@@ -34,7 +34,8 @@ Array = NDArray[np.float64]
 _MOST = 12  # formulas looked at closely
 _FAR = 40.0  # nats below the curve, from which shortening does not bring a formula back
 _HUGE = 1e6
-_POSITIONS = 160
+_STEP = math.sqrt(np.finfo(float).eps)  # of a constant, to see what it does
+_POSITIONS, _BETWEEN = 160, 223  # of the curve, where formulas are fitted, and where they are asked again
 _MOST_CONSTANTS = 12
 _NAMES = "abcdpqrsuvwzfghjklmn"  # of constants; enough where a model's states have taken some
 _EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 0.5, -1.0)
@@ -154,15 +155,21 @@ class _Target:
     def __init__(self, curve: Curve, observations: int) -> None:
         places, spline = curve.places[0], curve.splines[0]
         where = np.mod(places, 2 * np.pi) if spline.periodic else places
-        self.x = np.quantile(where, (np.arange(_POSITIONS) + 0.5) / _POSITIONS)
-        design = spline.design(self.x)
-        # Where there are no data the coefficients go on smoothly.
-        weak = 1e-6 * np.trace(design.T @ design) / np.trace(curve.roughness)
-        to_coefficients = np.linalg.solve(design.T @ design + weak * curve.roughness, design.T)
         information, vectors = eigh(curve.score.information)
         keep = information > 1e-9 * information[-1]
         root = np.sqrt(information[keep])
-        self.matrix: Array = (root[:, None] * vectors[:, keep].T) @ to_coefficients
+
+        def asked(positions: int) -> tuple[Array, Array]:
+            """Places of the curve, and what takes values there to coefficients."""
+            x = np.quantile(where, (np.arange(positions) + 0.5) / positions)
+            design = spline.design(x)
+            # Where there are no data the coefficients go on smoothly.
+            weak = 1e-6 * np.trace(design.T @ design) / np.trace(curve.roughness)
+            to_coefficients = np.linalg.solve(design.T @ design + weak * curve.roughness, design.T)
+            return x, (root[:, None] * vectors[:, keep].T) @ to_coefficients
+
+        self.x, self.matrix = asked(_POSITIONS)
+        self.between = asked(_BETWEEN)
         self.target: Array = vectors[:, keep].T @ curve.score.gradient / root
         self.angle = curve.coordinates[0].angle
         self.price = math.log(observations) / 2
@@ -178,21 +185,40 @@ class _Target:
         if len(numbers) > len(self.target) or not np.isfinite(start).all():
             return None
 
-        def residual(theta: Array) -> Array:
-            given = list(values)
-            for k, value in zip(numbers, theta, strict=True):
-                given[k] = float(value)
-            made = evaluate(node, self.x, given)
-            if not np.isfinite(made).all():
-                return np.full(len(self.target), _HUGE)
-            off: Array = self.matrix @ made - self.target
-            return np.clip(off, -_HUGE, _HUGE)
+        def residuals(thetas: Array, x: Array, matrix: Array) -> Array:
+            """At these places, a row for each column of constants."""
+            given: list[float | Array] = list(values)
+            for k, column in zip(numbers, thetas, strict=True):
+                given[k] = column[:, None]
+            made = evaluate(node, x, given)
+            there = np.isfinite(made).all(axis=1, keepdims=True)
+            off = np.where(there, made, 0.0) @ matrix.T - self.target
+            result: Array = np.clip(np.where(there, off, _HUGE), -_HUGE, _HUGE)
+            return result
 
-        solved = least_squares(residual, start, method="lm", x_scale="jac", max_nfev=40 * len(numbers))
+        def residual(theta: Array) -> Array:
+            result: Array = residuals(theta[:, None], self.x, self.matrix)[0]
+            return result
+
+        def slopes(theta: Array) -> Array:
+            """All of them from one evaluation."""
+            steps = np.where(theta < 0, -_STEP, _STEP) * np.maximum(1.0, np.abs(theta))
+            thetas = np.column_stack([theta, theta[:, None] + np.diag(steps)])
+            here, *moved = residuals(thetas, self.x, self.matrix)
+            return np.column_stack([(there - here) / step for there, step in zip(moved, steps, strict=True)])
+
+        solved = least_squares(
+            residual, start, jac=slopes, method="lm", x_scale="jac", max_nfev=40 * len(numbers)
+        )
         result = list(values)
         for k, value in zip(numbers, solved.x, strict=True):
             result[k] = float(value)
         gain = float(self.target @ self.target - solved.fun @ solved.fun) / 2
+        # A wave that fits only the places where it was fitted does otherwise between them.
+        between = residuals(solved.x[:, None], *self.between)[0]
+        lost = float(between @ between - solved.fun @ solved.fun) / 2
+        if lost >= max(gain / 2, NATS):
+            return None
         return _Fitted(gain - self.price * len(numbers) - price(node), node, result)
 
     def shorten(self, fitted: _Fitted) -> _Fitted:

@@ -14,6 +14,7 @@ from .expressions import Node, constants, read, scaled, simplify
 Array = NDArray[np.float64]
 
 _PLACES = 160  # of the curve, that the regression is given
+_SURE = 1e-3  # of the largest error: no place is taken for better known
 
 
 def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
@@ -100,6 +101,8 @@ def _sample(curve: Curve) -> Array:
     """Places as dense as the curve is well known, where there are data."""
     low, high = np.quantile(curve.places[0], (0.002, 0.998))
     grid = np.linspace(low, high, 600)
-    weight = np.cumsum(1.0 / np.maximum(curve.errors(grid), 1e-300) ** 2)
+    errors = curve.errors(grid)
+    # Where the known model can do all that the curve does, it is known without error.
+    weight = np.cumsum(1.0 / np.maximum(errors, (_SURE * errors.max()) or 1.0) ** 2)
     result: Array = np.interp((np.arange(_PLACES) + 0.5) / _PLACES, weight / weight[-1], grid)
     return result

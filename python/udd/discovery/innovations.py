@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
-from udd import _core
+from udd import _chi2, _core
 from udd.fitting import Fit
 
 Array = NDArray[np.float64]
@@ -51,7 +50,7 @@ class Innovations:
         """Ljung and Box's statistic of every channel, and its probability for white noise."""
         rho, sd = self.autocorrelation(lags)
         q = ((rho / sd) ** 2).sum(axis=0)  # the pairs' number stands for n (n + 2)/(n - k), for gaps' sake
-        return q, chi2.sf(q, lags)
+        return q, _chi2.sf(q, lags)
 
 
 def innovations(fit: Fit) -> Innovations:

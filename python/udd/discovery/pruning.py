@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
 
-from udd import _core
+from udd import _chi2, _core
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, fit_record, record_of
 from udd.fitting.annealing import tighten
@@ -149,7 +148,7 @@ def prune(
     full = fit_record(measurement, record, model, free, priors=priors, search=True)
     # Among n terms about one is expected to be needed, or each is priced against chance.
     n = max(len(names), 1)
-    price = 2 * math.log(n) if spread is not None else float(chi2_distribution.isf(alpha / n, 1))
+    price = 2 * math.log(n) if spread is not None else float(_chi2.isf(alpha / n, 1))
     pruning = _Pruning(names, price, spread, full, tell)
     end = pruning.run()
     kept = [name for name in names if name in end.parameters]
@@ -286,7 +285,9 @@ class _Pruning:
             sets.append((values, camera, clock))
         problem = replace(fitted.problem, free=free)
         try:
-            return solve(fitted.measurements, problem, replace(fitted.point, sets=tuple(sets)), iterations)
+            return solve(
+                fitted.measurements, problem, replace(fitted.point.bare(), sets=tuple(sets)), iterations
+            )
         except FitError:
             return None
 

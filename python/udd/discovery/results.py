@@ -19,6 +19,14 @@ from .scan import Scored
 
 #: What bears an effect out, of data that were not fitted.
 Witness = Literal["held", "fitted", "halves"]
+#: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; the
+#: held-out data do not bear it out; or another form that fits better fails.
+Failing = Literal["chance", "part", "held", "form"]
+
+
+def _named(ratio: Ratio) -> dict[str, float]:
+    """A ratio with its interval, as a machine reads it."""
+    return dict(zip(("value", "low", "high"), ratio, strict=True))
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,7 @@ class Found:
             "parameters": {n: {"value": v, "se": self.errors.get(n)} for n, v in self.parameters.items()},
             "chi2": self.chi2,
             "p": self.p,
-            "held_out_cost_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+            "held_out_cost_ratio": _named(self.ratio),
             "borne_out_by": self.witness,
         }
 
@@ -112,6 +120,50 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class Refused:
+    """An effect that lowers the held-out error of a model which lacks something, but does not pass the tests.
+
+    Attributes
+    ----------
+    effect : Effect
+        With the parameters fitted to all data.
+    title : str
+    chi2, p : float
+        By how much chi2 falls, in units of what remains at the same frequencies, and the probability of that
+        by chance, all candidates, curves and surfaces counted.
+    errors : Errors
+        Held-out errors of the model with it.
+    ratio : tuple of float
+        Held-out error with it over that without, as for :attr:`Discovery.ratio`.
+    why : {"chance", "part", "held", "form"}
+        Why it is not added: chance does as much, in all data or in the part that effects are sought in; the
+        held-out data do not bear it out; or another form that fits clearly better does not pass.
+    """
+
+    effect: Effect
+    title: str
+    chi2: float
+    p: float
+    errors: Errors
+    ratio: Ratio
+    why: Failing
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "name": self.effect.name,
+            "momentum": self.effect.momentum,
+            "title": self.title,
+            "why": self.why,
+            "expression": self.effect.expression,
+            "chi2": self.chi2,
+            "p": self.p,
+            "error": self.errors.to_dict(),
+            "held_out_ratio": _named(self.ratio),
+        }
+
+
+@dataclass(frozen=True)
 class Discovery:
     """What a model lacks, given measured motion.
 
@@ -138,6 +190,8 @@ class Discovery:
         How many candidates and curves each round looked at, every frequency counted.
     split : float
         Time from which the data were held out, s; of the first measurement.
+    refused : list of Refused
+        Where an effect is present but none passes: what comes nearest, the best first.
     """
 
     verdict: str
@@ -153,6 +207,7 @@ class Discovery:
     looks: list[int]
     split: float
     trained: Fit = field(repr=False)
+    refused: list[Refused] = field(default_factory=list)
 
     @property
     def measurement(self) -> Measurement:
@@ -185,9 +240,10 @@ class Discovery:
             "verdict": self.verdict,
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],
+            "refused": [near.to_dict() for near in self.refused],
             "error_before": self.error_before.to_dict(),
             "error_after": self.error_after.to_dict(),
-            "held_out_ratio": dict(zip(("value", "low", "high"), self.ratio, strict=True)),
+            "held_out_ratio": _named(self.ratio),
             "horizon_s": self.horizon,
             "held_out_from_s": self.split,
             "baseline": self.baseline.to_dict(),

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
 
-from udd import _core
+from udd import _chi2, _core
 from udd.fitting import Fit
 from udd.own_models import OwnModel
 
@@ -211,7 +210,7 @@ def _score(
     return Scored(
         candidate,
         chi2,
-        float(chi2_distribution.sf(chi2, n)),
+        float(_chi2.sf(chi2, n)),
         tuple(estimate.tolist()),
         tuple(errors.tolist()),
         False,

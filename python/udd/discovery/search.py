@@ -9,15 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, ncx2
 
+from udd import _chi2
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, extend, loosened
+from udd.fitting import Fit, Record, at_level
 
-from .bearing import ALPHA, borne_out, same_level
-from .candidates import Candidate, library
-from .coordinates import Coordinate
-from .curves import Curve, scan_curves
+from .bearing import ALPHA, Pair, borne_out, same_level
+from .candidates import Candidate
+from .curves import NATS, Curve
 from .formulas import Formula, formulas_for
 from .heldout import (
     Errors,
@@ -27,19 +26,17 @@ from .heldout import (
     improvement,
     whole_improvement,
 )
-from .located import fit_curve, fit_formula
-from .results import Alternative, Witness
-from .scan import Scan, Scored, physical, scan, strongest_ripple
+from .looks import Look, look_around, states_first, wider
+from .results import Alternative, Failing, Refused, Witness
+from .scan import Scan, Scored
 from .together import together
+from .trials import Trial, fitted_ones, of_curve, of_formula, of_library, one_of_each, same_law
 
-#: Forms of an effect whose fits differ by less than this many units of log-likelihood are not told apart.
-NATS = 10.0
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
-_SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
-_DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
 _TRIED = 6  # of the best candidates, fitted in full
+_NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
@@ -84,220 +81,42 @@ class State:
     errors: Errors
 
 
-@dataclass(frozen=True)
-class Look:
-    """What the scores around one fit say.
-
-    Attributes
-    ----------
-    fit : Fit
-    library : Scan
-    curves : list of Curve
-        The likeliest first.
-    looks : int
-        How many scores could have been the best, around all fits that were tried.
-    """
-
-    fit: Fit
-    library: Scan
-    curves: list[Curve]
-    looks: int
-
-    def passing(self) -> list[Scored]:
-        """The candidates that neither chance nor a film's faults explain, the strongest first."""
-        faults = self.fit.faults
-        usable = [
-            s
-            for s in self.library.scored
-            if s.physical and not s.absorbed and s.p * self.looks < ALPHA and s.chi2 > faults
-        ]
-        return sorted(usable, key=lambda s: -round(s.chi2, 3))
-
-    def nats(self, scored: Scored) -> float:
-        """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
-        return (scored.chi2 - scored.candidate.parameters * _price(self.fit)) / 2
-
-    def strongest(self) -> float:
-        """The gain of the best explanation."""
-        singles = [self.nats(s) for s in self.library.scored if s.physical]
-        return max([c.evidence for c in self.curves] + singles, default=0.0)
-
-
-def _wider(look: Look) -> Look:
-    """With the surfaces over two coordinates."""
-    found = scan_curves(look.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
-    curves = sorted(look.curves + found.curves, key=lambda c: -c.evidence)
-    return replace(look, curves=curves, looks=look.looks + found.looks)
-
-
-def _price(fitted: Fit) -> float:
-    """What a parameter costs, in chi2 (BIC)."""
-    return math.log(np.isfinite(fitted.misfit).sum())
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A proposal fitted in full: candidates with free amplitudes, a located curve, or a formula for one.
-
-    Attributes
-    ----------
-    candidates : list of Candidate
-        The effects, as they were proposed.
-    fit, compared : Fit
-        The fit, and the same held as tightly as those that it is compared with.
-    names : list of str
-        The parameters that came in with it.
-    price : float
-        What its freedom costs, in chi2 (BIC).
-    freedom : float
-        How many numbers were found for it.
-    curve : Curve or None
-        What was located.
-    formula : Formula or None
-        What the curve is written as.
-    """
-
-    candidates: list[Candidate]
-    fit: Fit
-    compared: Fit
-    names: list[str]
-    price: float
-    freedom: float
-    curve: Curve | None = None
-    formula: Formula | None = None
-
-    @property
-    def amplitudes(self) -> list[float]:
-        """The fitted values of these parameters."""
-        return [self.fit.parameters[name] for name in self.names]
-
-    @property
-    def is_curve(self) -> bool:
-        """Whether it is a curve without a formula."""
-        return self.curve is not None and self.formula is None
-
-    def criterion(self, unit: float) -> float:
-        """chi2 in a common unit with the price of the freedom: the smaller the better."""
-        return self.compared.chi2 / unit + self.price
-
-    @property
-    def handicap(self) -> float:
-        """By how much chi2 must be better than that of an effect of the library."""
-        return 0.0 if self.curve is None else 3 * NATS if self.formula is None else 2 * NATS
-
-    @property
-    def needed(self) -> bool:
-        """Whether each of several candidates is needed beside the others."""
-        if len(self.candidates) < 2:
-            return True
-        names = list(self.fit.parameters)
-        for candidate in self.candidates:
-            own = [names.index(name) for name in candidate.amplitude_names]
-            a = np.array([self.fit.parameters[names[k]] for k in own])
-            block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
-            if a @ np.linalg.solve(block, a) < chi2.isf(ALPHA, len(own)):
-                return False
-        return True
-
-    @property
-    def physical(self) -> bool:
-        """Whether all amplitudes lie in their ranges."""
-        if self.curve is not None:
-            return True
-        values, errors = self.fit.parameters, self.fit.errors
-        return all(
-            physical(c, [values[n] for n in c.amplitude_names], [errors[n] for n in c.amplitude_names])
-            for c in self.candidates
-        )
-
-
-def _of_library(current: Fit, candidates: list[Candidate], start: list[float]) -> Trial | None:
-    """Effects of the library with free amplitudes."""
-    try:
-        fitted = extend(current, [c.effect for c in candidates], start)
-    except FitError:
-        return None
-    names = [name for c in candidates for name in c.amplitude_names]
-    price = _price(fitted) * sum(c.parameters for c in candidates)
-    trial = Trial(candidates, fitted, fitted, names, price, len(names))
-    return trial if trial.physical and fitted.converged else None
-
-
-def _of_curve(current: Fit, curve: Curve) -> Trial | None:
-    """A curve, located in full."""
-    try:
-        kind = "curve" if len(curve.coordinates) == 1 else "surface"
-        located = fit_curve(current, curve, _unused(current, kind))
-    except FitError:
-        return None
-    if not located.fit.converged:
-        return None
-    candidate = Candidate(located.effect, curve.title)
-    return Trial(
-        [candidate], located.fit, located.fit, [], 2 * located.price, located.curve.df, located.curve
-    )
-
-
-def _of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
-    """A formula for a curve, all its constants free."""
-    name = _unused(current, "formula")
-    try:
-        fitted = fit_formula(current, curve, written, name)
-    except FitError:
-        return None
-    effect = fitted.model.effects[-1]
-    names = [f"{name}.{p}" for p in effect.parameters]
-    price, free = _price(fitted) * len(names), len(names)
-    trial = Trial([Candidate(effect, effect.title)], fitted, fitted, names, price, free, curve, written)
-    return trial if fitted.converged else None
-
-
-def _fitted(trials: list[Trial | None]) -> list[Trial]:
-    """Those that could be fitted."""
-    return [t for t in trials if t]
-
-
-def _one_of_each(trials: list[Trial]) -> list[Trial]:
-    """The best of those that tried one effect with several values of a shape that a fit then found."""
-    found: dict[object, Trial] = {}
-    for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
-        effect = trial.candidates[0].effect
-        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
-        found.setdefault((effect.name, effect.momentum, *fixed), trial)
-    return [trial for trial in trials if trial in found.values()]
-
-
-def _states_first(curves: list[Curve]) -> list[Curve]:
-    """The likeliest first, but after those as likely what stands for states in a roundabout way.
-
-    Curves over time take up anything slow, and curves over the direction can do much of what those over Y
-    and Z do.
-    """
-
-    def handicap(own: Coordinate) -> float:
-        return 2 * NATS if own.name == "t" else NATS if own.angle and own.text != own.name else 0.0
-
-    return sorted(curves, key=lambda c: -c.evidence + handicap(c.coordinates[0]))
-
-
-def _same(one: Fit, other: Fit) -> bool:
-    """Whether two models make the same motion: one law in other words."""
-    sd = one.noise.sd(one.record, one.states[:, 0])
-    return bool(np.nanmax(np.abs(one.misfit - other.misfit) / sd) < _DIFFERENT)
-
-
-def _unused(current: Fit, name: str) -> str:
-    """A name that no effect of the model has yet."""
-    taken = {effect.name for effect in current.model.effects}
-    return next(n for n in (name, *(f"{name}{k}" for k in range(2, 9))) if n not in taken)
-
-
 def _cheaper(found: tuple[Step, State], steps: Sequence[Step], start: State, end: State) -> bool:
     """Whether one step explains the data as well as several from the same start, their freedom paid for."""
     step, state = found
     several, one = same_level(end.part, state.part)
     unit = one.inflation(at_level(start.part, one.level))
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
+
+
+def _chance(pair: Pair, trial: Trial, look: Look) -> tuple[float, float]:
+    """By how much chi2 fell from one fit of all data to another, and the probability of that by chance."""
+    from scipy.stats import ncx2  # takes half a second to import
+
+    before, after = pair
+    inflation = after.inflation(before)
+    fall = (before.chi2 - after.chi2) / inflation
+    # What a film's faults make up is no sum of squares of chance alone.
+    return fall, min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * look.looks, 1.0)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What the tests say of a trial.
+
+    Attributes
+    ----------
+    whole : Fit
+        Of all data.
+    chi2, p, ratio, witness
+        As of a :class:`Step`; a trial that chance explains is not asked for a witness.
+    """
+
+    whole: Fit
+    chi2: float
+    p: float
+    ratio: Ratio
+    witness: Witness | None
 
 
 @dataclass(frozen=True)
@@ -345,10 +164,10 @@ class Search:
         states = [State(base, whole, before)]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = self._look(states[-1].part)
+            look = look_around(states[-1].part, self.given)
             found = self._known(states[-1], look)
             if found is None:
-                look = _wider(look)
+                look = wider(look)
                 found = self._located(states[-1], look)
             looks.append(look)
             if found is None:
@@ -360,23 +179,31 @@ class Search:
         end = states[-1]
         return Outcome(end.part, end.whole, end.errors, accepted, looks)
 
-    def _look(self, fitted: Fit) -> Look:
-        """Score every candidate and curve around the fit and, where it explains little, around a looser one.
-
-        A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
-        where it is held tightly. The scores with the stronger explanation count.
-        """
-
-        def look(current: Fit) -> Look:
-            ripple, frequencies = strongest_ripple(current)
-            best = [ripple.candidate] if ripple else []
-            scanned = scan(current, [*library(current.model, self.given), *best])
-            curves = scan_curves(current)
-            looks = len(scanned.scored) + frequencies + curves.looks
-            return Look(current, scanned, curves.curves, looks)
-
-        found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
-        return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
+    def refused(self, base: State, look: Look) -> list[Refused]:
+        """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
+        strongest: dict[object, Scored] = {}
+        for one in sorted(look.library.scored, key=lambda s: -round(s.chi2, 3)):
+            if one.physical and not one.absorbed:
+                strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
+        shown = [s.candidate for s in look.passing()]
+        refused = []
+        for trial in self._tried(base, list(strongest.values())[:_NEAREST]):
+            if trial.fit.level < base.part.level:
+                continue
+            judged, errors = self._judged(base, trial, look), self._errors_or_none(trial.fit)
+            if judged is None or errors is None:
+                continue
+            why: Failing = "form"
+            if judged.p >= ALPHA:
+                why = "chance"
+            elif trial.candidates[0] not in shown:
+                why = "part"
+            elif judged.witness is None or self._worse(base.errors, errors):
+                why = "held"
+            effect, ratio = judged.whole.model.effects[-1], self.improvement(base.errors, errors)
+            title = trial.candidates[0].title
+            refused.append(Refused(effect, title, judged.chi2, judged.p, errors, ratio, why))
+        return sorted((r for r in refused if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
 
     def _known(self, current: State, look: Look) -> tuple[Step, State] | None:
         """The best addition of the library that passes: an effect, or some of them together.
@@ -385,7 +212,7 @@ class Search:
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
         passing = look.passing()
-        curve = next((c for c in _states_first(look.curves) if len(c.coordinates) == 1), None)
+        curve = next((c for c in states_first(look.curves) if len(c.coordinates) == 1), None)
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
@@ -404,27 +231,30 @@ class Search:
         """The best curve or surface that passes."""
         faults = look.fit.faults
         shown = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
-        return self._accept(current, self._curves(current, _states_first(shown)[:_CURVES]), look)
+        return self._accept(current, self._curves(current, states_first(shown)[:_CURVES]), look)
 
     def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
         """Formulas for a curve, fitted."""
         self._trying([f.text for f in formulas])
-        return _fitted(together(lambda written: _of_formula(current.part, curve, written), formulas))
+        return fitted_ones(together(lambda written: of_formula(current.part, curve, written), formulas))
 
     def _trying(self, titles: list[str]) -> None:
         if titles:
             self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
     def _formulas(self, current: State, curve: Curve) -> list[Formula]:
-        observations = int(np.isfinite(current.part.misfit).sum())
-        taken = current.part.model.state_names
-        return formulas_for(curve, observations, taken=taken).formulas[:_FORMULAS]
+        part = current.part
+        return formulas_for(curve, part.observations, taken=part.model.state_names).formulas[:_FORMULAS]
 
     def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
         best = passing[:_TRIED]
         self._trying([s.candidate.title for s in best])
-        found = together(lambda s: _of_library(current.part, [s.candidate], list(s.amplitudes)), best)
-        return _one_of_each(_fitted(found))
+        return self._tried(current, best)
+
+    def _tried(self, current: State, some: list[Scored]) -> list[Trial]:
+        """Candidates fitted in full, from the amplitudes that the score foretells."""
+        found = together(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
+        return one_of_each(fitted_ones(found))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
         """Several effects at once that pass only together."""
@@ -434,20 +264,20 @@ class Search:
             for group, fall in best[:_TRIED]
             if len({s.candidate.effect.name for s in group}) == size
             and fall > look.fit.faults
-            and chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
+            and _chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
         self._trying([" with ".join(c.title for c in group) for group in likely])
 
         def tried(group: list[Candidate]) -> Trial | None:
-            return _of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
+            return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
 
-        return self._accept(current, _fitted(together(tried, likely)), replace(look, looks=len(best)))
+        return self._accept(current, fitted_ones(together(tried, likely)), replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
         trials: list[Trial] = []
         self._trying([curve.title for curve in likely])
-        for located in _fitted(together(lambda curve: _of_curve(current.part, curve), likely)):
+        for located in fitted_ones(together(lambda curve: of_curve(current.part, curve), likely)):
             trials.append(located)
             if located.curve is not None:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))
@@ -499,38 +329,56 @@ class Search:
         least = trials[0].criterion(unit) + trials[0].handicap
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in trials if t.criterion(unit) + t.handicap - least <= 2 * NATS):
+            judged = self._judged(current, trial, look)
+            if judged is None or judged.witness is None:
+                continue
+            errors = self._errors_or_none(trial.fit)
+            if errors is not None and not self._worse(current.errors, errors):
+                others = self._alternatives(trial, trials, look.library, unit)
+                step = Step(
+                    candidates=trial.candidates,
+                    curve=trial.curve,
+                    chi2=judged.chi2,
+                    p=judged.p,
+                    ratio=judged.ratio,
+                    witness=judged.witness,
+                    alternatives=others,
+                    price=trial.price + trial.handicap,
+                )
+                return step, State(trial.fit, judged.whole, errors)
+        return None
+
+    def _judged(self, current: State, trial: Trial, look: Look) -> Judged | None:
+        """What the tests say of a trial; None where it cannot be fitted to all data."""
+        try:
             whole = self._again(current.whole, trial)
             if whole is None:
-                continue
-            before, after = same_level(current.whole, whole.fit)
-            inflation = after.inflation(before)
-            fall = (before.chi2 - after.chi2) / inflation
-            # What a film's faults make up is no sum of squares of chance alone.
-            p = min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * look.looks, 1.0)
-            if p >= ALPHA:
-                continue
-            part, rest = (current.part, trial.fit), self.record.part(self.held)
-            ratio, witness = borne_out(part, (before, after), rest, trial.names, self.unit)
-            if witness is None:
-                continue
-            try:
-                errors = self.errors(trial.fit)
-            except FitError:
-                continue
-            if not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, look.library, unit)
-                price = trial.price + trial.handicap
-                step = Step(trial.candidates, trial.curve, fall, p, ratio, witness, others, price)
-                return step, State(trial.fit, whole.fit, errors)
-        return None
+                return None
+            pair = same_level(current.whole, whole.fit)
+            fall, p = _chance(pair, trial, look)
+            ratio: Ratio = (math.nan, math.nan, math.nan)
+            witness: Witness | None = None
+            if p < ALPHA:
+                part, rest = (current.part, trial.fit), self.record.part(self.held)
+                ratio, witness = borne_out(part, pair, rest, trial.names, self.unit)
+        except FitError:
+            return None
+        return Judged(whole.fit, fall, p, ratio, witness)
+
+    def _errors_or_none(self, fitted: Fit) -> Errors | None:
+        """None where the model cannot be run over the held-out frames."""
+        try:
+            return self.errors(fitted)
+        except FitError:
+            return None
 
     def _again(self, whole: Fit, trial: Trial) -> Trial | None:
         """The same proposal fitted to all data."""
         if trial.curve is None:
-            return _of_library(whole, trial.candidates, trial.amplitudes)
+            return of_library(whole, trial.candidates, trial.amplitudes)
         if trial.formula is None:
-            return _of_curve(whole, trial.curve)
-        return _of_formula(whole, trial.curve, trial.formula)
+            return of_curve(whole, trial.curve)
+        return of_formula(whole, trial.curve, trial.formula)
 
     def _worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
@@ -540,7 +388,7 @@ class Search:
 
     def _says_less(self, formula: Trial, chosen: Trial, nats: float) -> bool:
         """Whether a formula is the chosen law in other words, or has more constants for nothing."""
-        return _same(formula.compared, chosen.compared) or (
+        return same_law(formula.compared, chosen.compared) or (
             nats > 0 and len(formula.names) > len(chosen.names)
         )
 

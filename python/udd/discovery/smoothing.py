@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.stats import chi2
+
+from udd import _chi2
 
 from .forcing import Score
 
@@ -189,6 +190,6 @@ def chance(score: Score, roughness: Array) -> tuple[float, float, int]:
     numbers = sorted({min(straight + more, len(z)) for more in ORDERS} - {0})
     if not numbers:
         return 1.0, 0.0, 0
-    by_chance = [float(chi2.sf(falls[n - 1], n)) for n in numbers]
+    by_chance = [float(_chi2.sf(falls[n - 1], n)) for n in numbers]
     k = int(np.argmin(by_chance))
     return min(by_chance[k] * len(numbers), 1.0), float(falls[numbers[k] - 1]), numbers[k]

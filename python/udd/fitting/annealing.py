@@ -46,13 +46,13 @@ def tighten(
     if best is None:
         if not levels:
             raise FitError("the fit has no level to solve at")
-        best = rough(measurements, replace(problem, diffusion=levels.pop(0)), point, steps)
+        best = rough(measurements, problem.held(levels.pop(0)), point, steps)
         point = best.point
     far = _leapt(best, point, levels) if problem.likeliest else None
     if far:
         best = _eased(far, levels)
     for diffusion in () if far else levels:
-        result = rough(measurements, replace(best.problem, diffusion=diffusion), point, steps)
+        result = rough(measurements, best.problem.held(diffusion), point, steps)
         if not _stands(result, best):
             break
         best, point = result, result.point
@@ -90,7 +90,7 @@ def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit 
     """
     for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
         try:
-            result = rough(best.measurements, replace(best.problem, diffusion=diffusion), point, FEW)
+            result = rough(best.measurements, best.problem.held(diffusion), point, FEW)
         except FitError:
             return None
         if not _stands(result, best):
@@ -102,7 +102,7 @@ def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit 
 def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     """The fit held more loosely again, level by level, as long as that is likelier."""
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
-        problem = replace(fitted.problem, diffusion=diffusion)
+        problem = fitted.problem.held(diffusion)
         looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
         if _stands(fitted, looser):
             break
@@ -114,7 +114,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     """The end of a rough fit, or where it has none in sight that of a looser one."""
     own = fitted.problem.diffusion
     for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
-        problem = replace(fitted.problem, diffusion=diffusion)
+        problem = fitted.problem.held(diffusion)
         fitted = solve(fitted.measurements, problem, fitted.point, steps)
         if fitted.converged:
             break
@@ -149,7 +149,7 @@ def loosened(fitted: Fit, scatter: float) -> Fit:
     for diffusion in reversed(problem.schedule[: fitted.level]):
         if result.scatter < scatter:
             break
-        result = solve(fitted.measurements, replace(problem, diffusion=diffusion), result.point)
+        result = solve(fitted.measurements, problem.held(diffusion), result.point)
     return result
 
 
@@ -157,7 +157,7 @@ def at_level(fitted: Fit, level: int) -> Fit:
     """The same model, held as tightly as a level of the schedule says."""
     if level == fitted.level:
         return fitted
-    problem = replace(fitted.problem, diffusion=fitted.problem.schedule[level])
+    problem = fitted.problem.held(fitted.problem.schedule[level])
     return solve(fitted.measurements, problem, fitted.point)
 
 
@@ -168,5 +168,5 @@ def held(fitted: Fit, record: Record, level: int) -> Fit:
     """
     problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
     problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
-    start = replace(fitted.point, states=record.states)
+    start = Point(record.states, fitted.point.sets)
     return tighten(fitted.measurements, problem, start, problem.schedule[: level + 1])

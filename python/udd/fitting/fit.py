@@ -87,7 +87,7 @@ def fit(
     True
     """
     record = record_of(measurement, model)
-    return fit_record(measurement, record, model, free, camera=camera, priors=priors, each=each)
+    return fit_record(measurement, record, model, free, camera=camera, priors=priors, each=each).put_away()
 
 
 def fit_record(

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
-from scipy.stats import chi2
+
+from udd import _chi2
 
 from .record import Record
 
@@ -103,12 +104,12 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     channels = seen.sum(axis=1).clip(1)
     # What is far out is judged by the typical frame: the noise may be stated wrongly.
     numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
-    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi2.ppf(0.5, numbers))
-    limit = (np.sqrt(chi2.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
+    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(_chi2.ppf(0.5, numbers))
+    limit = (np.sqrt(_chi2.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
     # The variance comes from the frames within the limit, where honest noise would show this share of its
     # own.
-    shown = (chi2.cdf(chi2.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]
+    shown = (_chi2.cdf(_chi2.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
         use = seen[:, m] & (weight == 1.0)

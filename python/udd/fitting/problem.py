@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd import _core
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -54,6 +55,8 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
 Values = tuple[list[float], list[float], float]
 #: A record as the core takes it.
 Data = tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.int64], list[float]]
+#: A point as the core takes it.
+Start = tuple[Array, list[Values], _core.Linearised | None]
 
 
 @dataclass(frozen=True)
@@ -76,16 +79,18 @@ class Problem:
     diffusion: tuple[float, ...]
     likeliest: bool = True
 
+    def held(self, diffusion: tuple[float, ...]) -> Problem:
+        """The same with the model held this tightly: its assumed error, per square root of a second."""
+        return replace(self, diffusion=diffusion)
+
     def arguments(
         self, point: Point
-    ) -> tuple[
-        Model, Data, tuple[Array, list[Values]], list[tuple[str, int, int | None, float, float]], list[float]
-    ]:
+    ) -> tuple[Model, Data, Start, list[tuple[str, int, int | None, float, float]], list[float]]:
         """What the core takes to describe a problem at a point."""
         return (
             self.models[0],
             data_of(self.record, self.noise, point.states[:, 0]),
-            (point.states, list(point.sets)),
+            (point.states, list(point.sets), point.linear),
             [f.core for f in self.free],
             list(self.diffusion),
         )
@@ -99,10 +104,25 @@ def data_of(record: Record, noise: Noise, omega: Array) -> Data:
 
 @dataclass(frozen=True)
 class Point:
-    """Values of all unknowns: the states, and for every film the model's, the camera's and the clock's."""
+    """Values of all unknowns: the states, and for every film the model's, the camera's and the clock's.
+
+    Attributes
+    ----------
+    linear : Linearised, optional
+        The record linearised there, where a solve came to it: who asks for more there need not do it again.
+        It does not go with a pickle or a copy.
+    """
 
     states: Array
     sets: tuple[Values, ...]
+    linear: _core.Linearised | None = field(default=None, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "linear": None}
+
+    def bare(self) -> Point:
+        """The same without what a solve left there."""
+        return Point(self.states, self.sets)
 
     def value(self, free: Free) -> float:
         """The value of a free parameter."""
@@ -199,6 +219,11 @@ class Fit:
         return np.concatenate(rows)
 
     @property
+    def observations(self) -> int:
+        """How many numbers were seen."""
+        return int(np.isfinite(self.misfit).sum())
+
+    @property
     def level(self) -> int:
         """How tightly the model was held: the place of its assumed error in the schedule."""
         return self.problem.schedule.index(self.problem.diffusion)
@@ -220,6 +245,10 @@ class Fit:
         sd = self.noise.sd(self.record, self.states[:, 0])
         fault = np.array(FAULTS.get(self.model.kind, (0.0,)))
         return float(np.square(fault / sd, where=self.record.observed, out=np.zeros(sd.shape)).sum())
+
+    def put_away(self) -> Fit:
+        """The same without what its solve left for those who ask for more: a kilobyte and a half a frame."""
+        return replace(self, point=self.point.bare())
 
     def inflation(self, before: Fit) -> float:
         """By what a fall of chi2 from another fit is divided before it counts.

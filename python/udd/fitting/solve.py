@@ -39,7 +39,7 @@ def solve(
         raise FitError(_said(error, problem)) from error
     record = problem.record
     names = [f.name for f in problem.free]
-    end = Point(found["states"], tuple(found["sets"]))
+    end = Point(found["states"], tuple(found["sets"]), found["linear"])
     try:
         models = tuple(
             model.with_parameters(dict(zip(model.parameters, values, strict=True)))
@@ -127,14 +127,16 @@ def filtered(
     """
     data = data_of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
     pairs = [(int(a), int(b)) for a, b in windows]
-    return _core.filter(fitted.model, data, (record.states, list(fitted.point.sets)), list(diffusion), pairs)
+    return _core.filter(
+        fitted.model, data, (record.states, list(fitted.point.sets), None), list(diffusion), pairs
+    )
 
 
 def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:
     """The same model fitted to some of the frames (a mask), held as tightly, from where the fit ended."""
     noise = replace(fitted.noise, weight=fitted.noise.weight[frames])
     problem = replace(fitted.problem, record=fitted.record.part(frames), noise=noise)
-    return solve(fitted.measurements, problem, replace(fitted.point, states=fitted.states[frames]))
+    return solve(fitted.measurements, problem, Point(fitted.states[frames], fitted.point.sets))
 
 
 def frame_costs(fitted: Fit) -> Array:

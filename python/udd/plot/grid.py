@@ -99,10 +99,10 @@ def _cells(fit: Any) -> list[list[tuple[Array, Array, Array]]]:
 
 def beyond_chance(cell: tuple[Array, Array, Array], cells: int) -> bool:
     """Whether the means of a cell scatter more about zero than chance allows, all cells counted."""
-    from scipy.stats import chi2
+    from udd import _chi2
 
     _, mean, error = cell
     there = error > 0
     # The errors are those of a dozen stretches or so: a chi2 of normal means would be too sharp by a tenth.
     z2 = float(((mean[there] / error[there]) ** 2).sum()) / 1.1
-    return bool(chi2.sf(z2, int(there.sum())) < _CHANCE / cells)
+    return bool(_chi2.sf(z2, int(there.sum())) < _CHANCE / cells)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from udd.fitting import Fit
 from udd.fitting.problem import FOLLOWS, levels
 from udd.fitting.solve import solve
@@ -16,7 +14,7 @@ def loosest(fit: Fit) -> Fit:
     """
     result = fit
     for diffusion in levels(fit.measurement.kind):
-        result = solve(fit.measurements, replace(fit.problem, diffusion=diffusion), fit.point)
+        result = solve(fit.measurements, fit.problem.held(diffusion), fit.point)
         if result.leverage < FOLLOWS:
             break
     return result

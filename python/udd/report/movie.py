@@ -159,8 +159,9 @@ def _disk(panel: Panel, model: Any, seconds: float, frames: int) -> str:
 
 def _pendulum(panel: Panel, model: Any, seconds: float, frames: int) -> str:
     theta = _padded(panel.seen, frames)[:, 0]
-    # One that never rises hangs from the top of its panel.
-    top, length = (-0.36, 0.7) if np.abs(theta).max() < 1.0 else (0.0, 0.4)
+    most = float(np.abs(theta).max())
+    # One that never rises hangs from the top of its panel, as long as its swings leave room for.
+    top, length = (-0.36, min(0.7, 0.44 / max(math.sin(most), 0.1))) if most < 1.0 else (0.0, 0.4)
     length *= _PANEL
     turns = [f"{-math.degrees(angle):.2f}" for angle in theta]
     return (

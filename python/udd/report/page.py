@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from udd.discovery.innovations import innovations
 from udd.errors import UddError
@@ -14,6 +15,9 @@ from udd.files import write_whole
 from udd.pages import templates
 
 from . import figures, own, tables, words
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 
 def write(
@@ -47,20 +51,21 @@ def write(
     target = Path(path)
     if target.is_dir():
         raise UddError(f"{target} is a folder, not a page to write to")
-    environment = templates("udd.report")
-    environment.filters["pretty"] = words.pretty
     origin = film if source is None else source
     of_own = discovery.fit.model.kind == "own"
     if of_own and film is not None:
         raise UddError("a film shows a disk, not a model of your own")
     fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]
     surprises = [innovations(fit) for fit in fits]
-    page = environment.get_template("own.html" if of_own else "page.html").render(
+    with ThreadPoolExecutor(1) as beside:  # what to film next is for the core, pictures are Python's
+        beside.submit(lambda: discovery.hints)
+        pictures = own.draw(discovery, surprises) if of_own else figures.draw(discovery, film, surprises)
+    page = template("own.html" if of_own else "page.html").render(
         d=discovery,
         words=words,
         tables=tables,
         own=own,
-        pictures=own.draw(discovery, surprises) if of_own else figures.draw(discovery, film, surprises),
+        pictures=pictures,
         innovations=surprises,
         numbers=words.headline(discovery),
         command=command or words.command(discovery, None if origin is None else Path(origin).name),
@@ -69,6 +74,13 @@ def write(
         source=identity(origin),
     )
     write_whole(target, page.encode())
+
+
+def template(name: str) -> Template:
+    """One of the report's templates, which share their pieces and the words of these."""
+    environment = templates("udd.report")
+    environment.filters["pretty"] = words.pretty
+    return environment.get_template(name)
 
 
 def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:

@@ -14,12 +14,11 @@ import numpy as np
 
 from udd.errors import UddError
 from udd.files import write_whole
-from udd.pages import templates
 from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
 
 from . import words
 from .images import Image, blank, png
-from .page import identity, versions
+from .page import identity, template, versions
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -52,8 +51,7 @@ def write_tracked(
         raise UddError("the measurement was not tracked in a film, so there is no page about it")
     checked = health(m) if m.kind == "disk" else None
     udd_version, all_versions = versions()
-    template = templates("udd.report").get_template("tracked.html")
-    page = template.render(
+    page = template("tracked.html").render(
         m=m,
         headline=headline(m),
         numbers=numbers(m, checked),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from markupsafe import Markup, escape
@@ -113,6 +113,25 @@ def verdict(discovery: Any) -> str:
     if discovery.verdict == "effect identified":
         return f"{said[0].upper()}{said[1:]}."
     return f"The model lacks something. Most likely {said}; but this record does not settle its form."
+
+
+def refused(discovery: Any) -> list[str]:
+    """What comes nearest where nothing passes, and why it does not."""
+    sentences = []
+    for near in discovery.refused:
+        numbers = headline(replace(discovery, error_after=near.errors, ratio=near.ratio))
+        why = {
+            "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
+            f"as by chance with a probability of {probability(near.p)}",
+            "part": "the part in which effects are sought does not show it beyond chance",
+            "held": "the frames that were held back do not bear it out",
+            "form": "another form fits these data clearly better, and does not pass",
+        }[near.why]
+        sentences.append(
+            f"{near.title} ({near.effect.expression}) would bring the held-out error {numbers.span} from "
+            f"{numbers.before} to {numbers.after}, ratio {numbers.ratio} ({numbers.interval}), but {why}."
+        )
+    return sentences
 
 
 def at_the_floor(discovery: Any) -> bool:

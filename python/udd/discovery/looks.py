@@ -1,0 +1,97 @@
+"""What the scores around a fit say: of the library, and of curves of anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from udd.fitting import Fit, loosened
+
+from .bearing import ALPHA
+from .candidates import Candidate, library
+from .coordinates import Coordinate
+from .curves import NATS, Curve, scan_curves
+from .scan import Scan, Scored, scan, strongest_ripple
+from .together import together
+from .trials import price_of
+
+_SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the scores around one fit say.
+
+    Attributes
+    ----------
+    fit : Fit
+    library : Scan
+    curves : list of Curve
+        The likeliest first.
+    looks : int
+        How many scores could have been the best, around all fits that were tried.
+    """
+
+    fit: Fit
+    library: Scan
+    curves: list[Curve]
+    looks: int
+
+    def passing(self) -> list[Scored]:
+        """The candidates that neither chance nor a film's faults explain, the strongest first."""
+        faults = self.fit.faults
+        usable = [
+            s
+            for s in self.library.scored
+            if s.physical and not s.absorbed and s.p * self.looks < ALPHA and s.chi2 > faults
+        ]
+        return sorted(usable, key=lambda s: -round(s.chi2, 3))
+
+    def nats(self, scored: Scored) -> float:
+        """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
+        return (scored.chi2 - scored.candidate.parameters * price_of(self.fit)) / 2
+
+    def strongest(self) -> float:
+        """The gain of the best explanation."""
+        singles = [self.nats(s) for s in self.library.scored if s.physical]
+        return max([c.evidence for c in self.curves] + singles, default=0.0)
+
+
+def look_around(fitted: Fit, given: Sequence[Candidate] = ()) -> Look:
+    """Score every candidate and curve around the fit and, where it explains little, around a looser one.
+
+    A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
+    where it is held tightly. The scores with the stronger explanation count. `given` are the user's own
+    candidates.
+    """
+
+    def look(current: Fit) -> Look:
+        ripple, frequencies = strongest_ripple(current)
+        best = [ripple.candidate] if ripple else []
+        scanned = scan(current, [*library(current.model, given), *best])
+        curves = scan_curves(current)
+        looks = len(scanned.scored) + frequencies + curves.looks
+        return Look(current, scanned, curves.curves, looks)
+
+    found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
+    return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
+
+
+def wider(look: Look) -> Look:
+    """With the surfaces over two coordinates."""
+    found = scan_curves(look.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
+    curves = sorted(look.curves + found.curves, key=lambda c: -c.evidence)
+    return replace(look, curves=curves, looks=look.looks + found.looks)
+
+
+def states_first(curves: list[Curve]) -> list[Curve]:
+    """The likeliest first, but after those as likely what stands for states in a roundabout way.
+
+    Curves over time take up anything slow, and curves over the direction can do much of what those over Y
+    and Z do.
+    """
+
+    def handicap(own: Coordinate) -> float:
+        return 2 * NATS if own.name == "t" else NATS if own.angle and own.text != own.name else 0.0
+
+    return sorted(curves, key=lambda c: -c.evidence + handicap(c.coordinates[0]))

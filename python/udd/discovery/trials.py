@@ -1,0 +1,170 @@
+"""Proposals fitted in full: effects of the library, a located curve, or a formula for one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from udd import _chi2
+from udd.errors import FitError
+from udd.fitting import Fit, extend
+
+from .bearing import ALPHA
+from .candidates import Candidate
+from .curves import NATS, Curve
+from .formulas import Formula
+from .located import fit_curve, fit_formula
+from .scan import physical
+
+_DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
+
+
+def price_of(fitted: Fit) -> float:
+    """What a parameter costs, in chi2 (BIC)."""
+    return math.log(fitted.observations)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A proposal fitted in full: candidates with free amplitudes, a located curve, or a formula for one.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        The effects, as they were proposed.
+    fit, compared : Fit
+        The fit, and the same held as tightly as those that it is compared with.
+    names : list of str
+        The parameters that came in with it.
+    price : float
+        What its freedom costs, in chi2 (BIC).
+    freedom : float
+        How many numbers were found for it.
+    curve : Curve or None
+        What was located.
+    formula : Formula or None
+        What the curve is written as.
+    """
+
+    candidates: list[Candidate]
+    fit: Fit
+    compared: Fit
+    names: list[str]
+    price: float
+    freedom: float
+    curve: Curve | None = None
+    formula: Formula | None = None
+
+    @property
+    def amplitudes(self) -> list[float]:
+        """The fitted values of these parameters."""
+        return [self.fit.parameters[name] for name in self.names]
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether it is a curve without a formula."""
+        return self.curve is not None and self.formula is None
+
+    def criterion(self, unit: float) -> float:
+        """chi2 in a common unit with the price of the freedom: the smaller the better."""
+        return self.compared.chi2 / unit + self.price
+
+    @property
+    def handicap(self) -> float:
+        """By how much chi2 must be better than that of an effect of the library."""
+        return 0.0 if self.curve is None else 3 * NATS if self.formula is None else 2 * NATS
+
+    @property
+    def needed(self) -> bool:
+        """Whether each of several candidates is needed beside the others."""
+        if len(self.candidates) < 2:
+            return True
+        names = list(self.fit.parameters)
+        for candidate in self.candidates:
+            own = [names.index(name) for name in candidate.amplitude_names]
+            a = np.array([self.fit.parameters[names[k]] for k in own])
+            block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
+            if a @ np.linalg.solve(block, a) < _chi2.isf(ALPHA, len(own)):
+                return False
+        return True
+
+    @property
+    def physical(self) -> bool:
+        """Whether all amplitudes lie in their ranges."""
+        if self.curve is not None:
+            return True
+        values, errors = self.fit.parameters, self.fit.errors
+        return all(
+            physical(c, [values[n] for n in c.amplitude_names], [errors[n] for n in c.amplitude_names])
+            for c in self.candidates
+        )
+
+
+def of_library(current: Fit, candidates: list[Candidate], start: list[float]) -> Trial | None:
+    """Effects of the library with free amplitudes."""
+    try:
+        fitted = extend(current, [c.effect for c in candidates], start)
+    except FitError:
+        return None
+    names = [name for c in candidates for name in c.amplitude_names]
+    price = price_of(fitted) * sum(c.parameters for c in candidates)
+    trial = Trial(candidates, fitted, fitted, names, price, len(names))
+    return trial if trial.physical and fitted.converged else None
+
+
+def of_curve(current: Fit, curve: Curve) -> Trial | None:
+    """A curve, located in full."""
+    try:
+        kind = "curve" if len(curve.coordinates) == 1 else "surface"
+        located = fit_curve(current, curve, _unused(current, kind))
+    except FitError:
+        return None
+    if not located.fit.converged:
+        return None
+    candidate = Candidate(located.effect, curve.title)
+    return Trial(
+        [candidate], located.fit, located.fit, [], 2 * located.price, located.curve.df, located.curve
+    )
+
+
+def of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
+    """A formula for a curve, all its constants free."""
+    name = _unused(current, "formula")
+    try:
+        fitted = fit_formula(current, curve, written, name)
+    except FitError:
+        return None
+    effect = fitted.model.effects[-1]
+    names = [f"{name}.{p}" for p in effect.parameters]
+    price, free = price_of(fitted) * len(names), len(names)
+    trial = Trial([Candidate(effect, effect.title)], fitted, fitted, names, price, free, curve, written)
+    return trial if fitted.converged else None
+
+
+def fitted_ones(trials: list[Trial | None]) -> list[Trial]:
+    """Those that could be fitted."""
+    return [t for t in trials if t]
+
+
+def one_of_each(trials: list[Trial]) -> list[Trial]:
+    """The best of those that tried one effect with several values of a shape that a fit then found."""
+    found: dict[object, Trial] = {}
+    for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
+        effect = trial.candidates[0].effect
+        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
+        found.setdefault((effect.name, effect.momentum, *fixed), trial)
+    return [trial for trial in trials if trial in found.values()]
+
+
+def same_law(one: Fit, other: Fit) -> bool:
+    """Whether two models make the same motion: one law in other words."""
+    sd = one.noise.sd(one.record, one.states[:, 0])
+    return bool(np.nanmax(np.abs(one.misfit - other.misfit) / sd) < _DIFFERENT)
+
+
+def _unused(current: Fit, name: str) -> str:
+    """A name that no effect of the model has yet."""
+    taken = {effect.name for effect in current.model.effects}
+    return next(n for n in (name, *(f"{name}{k}" for k in range(2, 9))) if n not in taken)

@@ -1,0 +1,52 @@
+//! What a solve has worked out, kept for those who ask for more at the same point.
+
+use std::any::Any;
+
+use pyo3::prelude::*;
+
+use crate::estimate::{Estimator, Free, Known, Role, Sensor};
+use crate::model::Family;
+
+/// The record linearised where a solve ended: an estimator of any kind that knows it.
+#[pyclass(frozen, module = "udd._core")]
+pub struct Linearised(Box<dyn Any + Send + Sync>);
+
+impl Linearised {
+    /// Of this estimator.
+    pub fn new<F, C, const D: usize, const M: usize>(
+        mut of: Estimator<F, C, D, M>,
+        known: Known<D, M>,
+    ) -> Self
+    where
+        F: Family<D> + 'static,
+        C: Sensor<D, M> + 'static,
+    {
+        of.known = Some(known);
+        Self(Box::new(of))
+    }
+
+    /// What is known for an estimator; nothing where another record or model was linearised, or by other parameters.
+    pub fn known<F, C, const D: usize, const M: usize>(
+        &self,
+        of: &Estimator<F, C, D, M>,
+    ) -> Option<Known<D, M>>
+    where
+        F: Family<D> + 'static,
+        C: Sensor<D, M> + 'static,
+    {
+        let kept: &Estimator<F, C, D, M> = self.0.downcast_ref()?;
+        let (own, other) = (&kept.record, &of.record);
+        // What was not seen is not a number: only its bits are the same.
+        let bits = |seen: &f64| seen.to_bits();
+        let same = roles(&kept.free) == roles(&of.free)
+            && kept.family == of.family
+            && (&own.t, &own.linked, &own.film) == (&other.t, &other.linked, &other.film)
+            && own.seen.iter().flatten().map(bits).eq(other.seen.iter().flatten().map(bits));
+        if same { kept.known.clone() } else { None }
+    }
+}
+
+/// Which parameters are free.
+fn roles(free: &[Free]) -> Vec<(Role, Option<usize>)> {
+    free.iter().map(|free| (free.role, free.film)).collect()
+}
