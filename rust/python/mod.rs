@@ -16,6 +16,12 @@ mod simulate;
 
 use pyo3::prelude::*;
 
+/// Every solve takes and gives back some megabytes: this allocator keeps them for the next, where the system's
+/// returns them and gets them back page by page.
+#[cfg(feature = "allocator")]
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The compiled core of udd.
 #[pymodule(gil_used = false)]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {

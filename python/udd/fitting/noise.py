@@ -100,7 +100,8 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
         The noise that the fit assumed.
     """
     seen = record.observed
-    distance = _distance(record, misfit, before.sd(record, omega))
+    assumed = before.sd(record, omega)
+    distance = _distance(record, misfit, assumed)
     channels = seen.sum(axis=1).clip(1)
     # What is far out is judged by the typical frame: the noise may be stated wrongly.
     numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
@@ -116,10 +117,10 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
         if not use.any():
             continue  # a state that is not seen
         # A fit follows its data: each squared misfit is smaller than the noise's by the fit's leverage.
-        leverage = seen_variance[use, m] / before.sd(record, omega)[use, m] ** 2
+        variance = assumed[use, m] ** 2
+        leverage = seen_variance[use, m] / variance
         power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)
         terms = np.column_stack([record.sigma[use, m] ** 2, omega[use] ** 2])
-        variance = before.sd(record, omega)[use, m] ** 2
         for _ in range(3):  # the scatter of a squared misfit grows with its own expectation
             scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
             share, _residual = nnls(terms / scale / variance[:, None], power / variance)
