@@ -86,6 +86,9 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found.effects == []
     assert found.alternatives == []
     assert found.ratio == (1.0, 1.0, 1.0)
+    # What is said of the known model is what its best fit says.
+    assert found.baseline.parameters == found.fit.parameters
+    assert found.baseline.errors == found.fit.errors
 
 
 @pytest.mark.parametrize(

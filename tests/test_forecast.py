@@ -181,6 +181,7 @@ def test_a_joint_fit_forecasts_each_of_its_films() -> None:
         ({"t": [1.0, 1.0]}, "increases from 0 on"),
         ({"t": float("nan")}, "t must be finite"),
         ({"start": -1.0}, "holds 0 usable frames"),
+        ({"start": 41.0}, "cannot start at 41 s: the record ends at 39.95 s"),
         ({"window": 0.1}, "at least 6"),
         ({"members": 1}, "members must be a whole number"),
         ({"level": 1.0}, "level must be below 1"),
@@ -233,16 +234,17 @@ def test_the_command(
     assert "must end in" in capsys.readouterr().err
 
 
-def test_a_users_own_model_is_run_on_too():
+@pytest.mark.parametrize("x", ["x", "theta"])  # an angle of one's own is no pendulum of udd's
+def test_a_users_own_model_is_run_on_too(x):
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 16.0, 0.02)
-    truth = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v"}, {"k": 9.0, "c": 0.05})
+    truth = udd.Model([x, "v"], {x: "v", "v": f"-k*{x} - c*v"}, {"k": 9.0, "c": 0.05})
     motion = udd.simulate(truth, t, [1.0, 0.0]).state
-    seen = udd.Measurement(t, motion[:, :1] + 0.01 * rng.standard_normal((len(t), 1)), names=("x",))
+    seen = udd.Measurement(t, motion[:, :1] + 0.01 * rng.standard_normal((len(t), 1)), names=(x,))
     found = udd.forecast(seen, truth.with_parameters({"k": 8.8}), start=12.0, t=t[601:] - t[600])
-    assert found.names == ("x",) and found.lyapunov_time == np.inf and found.valid_time == np.inf
+    assert found.names == (x,) and found.lyapunov_time == np.inf and found.valid_time == np.inf
     inside = (found.low[:, 0] <= motion[600:, 0]) & (motion[600:, 0] <= found.high[:, 0])
     # The band is one of 95 %; its errors go together for as long as the forecast lasts.
     assert inside.mean() > 0.7
     assert np.abs(found.median[:, 0] - motion[600:, 0]).max() < 0.02
-    assert found.to_dict()["x"]["median"].shape == (200,)
+    assert found.to_dict()[x]["median"].shape == (200,)

@@ -221,17 +221,25 @@ def forecast(
     known = measurement
     if start is not None:
         known = measurement.rows(measurement.t <= number("start", start))
-    kind = measurement.kind
+        if start > measurement.t[-1] + np.median(np.diff(measurement.t)):
+            raise FitError(
+                f"a forecast cannot start at {start:g} s: the record ends at {measurement.t[-1]:g} s"
+            )
     if window is not None:
         number("window", window, above=0.0)
-    large = number("error", _LARGE[kind] if error is None else error, above=0.0)
+    if error is not None:
+        number("error", error, above=0.0)
     if isinstance(model, Fit):
         fitted = model
-        if fitted.measurement.kind != kind:
-            raise FitError(f"the fit is that of a {fitted.measurement.kind}, the measurement of a {kind}")
+        if fitted.measurement.kind != measurement.kind:
+            raise FitError(
+                f"the fit is that of a {fitted.measurement.kind}, the measurement of a {measurement.kind}"
+            )
     else:
         fitted = fit(known, model)
-    unit = pace(fitted)
+    # What a user's own model is of its measurement's columns do not tell.
+    kind, unit = fitted.model.kind, pace(fitted)
+    large = _LARGE[kind] if error is None else float(error)
     times = _times(_AHEAD[kind] * unit if t is None else t, _STEP * unit)
     length = float(_WINDOW[kind] * unit if window is None else window)
     record = record_of(known, fitted.model if kind == "own" else None)
@@ -268,7 +276,7 @@ def forecast(
         valid_low=float(shortest),
         valid_high=float(longest),
         lyapunov_time=_growth(fitted.models[film], states, _GROWTH_TIME * unit),
-        measured_valid_time=_compared(measurement, clock, median, spread, large),
+        measured_valid_time=_compared(measurement, kind, (clock, median), spread, large),
         fit=fitted,
         measurement=measurement,
     )
@@ -469,16 +477,19 @@ def _parted(t: Array, size: Array, error: float) -> float:
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
 
-def _compared(measurement: Measurement, clock: Array, median: Array, spread: Array, error: float) -> float:
+def _compared(
+    measurement: Measurement, kind: str, expectation: tuple[Array, Array], spread: Array, error: float
+) -> float:
     """When what was measured after the start first parts from the median, s after it; NaN if it does not."""
+    clock, median = expectation
     after = measurement.slice(float(np.nextafter(clock[0], np.inf)), float(clock[-1]))
     t = after.t
     expected = np.column_stack([np.interp(t, clock, column) for column in median.T])
     difference = np.where(after.seen[:, None], after.values - expected, np.nan)
-    if measurement.kind == "pendulum":
+    if kind == "pendulum":
         difference = (difference + np.pi) % (2 * np.pi) - np.pi
     there = np.isfinite(difference).all(axis=1)
-    when = _parted(t[there] - clock[0], _size(difference[there], measurement.kind, spread), error)
+    when = _parted(t[there] - clock[0], _size(difference[there], kind, spread), error)
     return when if np.isfinite(when) else math.nan
 
 

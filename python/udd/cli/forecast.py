@@ -79,7 +79,7 @@ def describe(found: Forecast) -> str:
     """A forecast in a few lines."""
     factor, unit = {
         "disk": (1e3, "mm"), "pendulum": (1e3, "mrad"), "own": (1e2, "% of the spread"),
-    }[found.measurement.kind]  # fmt: skip
+    }[found.fit.model.kind]  # fmt: skip
     within = f"{factor * found.error:.3g} {unit}"
     reach = found.t[-1] - found.start
     lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]

@@ -128,7 +128,7 @@ def discover(
         verdict = "effect identified" if found else "nothing missing"
     return Discovery(
         verdict=verdict,
-        baseline=baseline.put_away(),
+        baseline=(baseline if found else final).put_away(),
         fit=final.put_away(),
         effects=found,
         alternatives=others,

@@ -172,7 +172,7 @@ class Discovery:
     verdict : str
         ``"nothing missing"``, ``"effect identified"`` or ``"effect present, form not identified"``.
     baseline, fit : Fit
-        The model without and with the added effects, each fitted to all data.
+        The model without and with the added effects, each fitted to all data; the same where none was added.
     effects : list of Found
         The effects that were added; empty when nothing is missing.
     alternatives : list of Alternative

@@ -25,6 +25,7 @@ _NOISE_ROUNDS = 12
 #: In a search a pendulum's angle that states no error is not taken for better than this part of what is
 #: typical: frames may scatter less, but perspective bends the angle by as much.
 _FAITHFUL = {"pendulum": 0.5}
+_FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 
@@ -72,7 +73,8 @@ def fit(
     Raises
     ------
     FitError
-        The measurement does not suit the model, is too short, or does not determine the parameters.
+        The measurement does not suit the model, is too short, or does not determine the parameters; or it can
+        be followed only with a drive, or a clock, that is far from what was stated.
 
     Examples
     --------
@@ -118,7 +120,29 @@ def fit_record(
         (list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
         for own, film in zip(models, measurements, strict=True)
     )
-    return _anneal(measurements, problem, Point(record.states, sets))
+    return _as_stated(_anneal(measurements, problem, Point(record.states, sets)))
+
+
+def _as_stated(fitted: Fit) -> Fit:
+    """The fit, unless a disk's drive or clock came out far from what was stated: as with a wrong unit.
+
+    An effect that is missing may well move the drive by a half, and the clock by a tenth.
+    """
+    for free in fitted.problem.free:
+        value = fitted.parameters[free.name]
+        if fitted.model.kind != "disk" or abs(value - free.mean) <= _FAR * free.sd:
+            continue
+        if free.role == "clock" and abs(value) > 0.5:
+            raise FitError(
+                f"the disk can be followed only with a clock that is off by {100 * value:.3g} %: check the "
+                "times, and whether the drive W is in m/s"
+            )
+        if free.name.partition("[")[0] == "W" and not abs(free.mean) / 3 < value < 3 * abs(free.mean):
+            raise FitError(
+                f"the disk can be followed only with a drive of W = {value:.3g} m/s, where {free.mean:g} m/s "
+                "was stated: check the drive and its unit"
+            )
+    return fitted
 
 
 def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement]) -> tuple[Model, ...]:
@@ -248,8 +272,9 @@ def _estimate_noise(
         noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
         if measurements[0].sigma is not None and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return False, problem, point
-        if not problem.likeliest and measurements[0].sigma is None and measurements[0].kind in _FAITHFUL:
-            noise = replace(noise, factor=np.maximum(noise.factor, _FAITHFUL[measurements[0].kind]))
+        kind = problem.models[0].kind
+        if not problem.likeliest and measurements[0].sigma is None and kind in _FAITHFUL:
+            noise = replace(noise, factor=np.maximum(noise.factor, _FAITHFUL[kind]))
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, result.blurring):
             break

@@ -164,7 +164,7 @@ def errors(discovery: Any) -> Image:
 def whiteness(found: list[Any]) -> Image:
     """Autocorrelation of the innovations, before and after."""
     names = found[0].names
-    figure, grid = blank(3.1 * len(names) + (0 if len(names) > 1 else 4.0), 2.7, columns=len(names), top=0.4)
+    figure, grid = blank(max(3.1 * len(names), 8.0), 2.7, columns=len(names), top=0.4)
     said = (("the known model", BEFORE), ("with the added effect", AFTER))
     for ax, name in zip(grid[0], names, strict=True):
         for each, (words, colour) in zip(found, said, strict=False):

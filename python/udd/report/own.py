@@ -52,7 +52,7 @@ def measured(discovery: Any) -> str:
     seen = [(name, s) for name, s in zip(fit.channels, sd, strict=True) if np.isfinite(s)]
     noise = ", ".join(f"{s:.2g} in {name}" for name, s in seen)
     hidden = [name for name in fit.channels if name not in m.names]
-    what = f"{', '.join(m.names)} in {len(m)} frames over {m.duration:.4g}"
+    what = f"{', '.join(m.names)} in {len(m)} frames over {m.duration:.4g} s"
     rest = f" Not seen: {', '.join(hidden)}." if hidden else ""
     return f"{what}; noise as the record shows it: {noise}.{rest}"
 
