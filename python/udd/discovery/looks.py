@@ -37,15 +37,15 @@ class Look:
     curves: list[Curve]
     looks: int
 
+    def usable(self) -> list[Scored]:
+        """The candidates with physical numbers whose work no free parameter does, the strongest first."""
+        found = [s for s in self.library.scored if s.physical and not s.absorbed]
+        return sorted(found, key=lambda s: -round(s.chi2, 3))
+
     def passing(self) -> list[Scored]:
-        """The candidates that neither chance nor a film's faults explain, the strongest first."""
+        """Those of them that neither chance nor a film's faults explain."""
         faults = self.fit.faults
-        usable = [
-            s
-            for s in self.library.scored
-            if s.physical and not s.absorbed and s.p * self.looks < ALPHA and s.chi2 > faults
-        ]
-        return sorted(usable, key=lambda s: -round(s.chi2, 3))
+        return [s for s in self.usable() if s.p * self.looks < ALPHA and s.chi2 > faults]
 
     def nats(self, scored: Scored) -> float:
         """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""

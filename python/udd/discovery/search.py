@@ -182,9 +182,8 @@ class Search:
     def refused(self, base: State, look: Look) -> list[Refused]:
         """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
         strongest: dict[object, Scored] = {}
-        for one in sorted(look.library.scored, key=lambda s: -round(s.chi2, 3)):
-            if one.physical and not one.absorbed:
-                strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
+        for one in look.usable():
+            strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
         shown = [s.candidate for s in look.passing()]
         refused = []
         for trial in self._tried(base, list(strongest.values())[:_NEAREST]):

@@ -128,9 +128,11 @@ def _as_stated(fitted: Fit) -> Fit:
 
     An effect that is missing may well move the drive by a half, and the clock by a tenth.
     """
+    if fitted.model.kind != "disk":
+        return fitted
     for free in fitted.problem.free:
         value = fitted.parameters[free.name]
-        if fitted.model.kind != "disk" or abs(value - free.mean) <= _FAR * free.sd:
+        if abs(value - free.mean) <= _FAR * free.sd:
             continue
         if free.role == "clock" and abs(value) > 0.5:
             raise FitError(
