@@ -197,7 +197,8 @@ impl Expression {
     ///
     /// # Panics
     /// Where the stack is lower than the formula's [depth](Expression::depth).
-    #[inline(always)]
+    // One function for each kind of number and of leaf: its loop is large.
+    #[inline(never)]
     pub fn value_of<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, stack: &mut [S]) -> S {
         let mut top = 0;
         for op in &self.ops {
@@ -208,7 +209,7 @@ impl Expression {
                 }
                 Op::Unary(function) => stack[top - 1] = function.of(stack[top - 1]),
                 Op::Spline(spline) => {
-                    stack[top - 1] = spline.of(stack[top - 1], |i| leaf(Leaf::Parameter(i)));
+                    stack[top - 1] = spline.of(stack[top - 1], &|i| leaf(Leaf::Parameter(i)));
                 }
                 Op::Binary(function) => {
                     top -= 1;
@@ -222,7 +223,8 @@ impl Expression {
 
 impl Unary {
     /// The function's value.
-    #[inline(always)]
+    // One function for each kind of number: the elementary functions are long.
+    #[inline(never)]
     pub fn of<S: Scalar>(self, a: S) -> S {
         match self {
             Unary::Neg => -a,
@@ -255,10 +257,20 @@ impl Binary {
             Binary::Sub => a - b,
             Binary::Mul => a * b,
             Binary::Div => a / b,
-            Binary::Power => (b * a.ln()).exp(),
-            Binary::Atan2 => a.atan2(b),
+            Binary::Power => power_of(a, b),
+            Binary::Atan2 => angle_of(a, b),
         }
     }
+}
+
+#[inline(never)]
+fn power_of<S: Scalar>(a: S, b: S) -> S {
+    (b * a.ln()).exp()
+}
+
+#[inline(never)]
+fn angle_of<S: Scalar>(y: S, x: S) -> S {
+    y.atan2(x)
 }
 
 #[inline(always)]

@@ -33,8 +33,9 @@ impl Spline {
     }
 
     /// Its value. Only the four coefficients that count are asked for, of each lane's cell.
-    #[inline(always)]
-    pub fn of<S: Scalar>(self, x: S, coefficient: impl Fn(usize) -> S) -> S {
+    // One function for each kind of number, whatever asks for it.
+    #[inline(never)]
+    pub fn of<S: Scalar>(self, x: S, coefficient: &dyn Fn(usize) -> S) -> S {
         let cells = self.cells();
         let mut u = (x - S::constant(self.low)).scale(self.per);
         if !self.periodic {

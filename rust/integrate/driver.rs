@@ -1,14 +1,12 @@
 //! The one stepping loop.
 
-use std::array::from_fn;
-
 use super::control::{Controller, initial_step};
 use super::landing::{Landed, Landing, Look, TARGETS, WALL, Watch, union};
 use super::method::{Method, Point, Trial};
 use super::runge_kutta::Dopri5;
 use super::saltation::pass;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
-use crate::model::{MAX_SURFACES, System, choose, sides_of};
+use crate::model::{MAX_SURFACES, Sides, System, choose, sides_of};
 use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
@@ -38,6 +36,17 @@ pub enum Ending {
     Surface(usize),
     /// On the wall of the model's domain.
     Wall,
+}
+
+impl Ending {
+    /// On the first of the targets that were crossed.
+    fn of(crossed: &[bool; TARGETS]) -> Self {
+        match crossed.iter().position(|&crossed| crossed) {
+            Some(WALL) => Ending::Wall,
+            Some(j) => Ending::Surface(j),
+            None => Ending::Free,
+        }
+    }
 }
 
 /// What one trial step did, lane by lane.
@@ -179,20 +188,36 @@ where
             initial_step(&self.system, &fresh, K::ORDER, self.norm.state())
         });
         start_sides(&self.system, &mut fresh, h);
-        self.at.sides = from_fn(|j| choose(lanes, fresh.sides[j], self.at.sides[j]));
+        self.take_sides(lanes, &fresh.sides);
         self.h = S::Real::select(lanes, h, self.h);
         self.flips = S::Real::select(lanes, S::Real::zero(), self.flips);
         self.start = S::Real::select(lanes, t, self.start);
         self.jumps.0 = S::Real::select(lanes, S::Real::zero(), self.jumps.0);
         self.jumps.1 = S::Real::select(lanes, t, self.jumps.1);
         self.undecided = self.undecided.and(lanes.not());
-        self.landing.on = self.landing.on.map(|on| on.and(lanes.not()));
+        for on in &mut self.landing.on {
+            *on = on.and(lanes.not());
+        }
         self.controller.reset(lanes);
+    }
+
+    /// Takes the law on these sides, in these lanes.
+    #[inline(always)]
+    fn take_sides(&mut self, lanes: S::Mask, sides: &Sides<S>) {
+        for (own, &side) in self.at.sides.iter_mut().zip(sides) {
+            *own = choose(lanes, side, *own);
+        }
     }
 
     /// The work so far.
     pub fn counts(&self) -> Counts {
-        let sum = |count: S::Real| (0..S::Real::LANES).map(|i| count.lane(i) as u64).sum();
+        let sum = |count: S::Real| {
+            let mut all = 0;
+            for i in 0..S::Real::LANES {
+                all += count.lane(i) as u64;
+            }
+            all
+        };
         let Work { accepted, rejected, trials, beside, grazes } = self.work;
         let evaluations = trials.scale(K::EVALUATIONS as f64) + beside;
         Counts {
@@ -231,7 +256,7 @@ where
 
     /// The sides that the law is taken on.
     #[inline(always)]
-    pub fn sides(&self) -> &crate::model::Sides<S> {
+    pub fn sides(&self) -> &Sides<S> {
         &self.at.sides
     }
 
@@ -368,13 +393,18 @@ where
         if landing.any() {
             // What landing lanes want is the value of their own target.
             let mut value = S::Real::zero();
-            for target in watch.targets().filter(|&j| self.landing.on[j].any()) {
+            for target in 0..TARGETS {
+                if !self.landing.on[target].any() {
+                    continue;
+                }
                 let own = watch.value(target, self.at.t + trial.size, &trial.x);
                 value = S::Real::select(self.landing.on[target], own, value);
             }
             let on = self.landing.on;
             landed = self.landing.judge(value);
-            crossed = on.map(|on| on.and(landed.there));
+            for (crossed, on) in crossed.iter_mut().zip(on) {
+                *crossed = on.and(landed.there);
+            }
         }
         if crossing.any() {
             if K::SERIES {
@@ -382,12 +412,17 @@ where
                 let x = self.method.at(found.dt);
                 trial.x = vector!(S, D; n => S::select(crossing, x[n], trial.x[n]));
                 trial.size = S::Real::select(crossing, found.dt, trial.size);
-                crossed = from_fn(|j| crossed[j].or(found.crossing[j]));
+                for (crossed, &found) in crossed.iter_mut().zip(&found.crossing) {
+                    *crossed = crossed.or(found);
+                }
                 landed.there = landed.there.or(crossing);
             } else {
                 let mut slope = S::Real::zero();
                 let ahead = trial.size.scale(1e-4);
-                for target in watch.targets().filter(|&j| found.crossing[j].any()) {
+                for target in 0..TARGETS {
+                    if !found.crossing[target].any() {
+                        continue;
+                    }
                     let on = |dt: S::Real| watch.on(target, &self.method, dt);
                     let own = (on(found.dt + ahead) - on(found.dt - ahead)) / (ahead + ahead);
                     slope = S::Real::select(found.crossing[target], own, slope);
@@ -408,7 +443,7 @@ where
             self.h = S::Real::select(leaving, longer, self.h);
             self.undecided = self.undecided.and(leaving.not());
             let sides = sides_of(&self.system, S::lift(self.at.t), &self.at.x);
-            self.at.sides = from_fn(|j| choose(leaving, sides[j], self.at.sides[j]));
+            self.take_sides(leaving, &sides);
             self.begin(leaving);
         }
         if stale.any() {
@@ -515,11 +550,7 @@ where
                 return Err(self.failure());
             }
             if progress.moved {
-                return Ok(match progress.crossed.iter().position(|&crossed| crossed) {
-                    Some(WALL) => Ending::Wall,
-                    Some(j) => Ending::Surface(j),
-                    None => Ending::Free,
-                });
+                return Ok(Ending::of(&progress.crossed));
             }
         }
     }
@@ -544,12 +575,11 @@ where
             return Failure::Chattering { t };
         }
         let rate = self.system.rates(S::lift(self.at.t), &self.at.x, &self.at.sides);
-        let finite = |v: &[S; D]| v.iter().all(|v| v.real().lane(lane).is_finite());
-        if finite(&self.at.x) && finite(&rate) && (K::SERIES || self.h.lane(lane).is_finite()) {
-            Failure::StepUnderflow { t }
-        } else {
-            Failure::NotFinite { t }
+        let mut finite = K::SERIES || self.h.lane(lane).is_finite();
+        for n in 0..D {
+            finite &= self.at.x[n].real().lane(lane).is_finite() && rate[n].real().lane(lane).is_finite();
         }
+        if finite { Failure::StepUnderflow { t } } else { Failure::NotFinite { t } }
     }
 }
 

@@ -5,8 +5,6 @@
 //! its step anew up to there, and [`Landing`] corrects the step's size until the surface's function is
 //! zero; the other lanes go on meanwhile.
 
-use std::array::from_fn;
-
 use super::method::{MOST_PROBES, Method, Point};
 use super::root::bracketed;
 use super::tolerance::Tolerance;
@@ -73,9 +71,10 @@ where
         Self { system, at, wall, noise: NOISE.max(tolerance.atol) }
     }
 
-    /// The targets that there are.
-    pub fn targets(&self) -> impl Iterator<Item = usize> + use<M, S, D> {
-        (0..self.system.surfaces()).chain(self.wall.then_some(WALL))
+    /// Whether there is such a target.
+    #[inline(always)]
+    pub fn has(&self, target: usize) -> bool {
+        target < self.system.surfaces() || target == WALL && self.wall
     }
 
     /// The target's function, positive on the side that the law is frozen on.
@@ -100,19 +99,18 @@ where
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.system.watched());
         let mut beyond = [S::mask(false); TARGETS];
-        // Unrolled, so that each target's function is known.
-        unroll!(target in 0..TARGETS => {
-            if target < self.system.surfaces() || target == WALL && self.wall {
-                unroll!(i in 0..MOST_PROBES => {
-                    if i < K::PROBES.len() {
-                        let x = vector!(S, D; n => S::lift(probes[i][n]));
-                        let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
-                        beyond[target] = beyond[target].or(value.less(S::Real::zero()));
-                    }
-                });
-                beyond[target] = beyond[target].and(lanes);
+        for target in 0..TARGETS {
+            if !self.has(target) {
+                continue;
             }
-        });
+            let mut any = S::mask(false);
+            for i in 0..K::PROBES.len() {
+                let x = vector!(S, D; n => S::lift(probes[i][n]));
+                let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
+                any = any.or(value.less(S::Real::zero()));
+            }
+            beyond[target] = any.and(lanes);
+        }
         Look { probes, beyond }
     }
 
@@ -132,7 +130,10 @@ where
             Found { crossing: [never; TARGETS], stale: [never; TARGETS], dt: infinite, high: infinite, zero };
         let mut earliest = infinite;
         let mut stale = never;
-        for target in self.targets().filter(|&target| look.beyond[target].any()) {
+        for target in 0..TARGETS {
+            if !self.has(target) || !look.beyond[target].any() {
+                continue;
+            }
             let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
             let mut scale = start.abs();
@@ -174,12 +175,13 @@ where
             found.dt = S::Real::select(first, dt, found.dt);
             found.high = S::Real::select(first, high.0, found.high);
             found.zero = S::Real::select(first, scale.scale(ZERO), found.zero);
-            found.crossing = from_fn(|j| match j == target {
-                true => first,
-                false => found.crossing[j].and(first.not()),
-            });
+            for (j, crossing) in found.crossing.iter_mut().enumerate() {
+                *crossing = if j == target { first } else { crossing.and(first.not()) };
+            }
         }
-        found.crossing = found.crossing.map(|lanes| lanes.and(stale.not()));
+        for crossing in &mut found.crossing {
+            *crossing = crossing.and(stale.not());
+        }
         found
     }
 }
@@ -267,7 +269,9 @@ impl<R: Real> Landing<R> {
     /// Begins for the crossings found; `slope` is the function's on the polynomial.
     pub fn begin(&mut self, found: &Found<R>, lanes: R::Mask, slope: R) {
         let zero = R::zero();
-        self.on = from_fn(|j| self.on[j].or(found.crossing[j].and(lanes)));
+        for (on, &crossing) in self.on.iter_mut().zip(&found.crossing) {
+            *on = on.or(crossing.and(lanes));
+        }
         self.size = R::select(lanes, found.dt, self.size);
         self.low = pick(lanes, (zero, zero), self.low);
         self.high = pick(lanes, (found.high, zero), self.high);
@@ -307,7 +311,9 @@ impl<R: Real> Landing<R> {
         self.size = R::select(inside.and(patient), guess, careful);
 
         let done = there.or(grazed);
-        self.on = self.on.map(|on| on.and(done.not()));
+        for on in &mut self.on {
+            *on = on.and(done.not());
+        }
         Landed { there, grazed }
     }
 }

@@ -1,6 +1,5 @@
 //! Explicit Runge-Kutta pairs.
 
-use std::array::from_fn;
 use std::marker::PhantomData;
 
 use super::dop853::Dop853Scheme;
@@ -181,11 +180,17 @@ where
     #[inline(always)]
     fn along(&self, h: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; MOST_PROBES] {
         let mut states = [[S::Real::zero(); D]; MOST_PROBES];
-        for n in (0..D).filter(|&n| of[n]) {
-            let powers: [S::Real; P] = from_fn(|j| self.power(j, n, |s| s.real()));
+        for n in 0..D {
+            if !of[n] {
+                continue;
+            }
+            let powers = vector!(S::Real, P; j => self.power(j, n, S::real));
             for (state, &part) in states.iter_mut().zip(parts) {
                 let theta = self.theta(h.scale(part));
-                let sum = powers.iter().rev().fold(S::Real::zero(), |sum, &power| sum * theta + power);
+                let mut sum = S::Real::zero();
+                for j in (0..P).rev() {
+                    sum = sum * theta + powers[j];
+                }
                 state[n] = self.x[n].real() + sum * theta * self.h;
             }
         }
@@ -194,7 +199,9 @@ where
 
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
         coefficients.push(self.x);
-        coefficients.extend((0..P).map(|j| vector!(S, D; n => self.power(j, n, |s| s).times(self.h))));
+        for j in 0..P {
+            coefficients.push(vector!(S, D; n => self.power(j, n, |s| s).times(self.h)));
+        }
         self.h
     }
 }

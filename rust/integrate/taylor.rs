@@ -128,7 +128,9 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
         let series = self.jets.coefficients();
-        coefficients.extend((0..=self.jets.order()).map(|k| vector!(S, D; n => series[n][k])));
+        for k in 0..=self.jets.order() {
+            coefficients.push(vector!(S, D; n => series[n][k]));
+        }
         S::Real::one()
     }
 }

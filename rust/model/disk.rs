@@ -94,8 +94,10 @@ impl<S: Scalar> Disk<S> {
     #[inline(always)]
     fn slip<A: Scalar>(&self, lift: impl Fn(S) -> A, at: &At<A>, wanted: Momentum) -> Slots<A> {
         let mut slots = Slots::default();
-        for term in self.effects.iter().filter(|term| term.momentum == Some(wanted)) {
-            term.enter(&lift, at, &mut slots);
+        for term in &self.effects {
+            if term.momentum == Some(wanted) {
+                term.enter(&lift, at, &mut slots);
+            }
         }
         slots
     }
@@ -108,8 +110,12 @@ impl<S: Scalar> Disk<S> {
         let (mut dy, mut dz) = (z * omega, self.w - y * omega);
 
         let mut forces = Slots::default();
-        for term in self.effects.iter().filter(|term| term.momentum.is_none()) {
-            term.enter(&|s| s, &at, &mut forces);
+        let mut slips = false;
+        for term in &self.effects {
+            match term.momentum {
+                None => term.enter(&|s| s, &at, &mut forces),
+                Some(momentum) => slips |= momentum == Momentum::Consistent,
+            }
         }
         let mut torque = self.g * y;
         torque += forces.torque;
@@ -123,7 +129,7 @@ impl<S: Scalar> Disk<S> {
         // dW_c/dT and du/dT follow from the effect's own formula: direction 0 goes along the flow with
         // Omega held, direction 1 along Omega, whose rate is what we solve for.
         let mut inertia = at.inertia;
-        if self.effects.iter().any(|term| term.momentum == Some(Momentum::Consistent)) {
+        if slips {
             let along = |value: S, rate: S| Dual { re: value, d: [rate, S::zero()] };
             let flow = self.at(
                 Dual::<S, 2>::fixed,

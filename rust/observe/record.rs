@@ -1,7 +1,5 @@
 //! A whole run as a piecewise polynomial.
 
-use std::array::from_fn;
-
 use crate::integrate::{Driver, Method, Tolerance};
 use crate::model::System;
 
@@ -53,6 +51,12 @@ impl<const D: usize> Record<D> {
         let (unit, end) = self.pieces[piece];
         let theta = (t - self.times[piece]) / unit;
         let own = &self.coefficients[begin..end];
-        Some(from_fn(|n| own.iter().rev().fold(0.0, |sum, c| sum * theta + c[n])))
+        let mut x = [0.0; D];
+        for c in own.iter().rev() {
+            for n in 0..D {
+                x[n] = x[n] * theta + c[n];
+            }
+        }
+        Some(x)
     }
 }

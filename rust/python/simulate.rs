@@ -60,18 +60,19 @@ fn run<F: Family<D>, const D: usize>(
     (tolerance, keep): (&Tolerance, bool),
     stop: &Stop,
 ) -> Result<Flat, PyErr> {
-    let system = family.build(values);
+    let system = || family.build(values);
     let Run { t, x, events, outcome, counts, record } = match stepper {
-        Stepper::Dopri5 => trajectory(&system, Dopri5::default(), output, x0, tolerance, keep, stop)?,
-        Stepper::Dop853 => trajectory(&system, Dop853::default(), output, x0, tolerance, keep, stop)?,
+        Stepper::Dopri5 => trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop)?,
+        Stepper::Dop853 => trajectory(system(), Dop853::default(), output, x0, tolerance, keep, stop)?,
         Stepper::Taylor => {
             let tape = rows::tape(family, &[values.to_vec()]);
             let message = "the model's law depends on comparisons, which no power series follows; use method=\"dop853\"";
             let tape = tape.ok_or_else(|| ModelError::new_err(message))?;
             let method = Taylor::new(&tape, values.to_vec(), order(tolerance), Isa::best());
-            trajectory(&system, method, output, x0, tolerance, keep, stop)?
+            trajectory(system(), method, output, x0, tolerance, keep, stop)?
         }
     };
+    let system = system();
     Ok(Flat {
         dimension: D,
         t,

@@ -1,5 +1,7 @@
 //! Time averages with honest errors, from the means over blocks of a run.
 
+use crate::unroll::vector;
+
 /// Sums of `N` quantities over consecutive pieces of a run.
 #[derive(Clone, Debug)]
 pub struct Blocks<const N: usize> {
@@ -51,7 +53,7 @@ impl<const N: usize> Blocks<N> {
         let half = self.list.len() / 2;
         for i in 0..half {
             let ((a, s), (b, t)) = (self.list[2 * i], self.list[2 * i + 1]);
-            self.list[i] = (std::array::from_fn(|n| a[n] + b[n]), s + t);
+            self.list[i] = (vector!(f64, N; n => a[n] + b[n]), s + t);
         }
         self.list.truncate(half);
     }
@@ -62,11 +64,11 @@ impl<const N: usize> Blocks<N> {
         let half = self.list.len() / 2;
         let (first, second) = (average(&self.list[..half]), average(&self.list[half..]));
         // Four standard errors: chance does that once in ten thousand looks.
-        let apart = |n: usize| {
+        let mut differ = false;
+        for n in 0..N {
             let error = first.standard_error[n].hypot(second.standard_error[n]);
-            (first.value[n] - second.value[n]).abs() > 4.0 * error
-        };
-        let differ = (0..N).any(apart);
+            differ |= (first.value[n] - second.value[n]).abs() > 4.0 * error;
+        }
         if differ {
             self.list.drain(..half);
         }
@@ -83,21 +85,30 @@ fn average<const N: usize>(list: &[([f64; N], f64)]) -> Average<N> {
     // As long blocks as can be while enough of them remain.
     let size = (list.len() / Blocks::<N>::LEAST).max(1);
     let blocks = list.len() / size;
-    let time: f64 = list.iter().map(|block| block.1).sum();
-    let total = |n: usize| list.iter().map(|block| block.0[n]).sum::<f64>();
-    let value = std::array::from_fn(|n| total(n) / time);
-    let standard_error = std::array::from_fn(|n| {
-        if blocks < 2 {
-            return f64::NAN;
+    let mut time = 0.0;
+    let mut total = [0.0; N];
+    for block in list {
+        time += block.1;
+        for n in 0..N {
+            total[n] += block.0[n];
         }
-        // Blocks differ in length by a step or so: each counts by its time.
-        let scatter = list.chunks_exact(size).map(|chunk| {
-            let (sum, time) = chunk.iter().fold((0.0, 0.0), |(s, t), block| (s + block.0[n], t + block.1));
-            (sum - value[n] * time).powi(2)
-        });
-        let count = blocks as f64;
-        (scatter.sum::<f64>() * count / (count - 1.0)).sqrt() / time
-    });
+    }
+    let value = vector!(f64, N; n => total[n] / time);
+    // Blocks differ in length by a step or so: each counts by its time.
+    let mut scatter = [0.0; N];
+    for chunk in list.chunks_exact(size) {
+        for n in 0..N {
+            let (mut sum, mut time) = (0.0, 0.0);
+            for block in chunk {
+                sum += block.0[n];
+                time += block.1;
+            }
+            scatter[n] += (sum - value[n] * time).powi(2);
+        }
+    }
+    let count = blocks as f64;
+    let error = |n: usize| (scatter[n] * count / (count - 1.0)).sqrt() / time;
+    let standard_error = vector!(f64, N; n => if blocks < 2 { f64::NAN } else { error(n) });
     Average { value, standard_error, time }
 }
 

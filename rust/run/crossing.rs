@@ -9,6 +9,7 @@ use crate::integrate::root::bracketed;
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
 use crate::scalar::{Isa, Mask, Real};
+use crate::unroll::vector;
 
 /// Looked for to this part of the function's largest value near the crossing, and to this size.
 const ZERO: f64 = 1e-14;
@@ -183,7 +184,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             let stretches = &mut stretches[..K::PROBES.len()];
             surface.signs(&law, &step, moved, stretches);
             let last = stretches[stretches.len() - 1].value;
-            if stretches.iter().any(|stretch| stretch.crossing.any()) {
+            if crosses(stretches) {
                 if !any {
                     any = true;
                     self.crossed.iter_mut().for_each(Vec::clear);
@@ -198,14 +199,29 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         self.sides = *driver.sides();
         if any && !self.counted {
             for (list, skip) in self.crossed.iter_mut().zip(&mut self.skip) {
-                list.sort_by(|a, b| a.t.total_cmp(&b.t));
-                let left_out = list.len().min(*skip);
-                list.drain(..left_out);
-                *skip -= left_out;
+                in_order(list, skip);
             }
         }
         any
     }
+}
+
+/// Whether there is any crossing.
+#[inline(always)]
+fn crosses<R: Real>(stretches: &[Stretch<R>]) -> bool {
+    let mut any = R::mask(false);
+    for stretch in stretches {
+        any = any.or(stretch.crossing);
+    }
+    any.any()
+}
+
+/// Puts a lane's crossings in the order of time and takes away those that are still to be left out.
+fn in_order<const D: usize>(list: &mut Vec<Crossed<D>>, skip: &mut usize) {
+    list.sort_by(|a, b| a.t.total_cmp(&b.t));
+    let left_out = list.len().min(*skip);
+    list.drain(..left_out);
+    *skip -= left_out;
 }
 
 impl<R: Real> Surface<'_, R> {
@@ -299,10 +315,13 @@ impl<R: Real> Surface<'_, R> {
             let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
             let residual = self.at(law, &t, &x);
             let real = seen.and(residual.abs().less(scale.scale(JUMP)));
-            for lane in (0..R::LANES).filter(|&lane| real.lane(lane)) {
+            for lane in 0..R::LANES {
+                if !real.lane(lane) {
+                    continue;
+                }
                 crossed[lane].push(Crossed {
                     t: t.lane(lane),
-                    x: x.map(|x| x.lane(lane)),
+                    x: vector!(f64, D; n => x[n].lane(lane)),
                     which,
                     residual: residual.lane(lane),
                 });

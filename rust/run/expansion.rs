@@ -1,9 +1,8 @@
 //! The law's own derivatives at a state.
 
-use std::array::from_fn;
-
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::{Dual, Scalar, constants};
+use crate::unroll::vector;
 
 /// The rates at a state and their first derivatives.
 #[derive(Clone, Debug)]
@@ -19,21 +18,27 @@ pub struct Linear<const D: usize> {
 
 /// The rates and their first derivatives, on the side of every switching surface that the state lies on.
 pub fn linear<F: Family<D>, const D: usize>(family: &F, values: &[f64], t: f64, x: &[f64; D]) -> Linear<D> {
-    let fixed: Vec<Dual<f64, D>> = values.iter().map(|&value| Dual::constant(value)).collect();
-    let rates = at(&family.build(&fixed), t, &from_fn(|n| Dual::variable(x[n], n)));
-    let by_parameter = (0..values.len()).map(|p| {
-        let mut varied: Vec<Dual<f64, 1>> = values.iter().map(|&value| Dual::constant(value)).collect();
+    let fixed: Vec<Dual<f64, D>> = constants(values);
+    let rates = at(&family.build(&fixed), t, &vector!(Dual<f64, D>, D; n => Dual::variable(x[n], n)));
+    let still = vector!(Dual<f64, 1>, D; n => Dual::constant(x[n]));
+    let mut by_parameter = Vec::with_capacity(values.len());
+    for p in 0..values.len() {
+        let mut varied: Vec<Dual<f64, 1>> = constants(values);
         varied[p] = Dual::variable(values[p], 0);
-        at(&family.build(&varied), t, &x.map(Dual::constant)).map(|rate| rate.d[0])
-    });
+        let rates = at(&family.build(&varied), t, &still);
+        by_parameter.push(vector!(f64, D; n => rates[n].d[0]));
+    }
     let system = family.build(values);
     let sides = sides_of(&system, t, x);
-    Linear {
-        surfaces: (0..system.surfaces()).map(|j| system.surface(j, t, x, &sides)).collect(),
-        rate: rates.map(|rate| rate.re),
-        by_state: rates.map(|rate| rate.d),
-        by_parameter: by_parameter.collect(),
+    let mut surfaces = Vec::with_capacity(system.surfaces());
+    for j in 0..system.surfaces() {
+        surfaces.push(system.surface(j, t, x, &sides));
     }
+    let mut by_state = [[0.0; D]; D];
+    for n in 0..D {
+        by_state[n] = rates[n].d;
+    }
+    Linear { rate: vector!(f64, D; n => rates[n].re), by_state, by_parameter, surfaces }
 }
 
 /// The second and third derivatives, `[n][i][j]` and `[n][i][j][k]` flat.
@@ -44,7 +49,7 @@ pub fn higher<F: Family<D>, const D: usize>(
     x: &[f64; D],
 ) -> (Vec<f64>, Vec<f64>) {
     type Third = Dual<Dual<Dual<f64, 1>, 1>, 1>;
-    let fixed: Vec<Third> = values.iter().map(|&value| Dual::constant(value)).collect();
+    let fixed: Vec<Third> = constants(values);
     let system = family.build(&fixed);
     let mut second = vec![0.0; D * D * D];
     let mut third = vec![0.0; D * D * D * D];
@@ -53,7 +58,7 @@ pub fn higher<F: Family<D>, const D: usize>(
         for j in i..D {
             for k in j..D {
                 let along = |n: usize, m: usize| if n == m { 1.0 } else { 0.0 };
-                let start: [Third; D] = from_fn(|n| {
+                let start = vector!(Third, D; n => {
                     let inner = Dual { re: x[n], d: [along(n, i)] };
                     let middle = Dual { re: inner, d: [Dual::constant(along(n, j))] };
                     Dual { re: middle, d: [Dual::constant(along(n, k))] }

@@ -4,15 +4,16 @@ use super::ship::work;
 use crate::integrate::{Driver, ErrorNorm, Method};
 use crate::model::System;
 use crate::scalar::{Dual, Instructions, Isa, Mask, Real, Work};
-use crate::unroll::unroll;
+use crate::unroll::{unroll, vector};
 
 /// The state with `N` orthonormal tangents that no symmetry singles out.
 pub fn tangents<R: Real, const D: usize, const N: usize>(x: [f64; D]) -> [Dual<R, N>; D] {
-    let mut frame = x.map(|x| Dual::fixed(R::constant(x)));
-    for (n, component) in frame.iter_mut().enumerate() {
-        for (i, d) in component.d.iter_mut().enumerate() {
+    let mut frame = vector!(Dual<R, N>, D; n => Dual::fixed(R::constant(x[n])));
+    for n in 0..D {
+        for i in 0..N {
             // Any numbers without a pattern.
-            *d = R::constant(((n * N + i + 1) as f64 * 1.618).sin() + if n == i { 1.5 } else { 0.0 });
+            let d = ((n * N + i + 1) as f64 * 1.618).sin() + if n == i { 1.5 } else { 0.0 };
+            frame[n].d[i] = R::constant(d);
         }
     }
     orthonormalise(&frame).0
@@ -29,12 +30,10 @@ pub fn orthonormalise<R: Real, const D: usize, const N: usize>(
 ) -> ([Dual<R, N>; D], [R; N]) {
     let mut x = *x;
     let mut lengths = [R::zero(); N];
-    unroll!(i in 0..N => {
-        unroll!(j in 0..N => {
-            if j < i {
-                subtract(&mut x, i, j);
-            }
-        });
+    for i in 0..N {
+        for j in 0..i {
+            subtract(&mut x, i, j);
+        }
         let mut square = R::zero();
         unroll!(n in 0..D => { square += x[n].d[i] * x[n].d[i]; });
         lengths[i] = square.sqrt();
@@ -45,7 +44,7 @@ pub fn orthonormalise<R: Real, const D: usize, const N: usize>(
             lengths[i] = R::select(gone, R::zero(), lengths[i]);
             replace(&mut x, i, gone);
         }
-    });
+    }
     (x, lengths)
 }
 
@@ -60,27 +59,46 @@ fn subtract<R: Real, const D: usize, const N: usize>(x: &mut [Dual<R, N>; D], i:
 /// Puts the axis with the most room beside the tangents before `i` in its place, in these lanes.
 #[cold]
 fn replace<R: Real, const D: usize, const N: usize>(x: &mut [Dual<R, N>; D], i: usize, lanes: R::Mask) {
-    for lane in (0..R::LANES).filter(|&lane| lanes.lane(lane)) {
-        let taken = |n: usize| (0..i).map(|j| x[n].d[j].lane(lane).powi(2)).sum::<f64>();
-        let axis = (0..D).min_by(|&a, &b| taken(a).total_cmp(&taken(b))).unwrap_or(0);
-        let mut new: [f64; D] = std::array::from_fn(|n| if n == axis { 1.0 } else { 0.0 });
-        for j in 0..i {
-            let along: f64 = (0..D).map(|n| new[n] * x[n].d[j].lane(lane)).sum();
-            for n in 0..D {
-                new[n] -= along * x[n].d[j].lane(lane);
-            }
+    for lane in 0..R::LANES {
+        if !lanes.lane(lane) {
+            continue;
         }
-        let length = new.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let mut own = [[0.0; N]; D];
         for n in 0..D {
-            x[n].d[i].set_lane(lane, new[n] / length);
+            own[n] = vector!(f64, N; j => x[n].d[j].lane(lane));
+        }
+        let new = roomiest(&own, i);
+        for n in 0..D {
+            x[n].d[i].set_lane(lane, new[n]);
         }
     }
 }
 
+/// The axis with the most room beside the first `count` tangents, made perpendicular to them.
+fn roomiest<const D: usize, const N: usize>(x: &[[f64; N]; D], count: usize) -> [f64; D] {
+    let taken = |n: usize| x[n][..count].iter().map(|d| d.powi(2)).sum::<f64>();
+    let axis = (0..D).min_by(|&a, &b| taken(a).total_cmp(&taken(b))).unwrap_or(0);
+    let mut new = vector!(f64, D; n => if n == axis { 1.0 } else { 0.0 });
+    for j in 0..count {
+        let mut along = 0.0;
+        for n in 0..D {
+            along += new[n] * x[n][j];
+        }
+        for n in 0..D {
+            new[n] -= along * x[n][j];
+        }
+    }
+    let length = new.iter().map(|v| v * v).sum::<f64>().sqrt();
+    vector!(f64, D; n => new[n] / length)
+}
+
 /// The logarithm of a tangent's length.
 fn log_length<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: usize, lane: usize) -> f64 {
-    let square: f64 = x.iter().map(|x| x.d[i].lane(lane).powi(2)).sum();
-    0.5 * square.ln()
+    let mut square = 0.0;
+    for x in x {
+        square += x.d[i].lane(lane).powi(2);
+    }
+    0.5 * f64::ln(square)
 }
 
 /// How much tangents had grown when they were last made orthonormal: `ln(product) + sum`, so that a step
@@ -119,7 +137,7 @@ impl<R: Real, const N: usize> Growth<R, N> {
     /// The logarithms of a lane's, where its state is `x`.
     pub fn lane<const D: usize>(&self, x: &[Dual<R, N>; D], lane: usize) -> [f64; N] {
         let before = |i: usize| self.sum[i].lane(lane) + self.product[i].lane(lane).ln();
-        std::array::from_fn(|i| before(i) + log_length(x, i, lane))
+        vector!(f64, N; i => before(i) + log_length(x, i, lane))
     }
 
     /// Makes the tangents in the lanes that moved orthonormal again, where that has to be, and adds what they

@@ -11,6 +11,7 @@ use super::trajectory::Outcome;
 use crate::integrate::{Failure, Tolerance, WithTangents, order};
 use crate::model::Family;
 use crate::scalar::{Dual, Isa, Mask, Real};
+use crate::unroll::vector;
 
 /// A block is no shorter than this many steps.
 const LEAST_STEPS: f64 = 32.0;
@@ -103,7 +104,8 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
         let norm = WithTangents(tolerance);
         let mut ship = Ship::new(self.isa, self.orbits.family, |v| self.recipe.make(v), start(first), &norm);
         // Not cloned: clones have no room beforehand.
-        let mut blocks: Vec<Blocks<N>> = (0..R::LANES).map(|_| Blocks::new(span)).collect();
+        let mut blocks = Vec::with_capacity(R::LANES);
+        blocks.resize_with(R::LANES, || Blocks::<N>::new(span));
         let mut growth = Growth::<R, N>::none();
         // When each lane's block began, and its steps since.
         let (mut since, mut steps) = (R::zero(), R::zero());
@@ -135,8 +137,8 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             if !full.or(over).any() {
                 continue;
             }
-            for lane in (0..R::LANES).filter(|&lane| full.or(over).lane(lane)) {
-                let Some(orbit) = ship.job(lane) else { continue };
+            for lane in 0..R::LANES {
+                let Some(orbit) = ship.job(lane).filter(|_| full.or(over).lane(lane)) else { continue };
                 let now = t.lane(lane);
                 let own = &mut blocks[lane];
                 let mut converged = false;
@@ -171,7 +173,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
                     _ => Ok(Outcome::Finished),
                 };
                 let exponents = own.average();
-                let x = ship.driver.x().map(|x| x.re.lane(lane));
+                let x = vector!(f64, D; n => ship.driver.x()[n].re.lane(lane));
                 let means = moments.lane(lane);
                 moments.clear(lane);
                 yields.push(orbit, Exponents { exponents, moments: means, t: now, x, outcome });

@@ -1,12 +1,10 @@
 //! Time averages of the state and of the products of its components.
 
-use std::array::from_fn;
-
 use super::ship::work;
 use crate::integrate::{Driver, ErrorNorm, Method};
 use crate::model::System;
 use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
-use crate::unroll::unroll;
+use crate::unroll::{unroll, vector};
 
 /// Gauss-Legendre nodes on `[0, 1]` and their weights: exact for products of polynomials of degree 7.
 const NODES: [f64; 8] = [
@@ -61,8 +59,11 @@ impl<R: Real, const D: usize> Moments<R, D> {
     /// Forgets a lane.
     pub fn clear(&mut self, lane: usize) {
         self.time.set_lane(lane, 0.0);
-        for sum in self.first.iter_mut().chain(self.second.iter_mut().flatten()) {
-            sum.set_lane(lane, 0.0);
+        for n in 0..D {
+            self.first[n].set_lane(lane, 0.0);
+            for m in 0..D {
+                self.second[n][m].set_lane(lane, 0.0);
+            }
         }
     }
 
@@ -70,8 +71,12 @@ impl<R: Real, const D: usize> Moments<R, D> {
     pub fn lane(&self, lane: usize) -> Moments<f64, D> {
         let time = self.time.lane(lane);
         let mean = |sum: R| sum.lane(lane) / time;
-        let second = |n: usize, m: usize| mean(self.second[n.min(m)][n.max(m)]);
-        Moments { time, first: self.first.map(mean), second: from_fn(|n| from_fn(|m| second(n, m))) }
+        let first = vector!(f64, D; n => mean(self.first[n]));
+        let mut second = [[0.0; D]; D];
+        for n in 0..D {
+            second[n] = vector!(f64, D; m => mean(self.second[n.min(m)][n.max(m)]));
+        }
+        Moments { time, first, second }
     }
 }
 
@@ -95,7 +100,8 @@ where
         let Self { moments, driver, moved } = self;
         let size = S::Real::select(moved, driver.size(), S::Real::zero());
         moments.time += size;
-        for (x, weight) in driver.method().along(size, &NODES, &[true; D]).iter().zip(WEIGHTS) {
+        let states = driver.method().along(size, &NODES, &[true; D]);
+        for (x, &weight) in states.iter().zip(&WEIGHTS) {
             let share = size.scale(weight);
             unroll!(n in 0..D => {
                 // Lanes that did not move may hold anything.

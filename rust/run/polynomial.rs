@@ -18,16 +18,25 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
     #[inline(always)]
     pub fn of<K: Method<R, D>>(method: &'a K, isa: Isa, own: &'a mut Room<R, D>) -> Self {
         if K::SERIES {
-            let coefficients = std::array::from_fn(|n| method.component(n).unwrap_or_default());
+            let mut coefficients: [&[R]; D] = [&[]; D];
+            for (n, list) in coefficients.iter_mut().enumerate() {
+                *list = method.component(n).unwrap_or_default();
+            }
             return Self { isa, coefficients, unit: R::one() };
         }
         own.states.clear();
         let unit = method.polynomial(&mut own.states);
         for (n, list) in own.components.iter_mut().enumerate() {
             list.clear();
-            list.extend(own.states.iter().map(|x| x[n]));
+            for x in &own.states {
+                list.push(x[n]);
+            }
         }
-        Self { isa, coefficients: std::array::from_fn(|n| own.components[n].as_slice()), unit }
+        let mut coefficients: [&[R]; D] = [&[]; D];
+        for (own, list) in coefficients.iter_mut().zip(&own.components) {
+            *own = list;
+        }
+        Self { isa, coefficients, unit }
     }
 
     /// The state at `s`.

@@ -9,6 +9,7 @@ use crate::formula::Expression;
 use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
 use crate::scalar::{Isa, Mask, Real};
+use crate::unroll::vector;
 
 /// A component of the state beyond this has escaped to infinity.
 pub const FAR: f64 = 1e6;
@@ -107,7 +108,8 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
 
     fn start<R: Real>(&self, job: usize) -> Start<'_, R, D> {
         let x = rows::of(self.starts, job);
-        Start { values: rows::of::<Vec<f64>>(self.values, job), t: 0.0, x: x.map(R::constant), end: self.end }
+        let x = vector!(R, D; n => R::constant(x[n]));
+        Start { values: rows::of::<Vec<f64>>(self.values, job), t: 0.0, x, end: self.end }
     }
 }
 
@@ -154,8 +156,10 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                 });
             }
             let mut far = R::mask(false);
-            for (x, _) in ship.driver.x().iter().zip(bounded).filter(|(_, bounded)| *bounded) {
-                far = far.or(R::constant(FAR).less(x.abs()));
+            for n in 0..D {
+                if bounded[n] {
+                    far = far.or(R::constant(FAR).less(ship.driver.x()[n].abs()));
+                }
             }
             let walled = progress.walled();
             let over = full.or(ship.arrived()).or(walled).or(progress.failed).or(far);
@@ -163,7 +167,10 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                 continue;
             }
             let mut fresh = false;
-            for lane in (0..R::LANES).filter(|&lane| stopped || over.lane(lane)) {
+            for lane in 0..R::LANES {
+                if !(stopped || over.lane(lane)) {
+                    continue;
+                }
                 let ended = match () {
                     () if full.lane(lane) => Ended::Finished,
                     () if progress.failed.lane(lane) => Ended::Failed(ship.driver.failure_of(lane)),
@@ -177,7 +184,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                 found.ended = ended;
                 found.end = match ended {
                     Ended::Finished => (found.t[count - 1], found.x[count - 1]),
-                    _ => (ship.driver.t().lane(lane), ship.driver.x().map(|x| x.lane(lane))),
+                    _ => (ship.driver.t().lane(lane), vector!(f64, D; n => ship.driver.x()[n].lane(lane))),
                 };
                 yields.push(job, found);
                 let next = if stopped { None } else { queue.take() };

@@ -2,7 +2,7 @@
 
 use crate::integrate::{Driver, ErrorNorm, Method, Progress};
 use crate::model::{Family, System};
-use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work, constants};
 
 /// Where a job starts.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +46,7 @@ where
         like: Start<'_, S, D>,
         norm: &E,
     ) -> Self {
-        let values: Vec<S> = like.values.iter().map(|&value| S::constant(value)).collect();
+        let values: Vec<S> = constants(like.values);
         let t = S::Real::constant(like.t);
         let method = method(values.clone());
         let driver = Driver::by(method, family.build(&values), t, like.x, None, norm).with_wall();

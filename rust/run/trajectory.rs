@@ -52,7 +52,7 @@ pub struct Run<const D: usize> {
 /// Runs the system from `x0` by this method, ending on its wall where it has one. A run that ends there,
 /// or where it chatters, is cut: that point is the last one.
 pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
-    system: &M,
+    system: M,
     method: K,
     output: Output<'_>,
     x0: [f64; D],

@@ -162,12 +162,13 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         let root = self.re.sqrt();
         self.chain(root, S::constant(0.5) / root)
     }
-    #[inline(always)]
+    // One function for each kind of number: these are long.
+    #[inline(never)]
     fn exp(self) -> Self {
         let value = self.re.exp();
         self.chain(value, value)
     }
-    #[inline(always)]
+    #[inline(never)]
     fn ln(self) -> Self {
         self.chain(self.re.ln(), S::one() / self.re)
     }
@@ -179,17 +180,17 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     fn cos(self) -> Self {
         self.sin_cos().1
     }
-    #[inline(always)]
+    #[inline(never)]
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.re.sin_cos();
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
-    #[inline(always)]
+    #[inline(never)]
     fn tanh(self) -> Self {
         let value = self.re.tanh();
         self.chain(value, S::one() - value * value)
     }
-    #[inline(always)]
+    #[inline(never)]
     fn atan2(self, x: Self) -> Self {
         let inverse = S::one() / (self.re.square() + x.re.square());
         let (along, across) = (x.re * inverse, self.re * inverse);

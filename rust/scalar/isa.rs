@@ -95,6 +95,24 @@ impl Isa {
     }
 }
 
+impl Isa {
+    /// Does work over single numbers with these instructions, or with AVX2 where they are wider: nothing is
+    /// gained by registers that are half empty, and every copy takes its time to compile.
+    ///
+    /// # Panics
+    /// Where the machine lacks them.
+    #[inline]
+    pub fn run_narrow<W: Work>(self, work: W) -> W::Output {
+        assert!(self <= Isa::best(), "this machine lacks {self:?}");
+        #[cfg(target_arch = "x86_64")]
+        if self >= Isa::Avx2 {
+            // SAFETY: the machine has the instructions, as just seen.
+            return unsafe { avx2(work) };
+        }
+        baseline(work)
+    }
+}
+
 /// Does work over packets that are made of the instructions `V` with just these.
 #[inline(always)]
 pub(super) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {

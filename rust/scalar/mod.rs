@@ -109,6 +109,15 @@ pub trait Scalar:
     }
 }
 
+/// These values as constants.
+pub fn constants<S: Scalar>(values: &[f64]) -> Vec<S> {
+    let mut list = Vec::with_capacity(values.len());
+    for &value in values {
+        list.push(S::constant(value));
+    }
+    list
+}
+
 /// A number without derivatives: one lane (`f64`) or several ([`Packet`]).
 pub trait Real: Scalar<Real = Self> {
     /// How many trajectories it stands for.

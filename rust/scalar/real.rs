@@ -85,7 +85,7 @@ impl Real for f64 {
 
     #[inline(always)]
     fn work<W: Work>(isa: Isa, work: W) -> W::Output {
-        isa.run(work)
+        isa.run_narrow(work)
     }
     #[inline(always)]
     fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> f64 {

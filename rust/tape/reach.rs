@@ -26,45 +26,24 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     pub fn real_slope(&self, dt: S::Real) -> [S::Real; D] {
         vector!(S::Real, D; n => {
             let c = &self.coefficients()[n];
-            let terms = (1..=self.order()).rev();
-            terms.fold(S::Real::zero(), |sum, k| sum * dt + c[k].real().scale(k as f64))
+            let mut sum = S::Real::zero();
+            for k in (1..=self.order()).rev() {
+                sum = sum * dt + c[k].real().scale(k as f64);
+            }
+            sum
         })
     }
 
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
     #[inline(always)]
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
-        vector!(S, D; n => self.value(n, order, dt, |c| c))
+        vector!(S, D; n => value(&self.coefficients()[n], order, dt, |c| c))
     }
 
     #[inline(always)]
     fn real_values(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
         let order = self.order();
-        vector!(S::Real, D; n => if of[n] { self.value(n, order, dt, S::real) } else { S::Real::zero() })
-    }
-
-    /// A component's value at `dt`; `lift` makes coefficients what the value is to be.
-    #[inline(always)]
-    fn value<T: Scalar>(&self, n: usize, order: usize, dt: T::Real, lift: impl Fn(S) -> T) -> T {
-        let order = order.min(N - 1);
-        let c = |k: usize| lift(self.coefficients()[n][k]);
-        let dt2 = dt * dt;
-        let dt4 = dt2 * dt2;
-        // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
-        let rounds = order.div_ceil(4) - 1;
-        let mut sums = [T::zero(); 4];
-        unroll!(r in 0..4 => {
-            let k = 4 * rounds + 1 + r;
-            if k <= order {
-                sums[r] = c(k);
-            }
-        });
-        for round in (0..rounds).rev() {
-            unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused_times(sums[r], dt4); });
-        }
-        // The state itself is added last, which rounds once.
-        let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
-        c(0).fused_times(low.fused_times(high, dt2), dt)
+        vector!(S::Real, D; n => if of[n] { value(&self.coefficients()[n], order, dt, S::real) } else { S::Real::zero() })
     }
 
     /// How far the solution may be followed by the series up to this order: the last two terms are then as small
@@ -89,6 +68,35 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let term = vector!(S, D; n => series[n][k]);
         power_rough(norm.of_term(&term, weights), -0.5 / k as f64)
     }
+}
+
+/// A component's value at `dt`, of which these are the coefficients; `lift` makes them what the value is to be.
+#[inline(always)]
+fn value<S: Copy, T: Scalar, const N: usize>(
+    series: &[S; N],
+    order: usize,
+    dt: T::Real,
+    lift: impl Fn(S) -> T,
+) -> T {
+    let order = order.min(N - 1);
+    let c = |k: usize| lift(series[k]);
+    let dt2 = dt * dt;
+    let dt4 = dt2 * dt2;
+    // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
+    let rounds = order.div_ceil(4) - 1;
+    let mut sums = [T::zero(); 4];
+    unroll!(r in 0..4 => {
+        let k = 4 * rounds + 1 + r;
+        if k <= order {
+            sums[r] = c(k);
+        }
+    });
+    for round in (0..rounds).rev() {
+        unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused_times(sums[r], dt4); });
+    }
+    // The state itself is added last, which rounds once.
+    let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
+    c(0).fused_times(low.fused_times(high, dt2), dt)
 }
 
 struct Value<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
@@ -134,7 +142,8 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
                 if of[n] {
-                    let found = jets.value(n, jets.order(), places, |c| Packet::<P, V>::new([c.real().lane(0); P]));
+                    let lift = |c: S| Packet::<P, V>::new([c.real().lane(0); P]);
+                    let found = value(&jets.coefficients()[n], jets.order(), places, lift);
                     for (i, state) in states.iter_mut().enumerate() {
                         state[n] = S::Real::constant(found.lane(i));
                     }

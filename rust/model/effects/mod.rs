@@ -210,6 +210,12 @@ pub trait Law {
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>);
 }
 
+/// An effect over one kind of number: a function of its own, not a part of each that has effects.
+#[inline(never)]
+fn enter<L: Law, S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    L::enter(p, at, slots);
+}
+
 /// The most parameters an effect of the library can have.
 const MAX_PARAMETERS: usize = 4;
 
@@ -238,10 +244,8 @@ macro_rules! library {
                 match self { $(Kind::$Name => $Name::DRY),+ }
             }
 
-            // All effects over one kind of number are one function, not a copy for each use.
-            #[inline(never)]
             fn enter<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-                match self { $(Kind::$Name => $Name::enter(p, at, slots)),+ }
+                match self { $(Kind::$Name => enter::<$Name, S>(p, at, slots)),+ }
             }
         }
     };

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{At, Body, Formula, Kind, MAX_PARAMETERS, Momentum, Slot, Slots, Treatment};
 use crate::model::{Parameter, parameter};
 use crate::scalar::Scalar;
+use crate::unroll::vector;
 
 /// Where an effect's law comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,7 +126,9 @@ impl<S: Scalar> Term<S> {
     pub fn enter<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
         slots.treatment = self.treatment;
         match &self.law {
-            Law::Library(kind, values) => kind.enter(&values.map(lift), at, slots),
+            Law::Library(kind, values) => {
+                kind.enter(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
+            }
             Law::Formula(formula, values) => formula.enter(values, lift, at, slots),
         }
     }
