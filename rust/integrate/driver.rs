@@ -40,6 +40,7 @@ pub enum Ending {
 
 impl Ending {
     /// On the first of the targets that were crossed.
+    #[inline]
     fn of(crossed: &[bool; TARGETS]) -> Self {
         match crossed.iter().position(|&crossed| crossed) {
             Some(WALL) => Ending::Wall,
@@ -204,8 +205,8 @@ where
     /// Takes the law on these sides, in these lanes.
     #[inline(always)]
     fn take_sides(&mut self, lanes: S::Mask, sides: &Sides<S>) {
-        for (own, &side) in self.at.sides.iter_mut().zip(sides) {
-            *own = choose(lanes, side, *own);
+        for j in 0..MAX_SURFACES {
+            self.at.sides[j] = choose(lanes, sides[j], self.at.sides[j]);
         }
     }
 
@@ -402,8 +403,8 @@ where
             }
             let on = self.landing.on;
             landed = self.landing.judge(value);
-            for (crossed, on) in crossed.iter_mut().zip(on) {
-                *crossed = on.and(landed.there);
+            for j in 0..TARGETS {
+                crossed[j] = on[j].and(landed.there);
             }
         }
         if crossing.any() {
@@ -412,8 +413,8 @@ where
                 let x = self.method.at(found.dt);
                 trial.x = vector!(S, D; n => S::select(crossing, x[n], trial.x[n]));
                 trial.size = S::Real::select(crossing, found.dt, trial.size);
-                for (crossed, &found) in crossed.iter_mut().zip(&found.crossing) {
-                    *crossed = crossed.or(found);
+                for j in 0..TARGETS {
+                    crossed[j] = crossed[j].or(found.crossing[j]);
                 }
                 landed.there = landed.there.or(crossing);
             } else {
@@ -451,7 +452,8 @@ where
             self.from = S::Real::select(stale, self.at.t, self.from);
             self.size = S::Real::select(stale, S::Real::zero(), self.size);
         }
-        for (target, &crossed) in crossed.iter().enumerate() {
+        for target in 0..TARGETS {
+            let crossed = crossed[target];
             let over = crossed.or(found.stale[target]);
             if !over.any() {
                 continue;

@@ -175,8 +175,8 @@ where
             found.dt = S::Real::select(first, dt, found.dt);
             found.high = S::Real::select(first, high.0, found.high);
             found.zero = S::Real::select(first, scale.scale(ZERO), found.zero);
-            for (j, crossing) in found.crossing.iter_mut().enumerate() {
-                *crossing = if j == target { first } else { crossing.and(first.not()) };
+            for j in 0..TARGETS {
+                found.crossing[j] = if j == target { first } else { found.crossing[j].and(first.not()) };
             }
         }
         for crossing in &mut found.crossing {
@@ -269,8 +269,8 @@ impl<R: Real> Landing<R> {
     /// Begins for the crossings found; `slope` is the function's on the polynomial.
     pub fn begin(&mut self, found: &Found<R>, lanes: R::Mask, slope: R) {
         let zero = R::zero();
-        for (on, &crossing) in self.on.iter_mut().zip(&found.crossing) {
-            *on = on.or(crossing.and(lanes));
+        for j in 0..TARGETS {
+            self.on[j] = self.on[j].or(found.crossing[j].and(lanes));
         }
         self.size = R::select(lanes, found.dt, self.size);
         self.low = pick(lanes, (zero, zero), self.low);

@@ -78,8 +78,8 @@ pub trait Method<S: Scalar, const D: usize> {
     #[inline(always)]
     fn along(&self, h: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; MOST_PROBES] {
         let mut states = [[S::Real::zero(); D]; MOST_PROBES];
-        for (state, &part) in states.iter_mut().zip(parts) {
-            *state = self.real_at(h.scale(part), of);
+        for i in 0..parts.len() {
+            states[i] = self.real_at(h.scale(parts[i]), of);
         }
         states
     }

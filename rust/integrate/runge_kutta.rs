@@ -185,13 +185,13 @@ where
                 continue;
             }
             let powers = vector!(S::Real, P; j => self.power(j, n, S::real));
-            for (state, &part) in states.iter_mut().zip(parts) {
-                let theta = self.theta(h.scale(part));
+            for i in 0..parts.len() {
+                let theta = self.theta(h.scale(parts[i]));
                 let mut sum = S::Real::zero();
                 for j in (0..P).rev() {
                     sum = sum * theta + powers[j];
                 }
-                state[n] = self.x[n].real() + sum * theta * self.h;
+                states[i][n] = self.x[n].real() + sum * theta * self.h;
             }
         }
         states

@@ -101,8 +101,8 @@ where
         let size = S::Real::select(moved, driver.size(), S::Real::zero());
         moments.time += size;
         let states = driver.method().along(size, &NODES, &[true; D]);
-        for (x, &weight) in states.iter().zip(&WEIGHTS) {
-            let share = size.scale(weight);
+        for i in 0..NODES.len() {
+            let (x, share) = (&states[i], size.scale(WEIGHTS[i]));
             unroll!(n in 0..D => {
                 // Lanes that did not move may hold anything.
                 let own = S::Real::select(moved, x[n], S::Real::zero()) * share;

@@ -4,6 +4,7 @@ use super::signs::{Side, Stretch, judge};
 use crate::integrate::{MOST_PROBES, Method};
 use crate::model::choose;
 use crate::scalar::{Instructions, Isa, Mask, Packet, Real, Scalar, Work};
+use crate::unroll::vector;
 
 /// The polynomials of a step, one for each component of the state, in their own unit of time.
 pub struct Polynomials<'a, R: Real, const D: usize> {
@@ -19,8 +20,8 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
     pub fn of<K: Method<R, D>>(method: &'a K, isa: Isa, own: &'a mut Room<R, D>) -> Self {
         if K::SERIES {
             let mut coefficients: [&[R]; D] = [&[]; D];
-            for (n, list) in coefficients.iter_mut().enumerate() {
-                *list = method.component(n).unwrap_or_default();
+            for n in 0..D {
+                coefficients[n] = method.component(n).unwrap_or_default();
             }
             return Self { isa, coefficients, unit: R::one() };
         }
@@ -33,8 +34,8 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
             }
         }
         let mut coefficients: [&[R]; D] = [&[]; D];
-        for (own, list) in coefficients.iter_mut().zip(&own.components) {
-            *own = list;
+        for n in 0..D {
+            coefficients[n] = &own.components[n];
         }
         Self { isa, coefficients, unit }
     }
@@ -42,11 +43,7 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
     /// The state at `s`.
     #[inline(always)]
     pub fn state(&self, s: R) -> [R; D] {
-        let mut x = [R::zero(); D];
-        for (x, c) in x.iter_mut().zip(&self.coefficients) {
-            *x = R::work(self.isa, At { c, s });
-        }
-        x
+        vector!(R, D; n => R::work(self.isa, At { c: self.coefficients[n], s }))
     }
 
     /// Looks where a component crosses a value.
@@ -129,8 +126,8 @@ impl<R: Real> Work for Signs<'_, R> {
     fn run<V: Instructions>(self) -> Side<R> {
         let Scanned { less, probes, size, end, side } = self.scan;
         let mut s = [R::zero(); MOST_PROBES];
-        for (s, &theta) in s.iter_mut().zip(probes) {
-            *s = size.scale(theta);
+        for i in 0..probes.len() {
+            s[i] = size.scale(probes[i]);
         }
         let mut values = [end; MOST_PROBES];
         if const { R::LANES == 1 } {
@@ -147,13 +144,13 @@ impl<R: Real> Work for Signs<'_, R> {
                 }
                 return side;
             }
-            for (i, value) in values.iter_mut().enumerate() {
-                *value = R::constant(found.lane(i)) - R::constant(less);
+            for i in 0..MOST_PROBES {
+                values[i] = R::constant(found.lane(i)) - R::constant(less);
             }
             values[probes.len() - 1] = end;
         } else {
-            for (value, &s) in values[..probes.len() - 1].iter_mut().zip(&s) {
-                *value = self::value(self.c, s, |c| c) - R::constant(less);
+            for i in 0..probes.len() - 1 {
+                values[i] = value(self.c, s[i], |c| c) - R::constant(less);
             }
         }
         judge(&s, &values, side, self.stretches)

@@ -56,10 +56,10 @@ where
     /// Starts a job in a lane.
     #[inline(always)]
     pub fn load(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
-        for (own, &value) in self.values.iter_mut().zip(start.values) {
-            let mut lanes = own.real();
-            lanes.set_lane(lane, value);
-            *own = S::lift(lanes);
+        for i in 0..start.values.len() {
+            let mut lanes = self.values[i].real();
+            lanes.set_lane(lane, start.values[i]);
+            self.values[i] = S::lift(lanes);
         }
         self.driver.set_system(self.family.build(&self.values), &self.values);
         let only = S::Mask::from_lanes(|i| i == lane);

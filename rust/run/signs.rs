@@ -26,11 +26,11 @@ pub struct Stretch<R: Real> {
 pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Stretch<R>]) -> Side<R> {
     let (rising, falling) = (R::mask(side.rising), R::mask(side.falling));
     let Side { mut below, mut above, moved, .. } = side;
-    for (i, stretch) in stretches.iter_mut().enumerate() {
+    for i in 0..stretches.len() {
         let value = values[i];
         let (low, high) = (value.less(R::zero()), R::zero().less(value));
         let crossing = below.and(high).and(rising).or(above.and(low).and(falling)).and(moved);
-        *stretch = Stretch { s: s[i], value, crossing };
+        stretches[i] = Stretch { s: s[i], value, crossing };
         // A zero leaves the side as it was: a surface that is only touched is not crossed. What is not a
         // number has no side.
         let sane = value.finite();

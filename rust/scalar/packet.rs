@@ -50,8 +50,8 @@ impl<const L: usize, V: Instructions> LaneMask<L, V> {
 #[inline(always)]
 fn each<const L: usize>(mut lane: impl FnMut(usize) -> f64) -> [f64; L] {
     let mut all = [0.0; L];
-    for (i, own) in all.iter_mut().enumerate() {
-        *own = lane(i);
+    for i in 0..L {
+        all[i] = lane(i);
     }
     all
 }

@@ -144,14 +144,14 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
                 if of[n] {
                     let lift = |c: S| Packet::<P, V>::new([c.real().lane(0); P]);
                     let found = value(&jets.coefficients()[n], jets.order(), places, lift);
-                    for (i, state) in states.iter_mut().enumerate() {
-                        state[n] = S::Real::constant(found.lane(i));
+                    for i in 0..P {
+                        states[i][n] = S::Real::constant(found.lane(i));
                     }
                 }
             });
         } else {
-            for (state, &part) in states.iter_mut().zip(parts) {
-                *state = jets.real_values(dt.scale(part), of);
+            for i in 0..parts.len() {
+                states[i] = jets.real_values(dt.scale(parts[i]), of);
             }
         }
         states

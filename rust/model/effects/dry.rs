@@ -46,6 +46,7 @@ pub struct Contact<S> {
 }
 
 impl<S: Scalar> Default for Contact<S> {
+    #[inline]
     fn default() -> Self {
         Self { sign: S::zero(), bristle: S::zero() }
     }
@@ -64,6 +65,7 @@ pub struct Dry<S> {
 }
 
 impl<S: Scalar> Default for Dry<S> {
+    #[inline]
     fn default() -> Self {
         Self { hold: S::zero(), band: S::zero(), grip: S::zero(), stiffness: S::zero() }
     }

@@ -62,6 +62,7 @@ pub struct Slots<S> {
 }
 
 impl<S: Scalar> Default for Slots<S> {
+    #[inline]
     fn default() -> Self {
         let zero = S::zero();
         let treatment = Treatment::Smoothed;
