@@ -66,22 +66,38 @@ pub fn initial_step<S: Scalar, const D: usize>(
     order: i32,
     tolerance: &Tolerance,
 ) -> S::Real {
-    let constant = S::Real::constant;
-    let real = |v: &[S; D]| vector!(S::Real, D; n => v[n].real());
     let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
-    let (x_real, f_real) = (real(&at.x), real(&rate));
-    let norm = |v: [S::Real; D]| tolerance.norm(v, x_real, x_real);
-    let (size, speed) = (norm(x_real), norm(f_real));
-    let small = size.less(constant(1e-5)).or(speed.less(constant(1e-5)));
-    let h0 = S::Real::select(small, constant(1e-6), size.scale(0.01) / speed);
+    let start = vector!(S::Real, D; n => at.x[n].real());
+    let slope = vector!(S::Real, D; n => rate[n].real());
+    let (h0, speed) = euler_step(&start, &slope, tolerance);
 
     let moved = vector!(S, D; n => at.x[n] + rate[n].times(h0));
-    let later = real(&system.rates(S::lift(at.t + h0), &moved, &at.sides));
-    let bend = norm(vector!(S::Real, D; n => later[n] - f_real[n])) / h0;
+    let later = system.rates(S::lift(at.t + h0), &moved, &at.sides);
+    let turned = vector!(S::Real, D; n => later[n].real() - slope[n]);
+    curved_step(&start, &turned, (h0, speed), order, tolerance)
+}
+
+/// The size of an explicit Euler step that changes the state little, and the norm of its rate.
+fn euler_step<R: Real, const D: usize>(x: &[R; D], rate: &[R; D], tolerance: &Tolerance) -> (R, R) {
+    let (size, speed) = (tolerance.norm(*x, *x, *x), tolerance.norm(*rate, *x, *x));
+    let small = size.less(R::constant(1e-5)).or(speed.less(R::constant(1e-5)));
+    (R::select(small, R::constant(1e-6), size.scale(0.01) / speed), speed)
+}
+
+/// The size of a step of this order whose curvature is known from the change of the rate over the first one.
+fn curved_step<R: Real, const D: usize>(
+    x: &[R; D],
+    change: &[R; D],
+    (h0, speed): (R, R),
+    order: i32,
+    tolerance: &Tolerance,
+) -> R {
+    let constant = R::constant;
+    let bend = tolerance.norm(*change, *x, *x) / h0;
     let steepest = speed.max(bend);
     let flat = constant(1e-15).less(steepest).not();
     let curved = ((constant(0.01) / steepest).ln().scale(1.0 / f64::from(order))).exp();
-    let h1 = S::Real::select(flat, h0.scale(1e-3).max(constant(1e-6)), curved);
+    let h1 = R::select(flat, h0.scale(1e-3).max(constant(1e-6)), curved);
     let h = h1.min(h0.scale(100.0));
-    S::Real::select(h.finite(), h, constant(1e-6))
+    R::select(h.finite(), h, constant(1e-6))
 }

@@ -99,18 +99,18 @@ where
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.system.watched());
         let mut beyond = [S::mask(false); TARGETS];
-        for target in 0..TARGETS {
-            if !self.has(target) {
-                continue;
+        // Unrolled, so that each target's function is known.
+        unroll!(target in 0..TARGETS => {
+            if self.has(target) {
+                let mut any = S::mask(false);
+                for i in 0..K::PROBES.len() {
+                    let x = vector!(S, D; n => S::lift(probes[i][n]));
+                    let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
+                    any = any.or(value.less(S::Real::zero()));
+                }
+                beyond[target] = any.and(lanes);
             }
-            let mut any = S::mask(false);
-            for i in 0..K::PROBES.len() {
-                let x = vector!(S, D; n => S::lift(probes[i][n]));
-                let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
-                any = any.or(value.less(S::Real::zero()));
-            }
-            beyond[target] = any.and(lanes);
-        }
+        });
         Look { probes, beyond }
     }
 
