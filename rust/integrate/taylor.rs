@@ -145,6 +145,8 @@ struct Attempt<'a, 'b, S: Scalar, const D: usize, E> {
 
 impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, D, E> {
     type Output = Trial<S, D>;
+    // Eight derivatives fill a register; the series of the three equations, written out, wants 32 of them.
+    const WIDE: bool = size_of::<S>() > 8 * size_of::<f64>() || D == 3 && size_of::<S>() == size_of::<f64>();
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Trial<S, D> {

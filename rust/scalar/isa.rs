@@ -51,6 +51,8 @@ impl Instructions for Avx512 {
 /// of its own is compiled for the baseline.
 pub trait Work {
     type Output;
+    /// Whether it gains from AVX-512 over single numbers, too: from its wider registers, or from their number.
+    const WIDE: bool = false;
     fn run<V: Instructions>(self) -> Self::Output;
 }
 

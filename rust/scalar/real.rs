@@ -85,7 +85,7 @@ impl Real for f64 {
 
     #[inline(always)]
     fn work<W: Work>(isa: Isa, work: W) -> W::Output {
-        isa.run_narrow(work)
+        if const { W::WIDE } { isa.run(work) } else { isa.run_narrow(work) }
     }
     #[inline(always)]
     fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> f64 {

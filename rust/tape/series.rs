@@ -55,9 +55,10 @@ pub fn inner<S: Copy, C: Coefficient<S>, const N: usize>(a: &[S; N], b: &[C; N],
     if k >= 2 && k.is_multiple_of(2) {
         even = even.with(a[k / 2], b[k / 2]);
     }
-    for i in 0..pairs {
-        even = even.with(a_low[pairs - 1 - i], b_high[i]);
-        odd = odd.with(a_high[i], b_low[pairs - 1 - i]);
+    let outwards = a_low.iter().rev().zip(b_high).zip(b_low.iter().rev().zip(a_high));
+    for ((&al, &bh), (&bl, &ah)) in outwards {
+        even = even.with(al, bh);
+        odd = odd.with(ah, bl);
     }
     even.plus(odd)
 }
@@ -81,9 +82,8 @@ pub fn half_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
 #[inline(always)]
 fn pairs<S: Scalar, const N: usize>(a: &[S; N], k: usize, mut sum: S) -> S {
     let pairs = k.saturating_sub(1) / 2;
-    let (lows, highs) = (&a[1..=pairs], &a[k - pairs..k]);
-    for i in 0..pairs {
-        sum = sum.fused(lows[pairs - 1 - i], highs[i]);
+    for (&low, &high) in a[1..=pairs].iter().rev().zip(&a[k - pairs..k]) {
+        sum = sum.fused(low, high);
     }
     sum
 }
