@@ -1,15 +1,16 @@
 //! What a change of parameters does to the states and to what is seen.
 
-use rayon::prelude::*;
-
 use super::flow::{Link, Places};
 use super::follow::{Law, Way};
 use super::rows::Rows;
 use super::{EstimateError, Estimator, Free, Point, Role, Sensor};
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
+use crate::run::parallel::in_parts;
 use crate::scalar::{Dual, Scalar};
 
+/// Blocks of rows are worked on by so many at least.
+const TOGETHER: usize = 16;
 /// In how many directions one evaluation differentiates.
 pub const WIDTH: usize = 8;
 pub(super) type Wide = Dual<f64, WIDTH>;
@@ -77,9 +78,9 @@ where
         let films = 0..point.sets.len();
         let models: Vec<_> = films.clone().map(|film| acting(&self.free, film, model)).collect();
         let clocks: Vec<_> = films.map(|film| acting(&self.free, film, clock)).collect();
-        let blocks: Vec<&mut [f64]> = rows.blocks_mut(D).collect();
-        blocks.into_par_iter().zip(flow).enumerate().filter(|(i, _)| self.record.linked[*i]).for_each(
-            |(i, (rows, link))| {
+        in_blocks(rows, D, &|i, rows| {
+            if self.record.linked[i] {
+                let link = &flow[i];
                 let film = self.record.film[i];
                 let dt = self.record.t[i + 1] - self.record.t[i];
                 for n in 0..D {
@@ -90,19 +91,19 @@ where
                     // A slower clock lets the flow run on for longer.
                     clocks[film].iter().for_each(|&(column, _)| row[column] = link.arrival[n] * dt);
                 }
-            },
-        );
+            }
+        });
         // Those that found no room beside the state go the way again.
         for Beyond { columns, laws } in self.beyond(point) {
             let slopes = self.each_link(
                 point,
                 &laws,
-                |follower, i, (_, start, end)| {
+                &|follower, i, (_, start, end)| {
                     let x = point.states[i].map(Wide::constant);
                     let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
                     Ok(last.map(|x| x.d))
                 },
-                || [[0.0; WIDTH]; D],
+                &[[0.0; WIDTH]; D],
                 Vec::new(),
             )?;
             for (i, slopes) in slopes.iter().enumerate() {
@@ -156,8 +157,7 @@ where
             values.iter().enumerate().map(|(film, values)| actors(family, film, values, free)).collect();
         let systems: Vec<F::Built<f64>> = values.iter().map(|values| family.build(values)).collect();
 
-        let seen: Vec<&mut [f64]> = columns.seen.blocks_mut(M).collect();
-        seen.into_par_iter().enumerate().for_each(|(i, rows)| {
+        in_blocks(&mut columns.seen, M, &|i, rows| {
             let film = self.record.film[i];
             let set = &point.sets[film];
             let t = match origin {
@@ -181,8 +181,10 @@ where
             }
         });
 
-        let state: Vec<&mut [f64]> = columns.state.blocks_mut(D).collect();
-        state.into_par_iter().enumerate().filter(|(i, _)| self.record.linked[*i]).for_each(|(i, rows)| {
+        in_blocks(&mut columns.state, D, &|i, rows| {
+            if !self.record.linked[i] {
+                return;
+            }
             let (film, link) = (self.record.film[i], &places[i]);
             let exact = link.switched && origin == TimeOrigin::Record;
             if exact {
@@ -237,6 +239,16 @@ where
         });
         self.sensor.observe(&camera, &x, &rate).map(|seen| seen.d)
     }
+}
+
+/// Works on all blocks of so many rows, each given its number.
+fn in_blocks(rows: &mut Rows, many: usize, work: &(dyn Fn(usize, &mut [f64]) + Sync)) {
+    let mut blocks: Vec<&mut [f64]> = rows.blocks_mut(many).collect();
+    in_parts(&mut blocks, TOGETHER, &|first, part| {
+        for (j, block) in part.iter_mut().enumerate() {
+            work(first + j, block);
+        }
+    });
 }
 
 pub(super) fn model(role: Role) -> Option<usize> {

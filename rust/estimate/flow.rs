@@ -70,7 +70,7 @@ where
     ) -> Result<Vec<Link<D>>, EstimateError> {
         let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
         let zero = SVector::zeros();
-        let none = || Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
+        let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
         let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (film, start, end): Span| {
             let x = variable(&point.states[i]);
             let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
@@ -82,16 +82,14 @@ where
                 arrival: SVector::from(arrival),
             })
         };
-        self.each_link(point, laws, one, none, room)
+        self.each_link(point, laws, &one, &none, room)
     }
 
     /// What acts on every link; all zero where frames are not linked.
     pub fn places(&self, point: &Point<D>) -> Result<Vec<Places<D>>, EstimateError> {
         let laws = self.own_laws(point);
-        let none = || {
-            let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
-            Places { switched: false, places: [place; PLACES_PER_LINK] }
-        };
+        let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
+        let none = Places { switched: false, places: [place; PLACES_PER_LINK] };
         let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (_, start, end): Span| {
             let x: [Wide; D] = variable(&point.states[i]);
             let mut met = [x; PLACES_PER_LINK];
@@ -106,7 +104,7 @@ where
             });
             Ok(Places { switched, places })
         };
-        self.each_link(point, &laws, one, none, Vec::new())
+        self.each_link(point, &laws, &one, &none, Vec::new())
     }
 }
 

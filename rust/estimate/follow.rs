@@ -2,11 +2,10 @@
 
 use std::array::from_fn;
 
-use rayon::prelude::*;
-
 use super::{EstimateError, Estimator, Point, Role, Sensor, Set};
 use crate::integrate::{Driver, Failure, Method, Taylor, Tolerance, order};
 use crate::model::{Family, System};
+use crate::run::parallel::try_in_parts;
 use crate::scalar::{Dual, Isa, Scalar};
 use crate::tape::Tape;
 
@@ -140,12 +139,12 @@ where
 
     /// What `one` makes of every link, given its number and its span; `none` for frames that are not linked. It is
     /// kept where `found` was.
-    pub(super) fn each_link<S, T: Send>(
+    pub(super) fn each_link<S, T: Clone + Send>(
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<S>, S>],
-        one: impl Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span) -> Result<T, Failure> + Sync,
-        none: impl Fn() -> T + Sync,
+        one: &(dyn Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span) -> Result<T, Failure> + Sync),
+        none: &T,
         mut found: Vec<T>,
     ) -> Result<Vec<T>, EstimateError>
     where
@@ -153,21 +152,23 @@ where
     {
         let tape = self.tape(point);
         let new = |film: usize| Follower::new(tape.as_ref(), &laws[film], &self.tolerance);
-        // The film whose links were followed last, and what followed them.
-        let each = |last: &mut Option<_>, (i, found): (usize, &mut T)| {
-            let Some(link) = self.link(point, i) else { return Ok(()) };
-            let (_, follower) = match last.take() {
-                Some((film, same)) if film == link.0 => last.insert((film, same)),
-                _ => last.insert((link.0, new(link.0))),
-            };
-            let t = self.record.t[i];
-            *found = one(follower, i, link).map_err(|source| EstimateError::Integration { t, source })?;
-            Ok(())
-        };
         found.clear();
-        found.extend(self.record.linked.iter().map(|_| none()));
-        let links = found.par_iter_mut().enumerate().with_min_len(TOGETHER);
-        links.try_for_each_init(|| None, each)?;
+        found.resize(self.record.linked.len(), none.clone());
+        try_in_parts(&mut found, TOGETHER, &|first, part| {
+            // The film whose links were followed last, and what followed them.
+            let mut last: Option<(usize, Follower<'_, _, S, D>)> = None;
+            for (j, found) in part.iter_mut().enumerate() {
+                let i = first + j;
+                let Some(link) = self.link(point, i) else { continue };
+                let (_, follower) = match last.take() {
+                    Some((film, same)) if film == link.0 => last.insert((film, same)),
+                    _ => last.insert((link.0, new(link.0))),
+                };
+                let t = self.record.t[i];
+                *found = one(follower, i, link).map_err(|source| EstimateError::Integration { t, source })?;
+            }
+            Ok(())
+        })?;
         Ok(found)
     }
 }

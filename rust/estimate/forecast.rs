@@ -1,12 +1,12 @@
 //! Forecasts: filter a window, then run free.
 
 use nalgebra::SMatrix;
-use rayon::prelude::*;
 
 use super::{EstimateError, Estimator, Options, Point, Sensor, Set};
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 use crate::run::Stop;
+use crate::run::parallel::try_map;
 
 /// What a window of frames says on its own.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,8 @@ where
         options: &Options,
         stop: &Stop,
     ) -> Result<Vec<Filtered<D>>, EstimateError> {
-        let one = |&(first, last): &(usize, usize)| {
+        try_map(windows.len(), &|i| {
+            let (first, last) = windows[i];
             let part = Self {
                 record: self.record.part(first, last),
                 free: Vec::new(),
@@ -48,8 +49,7 @@ where
                 last: solution.point.states[last - first],
                 covariance: solution.state_covariance[last - first],
             })
-        };
-        windows.par_iter().map(one).collect()
+        })
     }
 
     /// What would be seen at increasing times after each start `(film, time, state)`, by the model alone.
@@ -60,7 +60,8 @@ where
         times: &[Vec<f64>],
     ) -> Result<Vec<Vec<[f64; M]>>, EstimateError> {
         let systems: Vec<F::Built<f64>> = sets.iter().map(|set| self.family.build(&set.model)).collect();
-        let one = |(&(film, t, x), times): (&(usize, f64, [f64; D]), &Vec<f64>)| {
+        try_map(starts.len().min(times.len()), &|i| {
+            let ((film, t, x), times) = (starts[i], &times[i]);
             let (system, set) = (&systems[film], &sets[film]);
             let (mut t, mut x) = (t * set.pace(), x);
             let mut seen = Vec::with_capacity(times.len());
@@ -73,7 +74,6 @@ where
                 seen.push(self.sensor.observe(&set.camera, &x, &rate));
             }
             Ok(seen)
-        };
-        starts.par_iter().zip(times).map(one).collect()
+        })
     }
 }

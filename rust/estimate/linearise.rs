@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, SMatrix, SVector};
-use rayon::prelude::*;
 
 use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, model, rates, tagged};
 use super::flow::Link;
@@ -11,7 +10,11 @@ use super::follow::{Law, variable};
 use super::rows::Rows;
 use super::{EstimateError, Estimator, Point, Sensor};
 use crate::model::Family;
+use crate::run::parallel::in_parts;
 use crate::scalar::{Instructions, Isa, Scalar, Work};
+
+/// Frames are looked at by so many at least: each takes about a microsecond.
+const TOGETHER: usize = 16;
 
 /// A frame's residual `misfit = seen - h`, and `dh/dx`.
 #[derive(Clone, Copy, Debug)]
@@ -106,14 +109,18 @@ where
                 }
             })
             .collect();
-        let blocks: Vec<&mut [f64]> = match p {
-            0 => (0..n).map(|_| Default::default()).collect(),
-            _ => seen.blocks_mut(M).collect(),
-        };
-        sights.par_iter_mut().zip(blocks).enumerate().for_each(|(i, (sight, rows))| {
-            let film = self.record.film[i];
-            let (of, law, view) = (self, &laws[film], &views[film]);
-            Isa::best().run(Look { of, point, law, view, beyond: &beyond, i, sight, rows });
+        let mut slots: Vec<(&mut Sight<D, M>, &mut [f64])> = Vec::with_capacity(n);
+        let mut blocks = seen.blocks_mut(M);
+        for sight in sights.iter_mut() {
+            slots.push((sight, blocks.next().unwrap_or_default()));
+        }
+        in_parts(&mut slots, TOGETHER, &|first, part| {
+            for (j, (sight, rows)) in part.iter_mut().enumerate() {
+                let i = first + j;
+                let film = self.record.film[i];
+                let (of, law, view) = (self, &laws[film], &views[film]);
+                Isa::best().run(Look { of, point, law, view, beyond: &beyond, i, sight, rows });
+            }
         });
     }
 

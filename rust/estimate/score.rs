@@ -1,7 +1,6 @@
 //! The score of candidates: what each would do for the fit, without fitting it.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::bordered::Bordered;
 use super::columns::{Columns, TimeOrigin};
@@ -11,6 +10,7 @@ use super::linearise::invert;
 use super::rows::Rows;
 use super::{EstimateError, Estimator, Free, Linear, Point, Role, Sensor};
 use crate::model::Family;
+use crate::run::parallel::try_map;
 
 /// The candidates' amplitudes near zero, everything else optimal: the cost falls by
 /// `2 gradient . c - c . information c` when they take the values `c`.
@@ -89,15 +89,13 @@ where
             }
             first += size;
         }
-        let scores: Vec<Vec<Score>> = batches
-            .par_iter()
-            .map(|(first, sizes)| {
-                let own = first..&(first + sizes.iter().sum::<usize>());
-                let part = |rows: &Rows| rows.part(*own.start..*own.end);
-                let more = Columns { seen: part(&columns.seen), state: part(&columns.state) };
-                self.score_beside(point, &linear, &linear.columns.beside(&more), sizes)
-            })
-            .collect::<Result<_, EstimateError>>()?;
+        let scores = try_map(batches.len(), &|i| {
+            let (first, sizes) = &batches[i];
+            let end = first + sizes.iter().sum::<usize>();
+            let part = |rows: &Rows| rows.part(*first..end);
+            let more = Columns { seen: part(&columns.seen), state: part(&columns.state) };
+            self.score_beside(point, &linear, &linear.columns.beside(&more), sizes)
+        })?;
         Ok(scores.concat())
     }
 

@@ -3,13 +3,13 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, SMatrix};
-use rayon::prelude::*;
 
 use super::columns::{Columns, TimeOrigin};
 use super::rows::Rows;
 use super::score::Candidate;
 use super::{EstimateError, Estimator, Point, Score, Sensor};
 use crate::model::Family;
+use crate::run::parallel::try_map;
 
 /// How many frequencies are scored in one solve.
 const BATCH: usize = 12;
@@ -53,14 +53,11 @@ where
         let steps = self.record.t.windows(2).zip(&self.record.linked).filter(|(_, linked)| **linked);
         let longest = steps.map(|(pair, _)| pair[1] - pair[0]).fold(0.0, f64::max);
         let shares = shares(&probe.frequencies, longest, frequencies);
-        let batches: Vec<Vec<Score>> = frequencies
-            .par_chunks(BATCH)
-            .zip(shares.par_chunks(BATCH))
-            .map(|(frequencies, shares)| {
-                let waves = self.waves(point, &responses, frequencies, shares);
-                self.score_beside(point, &linear, &linear.columns.beside(&waves), &vec![2; frequencies.len()])
-            })
-            .collect::<Result<_, EstimateError>>()?;
+        let batches = try_map(frequencies.len().div_ceil(BATCH), &|i| {
+            let own = i * BATCH..frequencies.len().min((i + 1) * BATCH);
+            let waves = self.waves(point, &responses, &frequencies[own.clone()], &shares[own.clone()]);
+            self.score_beside(point, &linear, &linear.columns.beside(&waves), &vec![2; own.len()])
+        })?;
         Ok(batches.concat())
     }
 

@@ -23,7 +23,7 @@ where
     T: Send,
     E: Into<PyErr> + Send,
 {
-    let (result, signal) = watch(py, || Ok(()), work)?;
+    let (result, signal) = watch(py, &|| Ok(()), work)?;
     signal?;
     result.map_err(Into::into)
 }
@@ -33,9 +33,22 @@ where
 /// the work as a signal does.
 pub fn watch<T: Send>(
     py: Python<'_>,
-    tick: impl Fn() -> PyResult<()>,
+    tick: &dyn Fn() -> PyResult<()>,
     work: impl FnOnce(&Stop) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
+    let (mut work, mut result) = (Some(work), None);
+    let signal = watch_any(py, tick, &mut |stop| {
+        result = work.take().map(|work| work(stop));
+    })?;
+    Ok((result.expect("the work has ended, without a panic"), signal))
+}
+
+/// The same, whatever the work: threads are compiled once.
+fn watch_any(
+    py: Python<'_>,
+    tick: &dyn Fn() -> PyResult<()>,
+    work: &mut (dyn FnMut(&Stop) + Send),
+) -> PyResult<PyResult<()>> {
     let stop = Stop::new();
     let done = AtomicBool::new(false);
     let caller = thread::current();
@@ -57,7 +70,7 @@ pub fn watch<T: Send>(
             }
         }
         match worker.join().and_then(|inner| inner) {
-            Ok(value) => Ok((value, signal)),
+            Ok(()) => Ok(signal),
             Err(panic) => {
                 let what = message(panic.as_ref());
                 Err(PyRuntimeError::new_err(format!("internal error, please report it: {what}")))

@@ -65,7 +65,7 @@ impl<'a, 'py> Jobs<'a, 'py> {
             Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
             None => Ok(()),
         };
-        interrupt::watch(py, tick, |stop| work(Crew { threads, isa: Isa::best(), done, stop }))
+        interrupt::watch(py, &tick, |stop| work(Crew { threads, isa: Isa::best(), done, stop }))
     }
 }
 

@@ -3,9 +3,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use rayon::ThreadPoolBuilder;
-
 use super::Stop;
+use super::parallel::on_threads;
 use crate::scalar::{Instructions, Isa, LANES, Packet, Real, Work};
 
 /// Jobs numbered from 0, each taken once.
@@ -89,7 +88,7 @@ pub struct Crew<'a> {
 /// What the jobs yield, in their order; `None` for those that were not finished when the work was
 /// stopped.
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
-    spread(jobs, crew, |queue, yields| {
+    spread(jobs, crew, &|queue, yields| {
         if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
             return crew.isa.run(InPackets { fleet, queue, yields });
         }
@@ -123,7 +122,7 @@ impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
 fn spread<Y: Send>(
     jobs: usize,
     crew: Crew<'_>,
-    work: impl Fn(&Queue<'_>, &mut Yields<'_, Y>) + Sync,
+    work: &(dyn Fn(&Queue<'_>, &mut Yields<'_, Y>) + Sync),
 ) -> Vec<Option<Y>> {
     let queue = Queue { next: AtomicUsize::new(0), jobs, stop: crew.stop };
     let mut all: Vec<Option<Y>> = Vec::new();
@@ -135,17 +134,14 @@ fn spread<Y: Send>(
         work(&queue, &mut yields);
         yields.place();
     };
-    let threads = if crew.threads == 0 { rayon::current_num_threads() } else { crew.threads };
-    // One packet's worth of jobs is the least that a thread is worth.
-    let threads = threads.min(jobs.div_ceil(LANES)).max(1);
-    if threads == 1 {
-        watch();
-    } else {
-        match ThreadPoolBuilder::new().num_threads(threads).build() {
-            Ok(pool) => drop(pool.broadcast(|_| watch())),
-            // No threads to be had: the caller's own will do.
-            Err(_) => watch(),
-        }
-    }
+    let threads = threads(jobs, crew.threads);
+    on_threads(threads, &watch);
     all.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// How many threads so many jobs are worth, where so many are wanted.
+fn threads(jobs: usize, wanted: usize) -> usize {
+    let threads = if wanted == 0 { rayon::current_num_threads() } else { wanted };
+    // One packet's worth of jobs is the least that a thread is worth.
+    threads.min(jobs.div_ceil(LANES)).max(1)
 }

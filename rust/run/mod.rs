@@ -9,6 +9,7 @@ mod frame;
 mod frames;
 mod lyapunov;
 mod moments;
+pub mod parallel;
 mod polynomial;
 mod recipe;
 pub mod rows;

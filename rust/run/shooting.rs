@@ -2,12 +2,11 @@
 
 use std::array::from_fn;
 
-use rayon::prelude::*;
-
 use super::Stop;
+use super::parallel::try_map;
 use crate::integrate::{Dop853, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
 use crate::model::{Family, System};
-use crate::scalar::{Dual, Isa, Scalar};
+use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
 
 /// So many parameters can be differentiated by at once.
@@ -62,7 +61,7 @@ pub fn pieces<F: Family<D>, const D: usize>(
     let width = pieces.first().map_or(0, |piece| piece.values.len());
     let known: Vec<_> = (0..width).map(|p| all(p).then_some(0.0)).collect();
     let tape = Tape::record(family, &known).ok();
-    pieces.par_iter().map(|piece| one(family, piece, wanted, (tape.as_ref(), tolerance), stop)).collect()
+    try_map(pieces.len(), &|i| one(family, &pieces[i], wanted, (tape.as_ref(), tolerance), stop))
 }
 
 fn one<F: Family<D>, const D: usize>(
@@ -72,7 +71,7 @@ fn one<F: Family<D>, const D: usize>(
     (tape, tolerance): (Option<&Tape<D>>, &Tolerance),
     stop: &Stop,
 ) -> Result<Flown<D>, Failure> {
-    let mut values: Vec<Number> = piece.values.iter().map(|&value| Dual::constant(value)).collect();
+    let mut values: Vec<Number> = constants(&piece.values);
     for (i, &p) in wanted.iter().enumerate() {
         values[p] = Dual::variable(piece.values[p], D + i);
     }

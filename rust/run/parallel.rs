@@ -1,0 +1,117 @@
+//! Work on all cores. What threads need is compiled once, whatever they work on; where a result is kept does
+//! not depend on who made it, nor on when.
+
+use std::convert::Infallible;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+
+/// Parts for each thread: not all take equally long.
+const PARTS: usize = 8;
+
+/// Runs the work on so many threads at once.
+pub fn on_threads(threads: usize, work: &(dyn Fn() + Sync)) {
+    if threads <= 1 {
+        return work();
+    }
+    match ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => drop(pool.broadcast(|_| work())),
+        // No threads to be had: the caller's own will do.
+        Err(_) => work(),
+    }
+}
+
+fn each_index(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().for_each(work);
+}
+
+/// Works on a list in parts of at least so many in a row, given the number of a part's first.
+pub fn in_parts<T: Send>(list: &mut [T], least: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    let done = try_in_parts(list, least, &|first, part| -> Result<(), Infallible> {
+        work(first, part);
+        Ok(())
+    });
+    let Ok(()) = done;
+}
+
+/// The same for work that can fail.
+///
+/// # Errors
+/// That of the first part that fails, which is to be that of the first in it.
+pub fn try_in_parts<T: Send, E: Send>(
+    list: &mut [T],
+    least: usize,
+    work: &(dyn Fn(usize, &mut [T]) -> Result<(), E> + Sync),
+) -> Result<(), E> {
+    let size = list.len().div_ceil(PARTS * rayon::current_num_threads()).max(least).max(1);
+    let mut parts = Vec::with_capacity(list.len().div_ceil(size));
+    for part in list.chunks_mut(size) {
+        parts.push(Mutex::new(part));
+    }
+    let failed: Mutex<Option<(usize, E)>> = Mutex::new(None);
+    let sooner = |k: usize, failed: &Option<(usize, E)>| matches!(failed, Some((first, _)) if *first < k);
+    each_index(parts.len(), &|k| {
+        // Locks are there to hand a part over: nobody else wants it.
+        let Ok(mut part) = parts[k].lock() else { return };
+        if sooner(k, &failed.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return;
+        }
+        if let Err(error) = work(k * size, &mut part) {
+            let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
+            if !sooner(k, &failed) {
+                *failed = Some((k, error));
+            }
+        }
+    });
+    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some((_, error)) => Err(error),
+        None => Ok(()),
+    }
+}
+
+/// What is made of the numbers below `count`, in their order.
+///
+/// # Errors
+/// That of the first that fails.
+pub fn try_map<T: Send, E: Send>(
+    count: usize,
+    one: &(dyn Fn(usize) -> Result<T, E> + Sync),
+) -> Result<Vec<T>, E> {
+    let mut slots: Vec<Option<T>> = Vec::with_capacity(count);
+    slots.resize_with(count, || None);
+    try_in_parts(&mut slots, 1, &|first, part| {
+        for (j, slot) in part.iter_mut().enumerate() {
+            *slot = Some(one(first + j)?);
+        }
+        Ok(())
+    })?;
+    let mut all = Vec::with_capacity(count);
+    for slot in slots {
+        all.push(slot.expect("none failed"));
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_has_its_place_and_the_first_error_counts() {
+        for count in [0, 1, 7, 1000] {
+            let squares: Result<Vec<usize>, ()> = try_map(count, &|i| Ok(i * i));
+            assert_eq!(squares, Ok((0..count).map(|i| i * i).collect()));
+        }
+        for _ in 0..20 {
+            let odd = |i: usize| if i > 100 && i % 2 == 1 { Err(i) } else { Ok(()) };
+            assert_eq!(try_map(1000, &odd), Err(101));
+        }
+        let mut list = vec![0; 1000];
+        in_parts(&mut list, 64, &|first, part| {
+            assert!(part.len() >= 64 || first + part.len() == 1000);
+            part.iter_mut().enumerate().for_each(|(j, own)| *own += first + j);
+        });
+        assert!(list.iter().enumerate().all(|(i, &own)| i == own));
+    }
+}
