@@ -1,13 +1,12 @@
 //! The model's flow from each frame to the next, and how it responds to what is added on the way.
 
-use std::array::from_fn;
-
 use nalgebra::{SMatrix, SVector};
 
 use super::columns::{WIDTH, Wide};
 use super::follow::{Follower, Law, Span, Way, variable};
 use super::{EstimateError, Estimator, Point, Sensor};
 use crate::model::{Family, System, sides_of};
+use crate::unroll::vector;
 
 /// Places within a link, as parts of its time, and their weights (Gauss-Legendre).
 const PLACES: [f64; PLACES_PER_LINK] = [0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7];
@@ -68,19 +67,21 @@ where
         laws: &[Law<F::Built<Wide>, Wide>],
         room: Vec<Link<D>>,
     ) -> Result<Vec<Link<D>>, EstimateError> {
-        let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
+        let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, &|_, values| values.to_vec());
         let zero = SVector::zeros();
         let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
         let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (film, start, end): Span| {
             let x = variable(&point.states[i]);
             let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
-            let (system, there) = (&plain[film].system, last.map(|x| x.re));
+            let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
             let arrival = system.rates(end, &there, &sides_of(system, end, &there));
-            Ok(Link {
-                defect: SVector::from_fn(|k, _| point.states[i + 1][k] - there[k]),
-                slopes: last.map(|x| x.d),
-                arrival: SVector::from(arrival),
-            })
+            let mut link = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
+            for k in 0..D {
+                link.defect[k] = point.states[i + 1][k] - there[k];
+                link.slopes[k] = last[k].d;
+                link.arrival[k] = arrival[k];
+            }
+            Ok(link)
         };
         self.each_link(point, laws, &one, &none, room)
     }
@@ -95,13 +96,15 @@ where
             let mut met = [x; PLACES_PER_LINK];
             let (last, switched) = follower.follow(Way { start, end, x, places: &PLACES, met: &mut met })?;
             let a = by_state(&last);
-            let places = from_fn(|q| {
+            let mut places = [place; PLACES_PER_LINK];
+            for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
                 let here = by_state(&met[q]).try_inverse().unwrap_or_else(SMatrix::zeros);
                 let response = a * here * (WEIGHTS[q] * (end - start));
-                Place { since, t: start + since, state: met[q].map(|x| x.re), response }
-            });
+                let state = vector!(f64, D; k => met[q][k].re);
+                places[q] = Place { since, t: start + since, state, response };
+            }
             Ok(Places { switched, places })
         };
         self.each_link(point, &laws, &one, &none, Vec::new())
@@ -110,5 +113,11 @@ where
 
 /// The derivatives of a state by the one it started from, as a matrix.
 fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
-    SMatrix::from_fn(|m, k| x[m].d[k])
+    let mut matrix = SMatrix::zeros();
+    for m in 0..D {
+        for k in 0..D {
+            matrix[(m, k)] = x[m].d[k];
+        }
+    }
+    matrix
 }

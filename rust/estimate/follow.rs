@@ -1,13 +1,12 @@
 //! Links followed one after the other.
 
-use std::array::from_fn;
-
-use super::{EstimateError, Estimator, Point, Role, Sensor, Set};
+use super::{EstimateError, Estimator, Point, Role, Sensor};
 use crate::integrate::{Driver, Failure, Method, Taylor, Tolerance, order};
 use crate::model::{Family, System};
 use crate::run::parallel::try_in_parts;
 use crate::scalar::{Dual, Isa, Scalar};
 use crate::tape::Tape;
+use crate::unroll::vector;
 
 /// A link takes a few steps; where a fit's numbers have gone astray, as near a formula's pole, it would take
 /// very many, and the fit had better turn back at once.
@@ -113,13 +112,14 @@ where
     pub(super) fn laws<S: Scalar>(
         &self,
         point: &Point<D>,
-        lifted: impl Fn(usize, &[f64]) -> Vec<S>,
+        lifted: &dyn Fn(usize, &[f64]) -> Vec<S>,
     ) -> Vec<Law<F::Built<S>, S>> {
-        let one = |(film, set): (usize, &Set)| {
+        let mut laws = Vec::with_capacity(point.sets.len());
+        for (film, set) in point.sets.iter().enumerate() {
             let values = lifted(film, &set.model);
-            Law { system: self.family.build(&values), values }
-        };
-        point.sets.iter().enumerate().map(one).collect()
+            laws.push(Law { system: self.family.build(&values), values });
+        }
+        laws
     }
 
     /// The film, start and end of link `i` in the model's time, where its frames are linked.
@@ -174,7 +174,8 @@ where
 }
 
 /// A state whose numbers are differentiated by its components, in the first directions.
+#[inline(always)]
 pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D]) -> [Dual<f64, N>; D] {
     const { assert!(D <= N) };
-    from_fn(|k| Dual::variable(x[k], k))
+    vector!(Dual<f64, N>, D; k => Dual::variable(x[k], k))
 }
