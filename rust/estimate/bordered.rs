@@ -1,6 +1,6 @@
 //! Block-tridiagonal normal equations with borders.
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 
 use super::rows::{Rows, Squares, add, combine, dot, padded};
 use super::{Columns, EstimateError, Linear, Record};
@@ -88,13 +88,14 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
         let width = padded(p + 1);
         for (matrices, count) in [(&mut system.diagonal, n), (&mut system.below, n - 1)] {
             matrices.clear();
-            matrices.resize(count, SMatrix::zeros());
+            matrices.resize(count, zeros());
         }
         system.border.become_zeros(n * D, width);
         system.corner.become_zeros(p + 1, width);
         let mut squares = Squares::new(width, 1.0);
         // Misfits in units of their noise, of this frame and of the one before.
-        let (mut now, mut before) = (Whitened::<D, M>::new(width), Whitened::<D, M>::new(width));
+        let (mut one, mut other) = (Whitened::<D, M>::new(width), Whitened::<D, M>::new(width));
+        let (mut now, mut before) = (&mut one, &mut other);
         let mut rows = Rows::zeros(M.max(D), width);
         for i in 0..n {
             std::mem::swap(&mut now, &mut before);
@@ -170,6 +171,12 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
     }
 }
 
+/// A small matrix of zeros, made where it is wanted.
+#[inline(always)]
+pub(super) fn zeros<const R: usize, const C: usize>() -> SMatrix<f64, R, C> {
+    SMatrix::from_array_storage(ArrayStorage([[0.0; R]; C]))
+}
+
 /// Adds the products of all lists `a` with all lists `b` to a matrix.
 #[inline(always)]
 fn add_products<const D: usize, const K: usize>(
@@ -198,7 +205,7 @@ struct Whitened<const D: usize, const M: usize> {
 
 impl<const D: usize, const M: usize> Whitened<D, M> {
     fn new(width: usize) -> Self {
-        Self { there: [false; M], h: [SVector::zeros(); M], columns: Rows::zeros(M, width) }
+        Self { there: [false; M], h: [zeros(); M], columns: Rows::zeros(M, width) }
     }
 
     #[inline(always)]
@@ -209,7 +216,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
             self.there[m] = root[(m, m)] != 0.0;
             let row = self.columns.row_mut(m);
             row.fill(0.0);
-            let mut h: SVector<f64, D> = SVector::zeros();
+            let mut h: SVector<f64, D> = zeros();
             for c in m..M {
                 let weight = root[(m, c)];
                 if weight == 0.0 {
@@ -230,7 +237,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
 #[inline(always)]
 pub(super) fn root<const M: usize>(information: &SMatrix<f64, M, M>) -> SMatrix<f64, M, M> {
     let mut rest = *information;
-    let mut root = SMatrix::zeros();
+    let mut root = zeros();
     for m in 0..M {
         if rest[(m, m)] <= 1e-12 * information[(m, m)] {
             continue;
@@ -317,7 +324,7 @@ impl<const D: usize> Work for Elimination<'_, D> {
 /// `a b^T`
 #[inline(always)]
 fn times_transposed<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let mut product = SMatrix::zeros();
+    let mut product = zeros();
     for r in 0..D {
         for c in 0..D {
             product[(r, c)] = row_product(a, r, b, c);
@@ -369,9 +376,9 @@ impl<const D: usize> Eliminated<D> {
     /// The change of the states that goes with a change of the parameters.
     pub fn states(&self, parameters: &DVector<f64>) -> Vec<SVector<f64, D>> {
         let (n, p) = (self.pivots.len(), parameters.len());
-        let mut change: Vec<SVector<f64, D>> = vec![SVector::zeros(); n];
+        let mut change: Vec<SVector<f64, D>> = vec![zeros(); n];
         for i in (0..n).rev() {
-            let mut x: SVector<f64, D> = SVector::zeros();
+            let mut x: SVector<f64, D> = zeros();
             for k in 0..D {
                 let row = self.solved.row(D * i + k);
                 x[k] = row[p] - dot(&row[..p], parameters.as_slice());
@@ -457,7 +464,7 @@ impl<const D: usize, const M: usize> Work for SeenVariance<'_, D, M> {
     fn run<V: Instructions>(self) -> Self::Output {
         let Uncertain { root, conditional, shifts } = self.of;
         let mut moved = vec![0.0; root.width()];
-        let mut variances: Vec<SVector<f64, M>> = vec![SVector::zeros(); conditional.len()];
+        let mut variances: Vec<SVector<f64, M>> = vec![zeros(); conditional.len()];
         for i in 0..variances.len() {
             let h = &self.linear.sights[i].h;
             for m in 0..M {
@@ -492,14 +499,14 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
     fn run<V: Instructions>(self) -> Self::Output {
         let Eliminated { pivots, links, solved, .. } = self.of;
         let (n, width) = (pivots.len(), self.root.width());
-        let (mut states, mut shifts) = (vec![SMatrix::zeros(); n], Rows::zeros(n * D, width));
-        let mut conditional: SMatrix<f64, D, D> = SMatrix::zeros();
+        let (mut states, mut shifts) = (vec![zeros(); n], Rows::zeros(n * D, width));
+        let mut conditional: SMatrix<f64, D, D> = zeros();
         let (mut alone, mut factors) = (Rows::zeros(D, width), vec![0.0; self.root.count()]);
         for i in (0..n).rev() {
             // The inverse of the pivot, and with it what this frame takes from the next.
             let inverse = lower_inverse(&pivots[i]);
             let linked = i + 1 < n;
-            let taken = if linked { links[i] * inverse } else { SMatrix::zeros() };
+            let taken = if linked { links[i] * inverse } else { zeros() };
             conditional = inverse.tr_mul(&inverse) + taken.tr_mul(&(conditional * taken));
             let (own, next) = shifts.numbers_mut()[D * i * width..].split_at_mut(D * width);
             for j in 0..D {
@@ -528,7 +535,7 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
 /// The inverse of a lower triangular matrix.
 #[inline(always)]
 fn lower_inverse<const D: usize>(lower: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let mut inverse = SMatrix::zeros();
+    let mut inverse = zeros();
     for c in 0..D {
         for r in c..D {
             let mut known = -0.0;

@@ -108,14 +108,13 @@ where
             let slopes = self.each_link(
                 point,
                 &laws,
-                &|follower, i, (_, start, end)| {
+                &|follower, i, (_, start, end), slopes: &mut [[f64; WIDTH]; D]| {
                     let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
                     let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
-                    let mut slopes = [[0.0; WIDTH]; D];
                     for k in 0..D {
                         slopes[k] = last[k].d;
                     }
-                    Ok(slopes)
+                    Ok(())
                 },
                 &[[0.0; WIDTH]; D],
                 Vec::new(),

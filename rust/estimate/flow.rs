@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::bordered::zeros;
 use super::columns::{WIDTH, Wide};
 use super::follow::{Follower, Law, Span, Way, variable};
 use super::{EstimateError, Estimator, Point, Sensor};
@@ -68,20 +69,22 @@ where
         room: Vec<Link<D>>,
     ) -> Result<Vec<Link<D>>, EstimateError> {
         let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, &|_, values| values.to_vec());
-        let zero = SVector::zeros();
+        let zero = zeros();
         let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
-        let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (film, start, end): Span| {
+        let one = |follower: &mut Follower<'_, _, Wide, D>,
+                   i: usize,
+                   (film, start, end): Span,
+                   link: &mut Link<D>| {
             let x = variable(&point.states[i]);
             let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
             let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
             let arrival = system.rates(end, &there, &sides_of(system, end, &there));
-            let mut link = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
             for k in 0..D {
                 link.defect[k] = point.states[i + 1][k] - there[k];
                 link.slopes[k] = last[k].d;
                 link.arrival[k] = arrival[k];
             }
-            Ok(link)
+            Ok(())
         };
         self.each_link(point, laws, &one, &none, room)
     }
@@ -89,23 +92,26 @@ where
     /// What acts on every link; all zero where frames are not linked.
     pub fn places(&self, point: &Point<D>) -> Result<Vec<Places<D>>, EstimateError> {
         let laws = self.own_laws(point);
-        let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
+        let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = Places { switched: false, places: [place; PLACES_PER_LINK] };
-        let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (_, start, end): Span| {
+        let one = |follower: &mut Follower<'_, _, Wide, D>,
+                   i: usize,
+                   (_, start, end): Span,
+                   found: &mut Places<D>| {
             let x: [Wide; D] = variable(&point.states[i]);
             let mut met = [x; PLACES_PER_LINK];
             let (last, switched) = follower.follow(Way { start, end, x, places: &PLACES, met: &mut met })?;
             let a = by_state(&last);
-            let mut places = [place; PLACES_PER_LINK];
+            found.switched = switched;
             for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
-                let here = by_state(&met[q]).try_inverse().unwrap_or_else(SMatrix::zeros);
+                let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
                 let response = a * here * (WEIGHTS[q] * (end - start));
                 let state = vector!(f64, D; k => met[q][k].re);
-                places[q] = Place { since, t: start + since, state, response };
+                found.places[q] = Place { since, t: start + since, state, response };
             }
-            Ok(Places { switched, places })
+            Ok(())
         };
         self.each_link(point, &laws, &one, &none, Vec::new())
     }
@@ -113,7 +119,7 @@ where
 
 /// The derivatives of a state by the one it started from, as a matrix.
 fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
-    let mut matrix = SMatrix::zeros();
+    let mut matrix = zeros();
     for m in 0..D {
         for k in 0..D {
             matrix[(m, k)] = x[m].d[k];

@@ -137,13 +137,15 @@ where
         Tape::record(&self.family, &known).ok()
     }
 
-    /// What `one` makes of every link, given its number and its span; `none` for frames that are not linked. It is
-    /// kept where `found` was.
-    pub(super) fn each_link<S, T: Clone + Send>(
+    /// What `one` makes of every link, given its number, its span and where to keep it; `none` for frames that are
+    /// not linked. It is kept where `found` was.
+    pub(super) fn each_link<S, T: Clone + Send + Sync>(
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<S>, S>],
-        one: &(dyn Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span) -> Result<T, Failure> + Sync),
+        one: &(
+             dyn Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync
+         ),
         none: &T,
         mut found: Vec<T>,
     ) -> Result<Vec<T>, EstimateError>
@@ -152,20 +154,22 @@ where
     {
         let tape = self.tape(point);
         let new = |film: usize| Follower::new(tape.as_ref(), &laws[film], &self.tolerance);
-        found.clear();
         found.resize(self.record.linked.len(), none.clone());
         try_in_parts(&mut found, TOGETHER, &|first, part| {
             // The film whose links were followed last, and what followed them.
             let mut last: Option<(usize, Follower<'_, _, S, D>)> = None;
             for (j, found) in part.iter_mut().enumerate() {
                 let i = first + j;
-                let Some(link) = self.link(point, i) else { continue };
+                let Some(link) = self.link(point, i) else {
+                    *found = none.clone();
+                    continue;
+                };
                 let (_, follower) = match last.take() {
                     Some((film, same)) if film == link.0 => last.insert((film, same)),
                     _ => last.insert((link.0, new(link.0))),
                 };
                 let t = self.record.t[i];
-                *found = one(follower, i, link).map_err(|source| EstimateError::Integration { t, source })?;
+                one(follower, i, link, found).map_err(|source| EstimateError::Integration { t, source })?;
             }
             Ok(())
         })?;

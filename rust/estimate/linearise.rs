@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 
+use super::bordered::zeros;
 use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, columns_of, model, rates, tagged};
 use super::flow::Link;
 use super::follow::{Law, variable};
@@ -101,8 +102,8 @@ where
     ) {
         let (n, p) = (self.record.t.len(), self.free.len());
         seen.become_zeros(n * M, p);
-        sights.clear();
-        sights.resize(n, Sight { misfit: SVector::zeros(), h: SMatrix::zeros() });
+        // All are filled anew.
+        sights.resize(n, Sight { misfit: zeros(), h: zeros() });
         let beyond = self.beyond(point);
         let views = views(&point.sets, &self.free);
         let mut slots: Vec<(&mut Sight<D, M>, &mut [f64])> = Vec::with_capacity(n);
@@ -123,7 +124,7 @@ where
     /// What was seen in frame `i` less what should have been.
     #[inline(always)]
     fn misfit(&self, i: usize, expected: &[f64; M]) -> SVector<f64, M> {
-        let mut misfit = SVector::zeros();
+        let mut misfit: SVector<f64, M> = zeros();
         for m in 0..M {
             let difference = self.record.seen[i][m] - expected[m];
             misfit[m] = if self.sensor.is_angle(m) { wrap(difference) } else { difference };
