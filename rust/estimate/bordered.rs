@@ -1,12 +1,11 @@
 //! Block-tridiagonal normal equations with borders.
 
-use std::array::from_fn;
-
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 
 use super::rows::{Rows, Squares, add, combine, dot, padded};
 use super::{Columns, EstimateError, Linear, Record};
 use crate::scalar::{Instructions, Isa, Work};
+use crate::unroll::vector;
 
 /// The normal equations of the least squares. The right-hand side is the last column of the borders, and of
 /// the corner: it takes part in all that the parameters' columns do.
@@ -89,13 +88,14 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
         let width = padded(p + 1);
         for (matrices, count) in [(&mut system.diagonal, n), (&mut system.below, n - 1)] {
             matrices.clear();
-            matrices.resize(count, SMatrix::zeros());
+            matrices.resize(count, zeros());
         }
         system.border.become_zeros(n * D, width);
         system.corner.become_zeros(p + 1, width);
         let mut squares = Squares::new(width, 1.0);
         // Misfits in units of their noise, of this frame and of the one before.
-        let (mut now, mut before) = (Whitened::<D, M>::new(width), Whitened::<D, M>::new(width));
+        let (mut one, mut other) = (Whitened::<D, M>::new(width), Whitened::<D, M>::new(width));
+        let (mut now, mut before) = (&mut one, &mut other);
         let mut rows = Rows::zeros(M.max(D), width);
         for i in 0..n {
             std::mem::swap(&mut now, &mut before);
@@ -112,12 +112,16 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                 let memory = record.remembered(i, m, before.there[m]);
                 let scale = (1.0 - memory * memory).sqrt().recip();
                 add(row, scale, now.columns.row(m));
-                (0..D).for_each(|k| h[k][m] = now.h[m][k] * scale);
+                for k in 0..D {
+                    h[k][m] = now.h[m][k] * scale;
+                }
                 if memory != 0.0 {
                     remembered = true;
                     let back = -memory * scale;
                     add(row, back, before.columns.row(m));
-                    (0..D).for_each(|k| h_back[k][m] = before.h[m][k] * back);
+                    for k in 0..D {
+                        h_back[k][m] = before.h[m][k] * back;
+                    }
                 }
                 squares.push(row, &mut system.corner);
             }
@@ -134,14 +138,18 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                 }
             }
         }
-        for i in (0..n - 1).filter(|&i| record.linked[i]) {
+        for i in 0..n - 1 {
+            if !record.linked[i] {
+                continue;
+            }
             let link = &linear.flow[i];
             let mut a = [[0.0; D]; D];
             for k in 0..D {
                 // w (x_{i+1} - a x_i - b theta) = -w defect
                 let (w, row) = (precision[i][k].sqrt(), rows.row_mut(k));
-                for (to, &value) in row.iter_mut().zip(columns.state.row(D * i + k)) {
-                    *to = -w * value;
+                let slopes = columns.state.row(D * i + k);
+                for j in 0..p {
+                    row[j] = -w * slopes[j];
                 }
                 row[p] = -w * link.defect[k];
                 row[p + 1..].fill(0.0);
@@ -163,6 +171,12 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
     }
 }
 
+/// A small matrix of zeros, made where it is wanted.
+#[inline(always)]
+pub(super) fn zeros<const R: usize, const C: usize>() -> SMatrix<f64, R, C> {
+    SMatrix::from_array_storage(ArrayStorage([[0.0; R]; C]))
+}
+
 /// Adds the products of all lists `a` with all lists `b` to a matrix.
 #[inline(always)]
 fn add_products<const D: usize, const K: usize>(
@@ -172,7 +186,11 @@ fn add_products<const D: usize, const K: usize>(
 ) {
     for c in 0..D {
         for r in 0..D {
-            to[(r, c)] += (0..K).map(|k| a[r][k] * b[c][k]).sum::<f64>();
+            let mut sum = -0.0;
+            for k in 0..K {
+                sum += a[r][k] * b[c][k];
+            }
+            to[(r, c)] += sum;
         }
     }
 }
@@ -187,7 +205,7 @@ struct Whitened<const D: usize, const M: usize> {
 
 impl<const D: usize, const M: usize> Whitened<D, M> {
     fn new(width: usize) -> Self {
-        Self { there: [false; M], h: [SVector::zeros(); M], columns: Rows::zeros(M, width) }
+        Self { there: [false; M], h: [zeros(); M], columns: Rows::zeros(M, width) }
     }
 
     #[inline(always)]
@@ -198,13 +216,15 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
             self.there[m] = root[(m, m)] != 0.0;
             let row = self.columns.row_mut(m);
             row.fill(0.0);
-            let mut h = SVector::zeros();
+            let mut h: SVector<f64, D> = zeros();
             for c in m..M {
                 let weight = root[(m, c)];
                 if weight == 0.0 {
                     continue;
                 }
-                (0..D).for_each(|k| h[k] += sight.h[(c, k)] * weight);
+                for k in 0..D {
+                    h[k] += sight.h[(c, k)] * weight;
+                }
                 add(&mut row[..p], weight, columns.seen.row(M * i + c));
                 row[p] += weight * sight.misfit[c];
             }
@@ -217,7 +237,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
 #[inline(always)]
 pub(super) fn root<const M: usize>(information: &SMatrix<f64, M, M>) -> SMatrix<f64, M, M> {
     let mut rest = *information;
-    let mut root = SMatrix::zeros();
+    let mut root = zeros();
     for m in 0..M {
         if rest[(m, m)] <= 1e-12 * information[(m, m)] {
             continue;
@@ -226,8 +246,10 @@ pub(super) fn root<const M: usize>(information: &SMatrix<f64, M, M>) -> SMatrix<
         for c in m..M {
             root[(m, c)] = rest[(m, c)] / own;
         }
-        for (r, c) in (m..M).flat_map(|r| (m..M).map(move |c| (r, c))) {
-            rest[(r, c)] -= root[(m, r)] * root[(m, c)];
+        for r in m..M {
+            for c in m..M {
+                rest[(r, c)] -= root[(m, r)] * root[(m, c)];
+            }
         }
     }
     root
@@ -253,28 +275,35 @@ impl<const D: usize> Work for Elimination<'_, D> {
             let mut pivot = pivots[i];
             if i > 0 {
                 let link = &links[i - 1];
-                for (r, c) in (0..D).flat_map(|r| (r..D).map(move |c| (r, c))) {
-                    pivot[(r, c)] -= (0..D).map(|k| link[(r, k)] * link[(c, k)]).sum::<f64>();
+                for r in 0..D {
+                    for c in r..D {
+                        pivot[(r, c)] -= row_product(link, r, link, c);
+                    }
                 }
             }
             let pivot = root(&pivot).transpose();
-            if (0..D).any(|k| pivot[(k, k)].is_nan() || pivot[(k, k)] <= 0.0) {
-                return Err(EstimateError::Singular { t: self.t[i] });
+            let mut product = 1.0;
+            for k in 0..D {
+                if pivot[(k, k)].is_nan() || pivot[(k, k)] <= 0.0 {
+                    return Err(EstimateError::Singular { t: self.t[i] });
+                }
+                product *= pivot[(k, k)];
             }
-            log_determinant += 2.0 * (0..D).map(|k| pivot[(k, k)]).product::<f64>().ln();
+            log_determinant += 2.0 * f64::ln(product);
             let inverse = lower_inverse(&pivot);
             // The border less what the frame before says of it, in units of the pivot.
             let (before, own) = solved.numbers_mut().split_at_mut(D * i * width);
             let (before, own) = (&before[before.len().saturating_sub(D * width)..], &mut own[..D * width]);
             if i > 0 {
-                for (k, row) in own.chunks_exact_mut(width).enumerate() {
-                    let factors: [f64; D] = from_fn(|j| -links[i - 1][(k, j)]);
-                    combine(row, &factors, before);
+                for k in 0..D {
+                    let factors = vector!(f64, D; j => -links[i - 1][(k, j)]);
+                    combine(&mut own[k * width..(k + 1) * width], &factors, before);
                 }
             }
             rest.copy_from_slice(own);
-            for (k, row) in own.chunks_exact_mut(width).enumerate() {
-                let factors: [f64; D] = from_fn(|j| inverse[(k, j)]);
+            for k in 0..D {
+                let row = &mut own[k * width..(k + 1) * width];
+                let factors = vector!(f64, D; j => inverse[(k, j)]);
                 row.fill(0.0);
                 combine(row, &factors[..=k], &rest);
                 squares.push(row, &mut corner);
@@ -295,11 +324,23 @@ impl<const D: usize> Work for Elimination<'_, D> {
 /// `a b^T`
 #[inline(always)]
 fn times_transposed<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let mut product = SMatrix::zeros();
-    for (r, c) in (0..D).flat_map(|r| (0..D).map(move |c| (r, c))) {
-        product[(r, c)] = (0..D).map(|k| a[(r, k)] * b[(c, k)]).sum();
+    let mut product = zeros();
+    for r in 0..D {
+        for c in 0..D {
+            product[(r, c)] = row_product(a, r, b, c);
+        }
     }
     product
+}
+
+/// The product of two matrices' rows.
+#[inline(always)]
+fn row_product<const D: usize>(a: &SMatrix<f64, D, D>, r: usize, b: &SMatrix<f64, D, D>, c: usize) -> f64 {
+    let mut sum = -0.0;
+    for k in 0..D {
+        sum += a[(r, k)] * b[(c, k)];
+    }
+    sum
 }
 
 /// The normal equations after the states were eliminated.
@@ -335,12 +376,13 @@ impl<const D: usize> Eliminated<D> {
     /// The change of the states that goes with a change of the parameters.
     pub fn states(&self, parameters: &DVector<f64>) -> Vec<SVector<f64, D>> {
         let (n, p) = (self.pivots.len(), parameters.len());
-        let mut change: Vec<SVector<f64, D>> = vec![SVector::zeros(); n];
+        let mut change: Vec<SVector<f64, D>> = vec![zeros(); n];
         for i in (0..n).rev() {
-            let mut x = SVector::from_fn(|k, _| {
+            let mut x: SVector<f64, D> = zeros();
+            for k in 0..D {
                 let row = self.solved.row(D * i + k);
-                row[p] - dot(&row[..p], parameters.as_slice())
-            });
+                x[k] = row[p] - dot(&row[..p], parameters.as_slice());
+            }
             if i + 1 < n {
                 x -= self.links[i].transpose() * change[i + 1];
             }
@@ -355,7 +397,11 @@ impl<const D: usize> Eliminated<D> {
         let mut root = Rows::zeros(n, width);
         if let Some(lower) = nalgebra::Cholesky::new(parameters.clone()) {
             let lower = lower.l();
-            (0..n).for_each(|j| (0..=j).for_each(|c| root.row_mut(j)[c] = lower[(j, c)]));
+            for j in 0..n {
+                for c in 0..=j {
+                    root.row_mut(j)[c] = lower[(j, c)];
+                }
+            }
         }
         Isa::best().run(StateCovariance { of: self, root })
     }
@@ -392,15 +438,17 @@ impl<const D: usize> Work for FullCovariance<'_, D> {
     #[inline(always)]
     fn run<V: Instructions>(self) -> Self::Output {
         let Uncertain { conditional, shifts, .. } = self.0;
-        let one = |(i, own): (usize, &SMatrix<f64, D, D>)| {
-            let mut all = *own;
-            for (r, c) in (0..D).flat_map(|r| (r..D).map(move |c| (r, c))) {
-                all[(r, c)] += dot(shifts.row(D * i + r), shifts.row(D * i + c));
-                all[(c, r)] = all[(r, c)];
+        let mut covariance = conditional.clone();
+        for i in 0..covariance.len() {
+            let all = &mut covariance[i];
+            for r in 0..D {
+                for c in r..D {
+                    all[(r, c)] += dot(shifts.row(D * i + r), shifts.row(D * i + c));
+                    all[(c, r)] = all[(r, c)];
+                }
             }
-            all
-        };
-        conditional.iter().enumerate().map(one).collect()
+        }
+        covariance
     }
 }
 
@@ -416,17 +464,23 @@ impl<const D: usize, const M: usize> Work for SeenVariance<'_, D, M> {
     fn run<V: Instructions>(self) -> Self::Output {
         let Uncertain { root, conditional, shifts } = self.of;
         let mut moved = vec![0.0; root.width()];
-        let mut variances = vec![SVector::zeros(); conditional.len()];
-        for (i, variance) in variances.iter_mut().enumerate() {
+        let mut variances: Vec<SVector<f64, M>> = vec![zeros(); conditional.len()];
+        for i in 0..variances.len() {
             let h = &self.linear.sights[i].h;
             for m in 0..M {
                 moved.fill(0.0);
-                let by_state: [f64; D] = from_fn(|k| h[(m, k)]);
+                let by_state = vector!(f64, D; k => h[(m, k)]);
                 combine(&mut moved, &by_state, &shifts.numbers()[D * i * shifts.width()..]);
                 combine(&mut moved, self.linear.columns.seen.row(M * i + m), root.numbers());
-                let known = (0..D)
-                    .map(|k| by_state[k] * (0..D).map(|j| conditional[i][(k, j)] * by_state[j]).sum::<f64>());
-                variance[m] = known.sum::<f64>() + dot(&moved, &moved);
+                let mut known = -0.0;
+                for k in 0..D {
+                    let mut along = -0.0;
+                    for j in 0..D {
+                        along += conditional[i][(k, j)] * by_state[j];
+                    }
+                    known += by_state[k] * along;
+                }
+                variances[i][m] = known + dot(&moved, &moved);
             }
         }
         variances
@@ -445,27 +499,31 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
     fn run<V: Instructions>(self) -> Self::Output {
         let Eliminated { pivots, links, solved, .. } = self.of;
         let (n, width) = (pivots.len(), self.root.width());
-        let (mut states, mut shifts) = (vec![SMatrix::zeros(); n], Rows::zeros(n * D, width));
-        let mut conditional: SMatrix<f64, D, D> = SMatrix::zeros();
+        let (mut states, mut shifts) = (vec![zeros(); n], Rows::zeros(n * D, width));
+        let mut conditional: SMatrix<f64, D, D> = zeros();
         let (mut alone, mut factors) = (Rows::zeros(D, width), vec![0.0; self.root.count()]);
         for i in (0..n).rev() {
             // The inverse of the pivot, and with it what this frame takes from the next.
             let inverse = lower_inverse(&pivots[i]);
             let linked = i + 1 < n;
-            let taken = if linked { links[i] * inverse } else { SMatrix::zeros() };
+            let taken = if linked { links[i] * inverse } else { zeros() };
             conditional = inverse.tr_mul(&inverse) + taken.tr_mul(&(conditional * taken));
             let (own, next) = shifts.numbers_mut()[D * i * width..].split_at_mut(D * width);
             for j in 0..D {
                 // More of a parameter takes from the state what it explains.
-                factors.iter_mut().zip(solved.row(D * i + j)).for_each(|(to, value)| *to = -value);
+                let explained = solved.row(D * i + j);
+                for c in 0..factors.len() {
+                    factors[c] = -explained[c];
+                }
                 let row = alone.row_mut(j);
                 row.fill(0.0);
                 combine(row, &factors, self.root.numbers());
             }
-            for (k, row) in own.chunks_exact_mut(width).enumerate() {
-                combine(row, &from_fn::<_, D, _>(|j| inverse[(j, k)]), alone.numbers());
+            for k in 0..D {
+                let row = &mut own[k * width..(k + 1) * width];
+                combine(row, &vector!(f64, D; j => inverse[(j, k)]), alone.numbers());
                 if linked {
-                    combine(row, &from_fn::<_, D, _>(|j| -taken[(j, k)]), next);
+                    combine(row, &vector!(f64, D; j => -taken[(j, k)]), next);
                 }
             }
             states[i] = conditional;
@@ -477,10 +535,13 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
 /// The inverse of a lower triangular matrix.
 #[inline(always)]
 fn lower_inverse<const D: usize>(lower: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let mut inverse = SMatrix::zeros();
+    let mut inverse = zeros();
     for c in 0..D {
         for r in c..D {
-            let known: f64 = (c..r).map(|k| lower[(r, k)] * inverse[(k, c)]).sum();
+            let mut known = -0.0;
+            for k in c..r {
+                known += lower[(r, k)] * inverse[(k, c)];
+            }
             inverse[(r, c)] = (if r == c { 1.0 } else { 0.0 } - known) / lower[(r, r)];
         }
     }

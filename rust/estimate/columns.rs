@@ -1,13 +1,14 @@
 //! What a change of parameters does to the states and to what is seen.
 
 use super::flow::{Link, Places};
-use super::follow::{Law, Way};
+use super::follow::{Law, Way, variable};
 use super::rows::Rows;
 use super::{EstimateError, Estimator, Free, Point, Role, Sensor};
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 use crate::run::parallel::in_parts;
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::{Dual, Scalar, constants};
+use crate::unroll::vector;
 
 /// Blocks of rows are worked on by so many at least.
 const TOGETHER: usize = 16;
@@ -45,11 +46,18 @@ pub(super) struct Beyond<B> {
     pub laws: Vec<Law<B, Wide>>,
 }
 
-/// Values of which those with these numbers are differentiated by, from direction `first` on.
-pub(super) fn tagged(values: &[f64], numbers: impl Iterator<Item = usize>, first: usize) -> Vec<Wide> {
-    let mut wide: Vec<Wide> = values.iter().map(|&v| Wide::constant(v)).collect();
-    numbers.enumerate().for_each(|(k, number)| wide[number] = Wide::variable(values[number], first + k));
+/// Values of which those with the numbers of [`acting`] parameters are differentiated by, from direction `first` on.
+pub(super) fn tagged(values: &[f64], own: &[(usize, usize)], first: usize) -> Vec<Wide> {
+    let mut wide: Vec<Wide> = constants(values);
+    for (k, &(_, number)) in own.iter().enumerate() {
+        wide[number] = Wide::variable(values[number], first + k);
+    }
     wide
+}
+
+/// Their columns.
+pub(super) fn columns_of(own: &[(usize, usize)]) -> Vec<usize> {
+    own.iter().map(|&(column, _)| column).collect()
 }
 
 /// A system whose numbers know their derivatives by some parameters, and those parameters' columns.
@@ -85,11 +93,13 @@ where
                 let dt = self.record.t[i + 1] - self.record.t[i];
                 for n in 0..D {
                     let row = &mut rows[n * p..(n + 1) * p];
-                    for (&(column, _), slope) in models[film].iter().zip(&link.slopes[n][D..]) {
-                        row[column] = *slope;
+                    for k in 0..models[film].len().min(WIDTH - D) {
+                        row[models[film][k].0] = link.slopes[n][D + k];
                     }
                     // A slower clock lets the flow run on for longer.
-                    clocks[film].iter().for_each(|&(column, _)| row[column] = link.arrival[n] * dt);
+                    for &(column, _) in &clocks[film] {
+                        row[column] = link.arrival[n] * dt;
+                    }
                 }
             }
         });
@@ -98,17 +108,22 @@ where
             let slopes = self.each_link(
                 point,
                 &laws,
-                &|follower, i, (_, start, end)| {
-                    let x = point.states[i].map(Wide::constant);
+                &|follower, i, (_, start, end), slopes: &mut [[f64; WIDTH]; D]| {
+                    let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
                     let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
-                    Ok(last.map(|x| x.d))
+                    for k in 0..D {
+                        slopes[k] = last[k].d;
+                    }
+                    Ok(())
                 },
                 &[[0.0; WIDTH]; D],
                 Vec::new(),
             )?;
             for (i, slopes) in slopes.iter().enumerate() {
                 for (k, &column) in columns[self.record.film[i]].iter().enumerate() {
-                    (0..D).for_each(|n| rows.row_mut(D * i + n)[column] = slopes[n][k]);
+                    for n in 0..D {
+                        rows.row_mut(D * i + n)[column] = slopes[n][k];
+                    }
                 }
             }
         }
@@ -119,8 +134,10 @@ where
     /// the film's free parameters.
     pub(super) fn own_laws(&self, point: &Point<D>) -> Vec<Law<F::Built<Wide>, Wide>> {
         const { assert!(D < WIDTH) };
-        let first = |film| acting(&self.free, film, model).into_iter().take(WIDTH - D);
-        self.laws(point, |film, values| tagged(values, first(film).map(|(_, number)| number), D))
+        self.laws(point, &|film, values| {
+            let own = acting(&self.free, film, model);
+            tagged(values, &own[..own.len().min(WIDTH - D)], D)
+        })
     }
 
     /// The laws over numbers that are differentiated by the free parameters that find no room there.
@@ -128,14 +145,23 @@ where
         let films = 0..point.sets.len();
         let models: Vec<_> = films.map(|film| acting(&self.free, film, model)).collect();
         let most = models.iter().map(Vec::len).max().unwrap_or(0);
-        let chunk = |first: usize| {
-            let own = |film: usize| models[film].iter().skip(first).take(WIDTH);
-            let columns = (0..models.len()).map(|film| own(film).map(|&(column, _)| column).collect());
-            let numbers = |film| own(film).map(|&(_, number)| number);
-            let laws = self.laws(point, |film, values| tagged(values, numbers(film), 0));
-            Beyond { columns: columns.collect(), laws }
-        };
-        (WIDTH - D..most).step_by(WIDTH).map(chunk).collect()
+        let (mut all, mut first) = (Vec::new(), WIDTH - D);
+        while first < most {
+            let mut own = Vec::new();
+            for model in &models {
+                own.push(&model[first.min(model.len())..model.len().min(first + WIDTH)]);
+            }
+            let mut columns = Vec::new();
+            for own in &own {
+                columns.push(columns_of(own));
+            }
+            all.push(Beyond {
+                columns,
+                laws: self.laws(point, &|film, values| tagged(values, own[film], 0)),
+            });
+            first += WIDTH;
+        }
+        all
     }
 
     /// The columns of parameters that may belong to another family of models, to which each film's values are
@@ -168,14 +194,19 @@ where
             let rate = systems[film].rates(t, x, &sides_of(&systems[film], t, x));
             // The parameters of the model are seen through the rate, by a camera that looks at it.
             let by_rate = self.seen_by_rate(&set.camera, x, &rate);
-            if by_rate.iter().flatten().all(|&v| v == 0.0) {
+            if by_rate.as_flattened().iter().all(|&v| v == 0.0) {
                 return;
             }
             for actor in &actors[film] {
-                let rates = rates(&actor.system, Wide::constant(t), &x.map(Wide::constant));
+                let x = vector!(Wide, D; k => Wide::constant(x[k]));
+                let rates = rates(&actor.system, Wide::constant(t), &x);
                 for (k, &column) in actor.columns.iter().enumerate() {
                     for m in 0..M {
-                        rows[m * p + column] += (0..D).map(|n| by_rate[m][n] * rates[n].d[k]).sum::<f64>();
+                        let mut moved = -0.0;
+                        for n in 0..D {
+                            moved += by_rate[m][n] * rates[n].d[k];
+                        }
+                        rows[m * p + column] += moved;
                     }
                 }
             }
@@ -189,20 +220,25 @@ where
             let exact = link.switched && origin == TimeOrigin::Record;
             if exact {
                 for actor in &actors[film] {
-                    self.along(point, i, &actor.system, |n, end| {
-                        for (k, &column) in actor.columns.iter().enumerate() {
-                            rows[n * p + column] = end.d[k];
-                        }
-                    });
-                }
-            }
-            for place in link.places.iter().filter(|_| !exact) {
-                let t = if origin == TimeOrigin::Record { place.t } else { place.since };
-                for actor in &actors[film] {
-                    let rates = rates(&actor.system, Wide::constant(t), &place.state.map(Wide::constant));
+                    let Some(end) = self.along(point, i, &actor.system) else { continue };
                     for (k, &column) in actor.columns.iter().enumerate() {
                         for n in 0..D {
-                            let moved: f64 = (0..D).map(|m| place.response[(n, m)] * rates[m].d[k]).sum();
+                            rows[n * p + column] = end[n].d[k];
+                        }
+                    }
+                }
+            }
+            for place in if exact { &[] } else { &link.places[..] } {
+                let t = if origin == TimeOrigin::Record { place.t } else { place.since };
+                for actor in &actors[film] {
+                    let x = vector!(Wide, D; k => Wide::constant(place.state[k]));
+                    let rates = rates(&actor.system, Wide::constant(t), &x);
+                    for (k, &column) in actor.columns.iter().enumerate() {
+                        for n in 0..D {
+                            let mut moved = -0.0;
+                            for m in 0..D {
+                                moved += place.response[(n, m)] * rates[m].d[k];
+                            }
                             rows[n * p + column] += moved;
                         }
                     }
@@ -212,32 +248,24 @@ where
         columns
     }
 
-    /// Follows link `i` with its parameters' derivatives, to take each component of its end.
-    fn along(
-        &self,
-        point: &Point<D>,
-        i: usize,
-        system: &impl System<Wide, D>,
-        mut take: impl FnMut(usize, Wide),
-    ) {
-        let Some((_, start, end)) = self.link(point, i) else { return };
-        let x = point.states[i].map(Wide::constant);
+    /// The end of link `i`, followed with its parameters' derivatives.
+    fn along(&self, point: &Point<D>, i: usize, system: &impl System<Wide, D>) -> Option<[Wide; D]> {
+        let (_, start, end) = self.link(point, i)?;
+        let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
         // The flow went this way already.
-        if let Ok(there) = propagate(system, start, end, x, &self.tolerance) {
-            (0..D).for_each(|n| take(n, there[n]));
-        }
+        propagate(system, start, end, x, &self.tolerance).ok()
     }
 
     /// The derivatives of what is seen by the state's rate.
     fn seen_by_rate(&self, camera: &[f64], x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
-        let camera: Vec<Dual<f64, D>> = camera.iter().map(|&v| Dual::constant(v)).collect();
-        let x = x.map(Dual::constant);
-        let mut k = 0;
-        let rate = rate.map(|v| {
-            k += 1;
-            Dual::variable(v, k - 1)
-        });
-        self.sensor.observe(&camera, &x, &rate).map(|seen| seen.d)
+        let camera: Vec<Dual<f64, D>> = constants(camera);
+        let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
+        let seen = self.sensor.observe(&camera, &x, &variable(rate));
+        let mut slopes = [[0.0; D]; M];
+        for m in 0..M {
+            slopes[m] = seen[m].d;
+        }
+        slopes
     }
 }
 
@@ -278,10 +306,7 @@ fn actors<F: Family<D>, const D: usize>(
 ) -> Vec<Actor<F::Built<Wide>>> {
     acting(free, film, model)
         .chunks(WIDTH)
-        .map(|chunk| {
-            let wide = tagged(values, chunk.iter().map(|&(_, number)| number), 0);
-            Actor { system: family.build(&wide), columns: chunk.iter().map(|&(column, _)| column).collect() }
-        })
+        .map(|chunk| Actor { system: family.build(&tagged(values, chunk, 0)), columns: columns_of(chunk) })
         .collect()
 }
 

@@ -14,7 +14,11 @@ where
     pub(super) fn misfit_cost(&self, misfit: &[SVector<f64, M>]) -> f64 {
         let record = &self.record;
         if record.memory == [0.0; M] {
-            return misfit.iter().zip(&record.information).map(|(e, own)| e.dot(&(own * e))).sum();
+            let mut cost = -0.0;
+            for i in 0..misfit.len() {
+                cost += misfit[i].dot(&(record.information[i] * misfit[i]));
+            }
+            return cost;
         }
         let mut cost = 0.0;
         let mut before = ([false; M], SVector::<f64, M>::zeros());

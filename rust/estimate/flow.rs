@@ -1,13 +1,13 @@
 //! The model's flow from each frame to the next, and how it responds to what is added on the way.
 
-use std::array::from_fn;
-
 use nalgebra::{SMatrix, SVector};
 
+use super::bordered::zeros;
 use super::columns::{WIDTH, Wide};
 use super::follow::{Follower, Law, Span, Way, variable};
 use super::{EstimateError, Estimator, Point, Sensor};
 use crate::model::{Family, System, sides_of};
+use crate::unroll::vector;
 
 /// Places within a link, as parts of its time, and their weights (Gauss-Legendre).
 const PLACES: [f64; PLACES_PER_LINK] = [0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7];
@@ -68,19 +68,23 @@ where
         laws: &[Law<F::Built<Wide>, Wide>],
         room: Vec<Link<D>>,
     ) -> Result<Vec<Link<D>>, EstimateError> {
-        let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, |_, values| values.to_vec());
-        let zero = SVector::zeros();
+        let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, &|_, values| values.to_vec());
+        let zero = zeros();
         let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
-        let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (film, start, end): Span| {
+        let one = |follower: &mut Follower<'_, _, Wide, D>,
+                   i: usize,
+                   (film, start, end): Span,
+                   link: &mut Link<D>| {
             let x = variable(&point.states[i]);
             let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
-            let (system, there) = (&plain[film].system, last.map(|x| x.re));
+            let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
             let arrival = system.rates(end, &there, &sides_of(system, end, &there));
-            Ok(Link {
-                defect: SVector::from_fn(|k, _| point.states[i + 1][k] - there[k]),
-                slopes: last.map(|x| x.d),
-                arrival: SVector::from(arrival),
-            })
+            for k in 0..D {
+                link.defect[k] = point.states[i + 1][k] - there[k];
+                link.slopes[k] = last[k].d;
+                link.arrival[k] = arrival[k];
+            }
+            Ok(())
         };
         self.each_link(point, laws, &one, &none, room)
     }
@@ -88,21 +92,26 @@ where
     /// What acts on every link; all zero where frames are not linked.
     pub fn places(&self, point: &Point<D>) -> Result<Vec<Places<D>>, EstimateError> {
         let laws = self.own_laws(point);
-        let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: SMatrix::zeros() };
+        let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = Places { switched: false, places: [place; PLACES_PER_LINK] };
-        let one = |follower: &mut Follower<'_, _, Wide, D>, i: usize, (_, start, end): Span| {
+        let one = |follower: &mut Follower<'_, _, Wide, D>,
+                   i: usize,
+                   (_, start, end): Span,
+                   found: &mut Places<D>| {
             let x: [Wide; D] = variable(&point.states[i]);
             let mut met = [x; PLACES_PER_LINK];
             let (last, switched) = follower.follow(Way { start, end, x, places: &PLACES, met: &mut met })?;
             let a = by_state(&last);
-            let places = from_fn(|q| {
+            found.switched = switched;
+            for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
-                let here = by_state(&met[q]).try_inverse().unwrap_or_else(SMatrix::zeros);
+                let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
                 let response = a * here * (WEIGHTS[q] * (end - start));
-                Place { since, t: start + since, state: met[q].map(|x| x.re), response }
-            });
-            Ok(Places { switched, places })
+                let state = vector!(f64, D; k => met[q][k].re);
+                found.places[q] = Place { since, t: start + since, state, response };
+            }
+            Ok(())
         };
         self.each_link(point, &laws, &one, &none, Vec::new())
     }
@@ -110,5 +119,11 @@ where
 
 /// The derivatives of a state by the one it started from, as a matrix.
 fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
-    SMatrix::from_fn(|m, k| x[m].d[k])
+    let mut matrix = zeros();
+    for m in 0..D {
+        for k in 0..D {
+            matrix[(m, k)] = x[m].d[k];
+        }
+    }
+    matrix
 }

@@ -1,13 +1,12 @@
 //! Links followed one after the other.
 
-use std::array::from_fn;
-
-use super::{EstimateError, Estimator, Point, Role, Sensor, Set};
+use super::{EstimateError, Estimator, Point, Role, Sensor};
 use crate::integrate::{Driver, Failure, Method, Taylor, Tolerance, order};
 use crate::model::{Family, System};
 use crate::run::parallel::try_in_parts;
 use crate::scalar::{Dual, Isa, Scalar};
 use crate::tape::Tape;
+use crate::unroll::vector;
 
 /// A link takes a few steps; where a fit's numbers have gone astray, as near a formula's pole, it would take
 /// very many, and the fit had better turn back at once.
@@ -113,13 +112,14 @@ where
     pub(super) fn laws<S: Scalar>(
         &self,
         point: &Point<D>,
-        lifted: impl Fn(usize, &[f64]) -> Vec<S>,
+        lifted: &dyn Fn(usize, &[f64]) -> Vec<S>,
     ) -> Vec<Law<F::Built<S>, S>> {
-        let one = |(film, set): (usize, &Set)| {
+        let mut laws = Vec::with_capacity(point.sets.len());
+        for (film, set) in point.sets.iter().enumerate() {
             let values = lifted(film, &set.model);
-            Law { system: self.family.build(&values), values }
-        };
-        point.sets.iter().enumerate().map(one).collect()
+            laws.push(Law { system: self.family.build(&values), values });
+        }
+        laws
     }
 
     /// The film, start and end of link `i` in the model's time, where its frames are linked.
@@ -137,13 +137,15 @@ where
         Tape::record(&self.family, &known).ok()
     }
 
-    /// What `one` makes of every link, given its number and its span; `none` for frames that are not linked. It is
-    /// kept where `found` was.
-    pub(super) fn each_link<S, T: Clone + Send>(
+    /// What `one` makes of every link, given its number, its span and where to keep it; `none` for frames that are
+    /// not linked. It is kept where `found` was.
+    pub(super) fn each_link<S, T: Clone + Send + Sync>(
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<S>, S>],
-        one: &(dyn Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span) -> Result<T, Failure> + Sync),
+        one: &(
+             dyn Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync
+         ),
         none: &T,
         mut found: Vec<T>,
     ) -> Result<Vec<T>, EstimateError>
@@ -152,20 +154,22 @@ where
     {
         let tape = self.tape(point);
         let new = |film: usize| Follower::new(tape.as_ref(), &laws[film], &self.tolerance);
-        found.clear();
         found.resize(self.record.linked.len(), none.clone());
         try_in_parts(&mut found, TOGETHER, &|first, part| {
             // The film whose links were followed last, and what followed them.
             let mut last: Option<(usize, Follower<'_, _, S, D>)> = None;
             for (j, found) in part.iter_mut().enumerate() {
                 let i = first + j;
-                let Some(link) = self.link(point, i) else { continue };
+                let Some(link) = self.link(point, i) else {
+                    *found = none.clone();
+                    continue;
+                };
                 let (_, follower) = match last.take() {
                     Some((film, same)) if film == link.0 => last.insert((film, same)),
                     _ => last.insert((link.0, new(link.0))),
                 };
                 let t = self.record.t[i];
-                *found = one(follower, i, link).map_err(|source| EstimateError::Integration { t, source })?;
+                one(follower, i, link, found).map_err(|source| EstimateError::Integration { t, source })?;
             }
             Ok(())
         })?;
@@ -174,7 +178,8 @@ where
 }
 
 /// A state whose numbers are differentiated by its components, in the first directions.
+#[inline(always)]
 pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D]) -> [Dual<f64, N>; D] {
     const { assert!(D <= N) };
-    from_fn(|k| Dual::variable(x[k], k))
+    vector!(Dual<f64, N>, D; k => Dual::variable(x[k], k))
 }

@@ -95,16 +95,24 @@ where
 {
     /// The inverse variance of the model's error over each link.
     pub fn precision(&self) -> Vec<SVector<f64, D>> {
-        let steps = self.record.t.windows(2).map(|pair| pair[1] - pair[0]);
-        steps.map(|dt| SVector::from_fn(|k, _| (self.diffusion[k].powi(2) * dt).recip())).collect()
+        let t = &self.record.t;
+        let mut all: Vec<SVector<f64, D>> = vec![SVector::zeros(); t.len().saturating_sub(1)];
+        for i in 0..all.len() {
+            for k in 0..D {
+                all[i][k] = (self.diffusion[k].powi(2) * (t[i + 1] - t[i])).recip();
+            }
+        }
+        all
     }
 
     /// The cost at a point around which the record is linearised.
     fn cost(&self, point: &Point<D>, linear: &Linear<D, M>) -> Cost {
         let mut cost = Cost { misfit: self.misfit_cost(&linear.misfits()), ..Cost::default() };
-        for ((link, q), &linked) in linear.flow.iter().zip(&self.precision()).zip(&self.record.linked) {
-            if linked {
-                cost.defect += link.defect.component_mul(&link.defect).dot(q);
+        let precision = self.precision();
+        for i in 0..linear.flow.len() {
+            if self.record.linked[i] {
+                let defect = &linear.flow[i].defect;
+                cost.defect += defect.component_mul(defect).dot(&precision[i]);
             }
         }
         for free in &self.free {
@@ -217,9 +225,9 @@ where
     /// A point moved by a part of a step.
     fn moved(&self, point: &Point<D>, step: &Step<D>, length: f64) -> Point<D> {
         let mut moved = point.clone();
-        for (x, change) in moved.states.iter_mut().zip(&step.states) {
+        for i in 0..moved.states.len() {
             for k in 0..D {
-                x[k] += length * change[k];
+                moved.states[i][k] += length * step.states[i][k];
             }
         }
         for (free, &change) in self.free.iter().zip(step.parameters.iter()) {

@@ -4,14 +4,16 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 
-use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, model, rates, tagged};
+use super::bordered::zeros;
+use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, columns_of, model, rates, tagged};
 use super::flow::Link;
 use super::follow::{Law, variable};
 use super::rows::Rows;
-use super::{EstimateError, Estimator, Point, Sensor};
+use super::{EstimateError, Estimator, Free, Point, Sensor, Set};
 use crate::model::Family;
 use crate::run::parallel::in_parts;
-use crate::scalar::{Instructions, Isa, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Scalar, Work, constants};
+use crate::unroll::vector;
 
 /// Frames are looked at by so many at least: each takes about a microsecond.
 const TOGETHER: usize = 16;
@@ -41,12 +43,20 @@ pub struct Known<const D: usize, const M: usize> {
 impl<const D: usize, const M: usize> Linear<D, M> {
     /// The residuals of what was seen.
     pub fn misfits(&self) -> Vec<SVector<f64, M>> {
-        self.sights.iter().map(|sight| sight.misfit).collect()
+        let mut all = Vec::with_capacity(self.sights.len());
+        for sight in &self.sights {
+            all.push(sight.misfit);
+        }
+        all
     }
 
     /// The residuals of the links.
     pub fn defects(&self) -> Vec<SVector<f64, D>> {
-        self.flow.iter().map(|link| link.defect).collect()
+        let mut all = Vec::with_capacity(self.flow.len());
+        for link in &self.flow {
+            all.push(link.defect);
+        }
+        all
     }
 }
 
@@ -92,23 +102,10 @@ where
     ) {
         let (n, p) = (self.record.t.len(), self.free.len());
         seen.become_zeros(n * M, p);
-        sights.clear();
-        sights.resize(n, Sight { misfit: SVector::zeros(), h: SMatrix::zeros() });
+        // All are filled anew.
+        sights.resize(n, Sight { misfit: zeros(), h: zeros() });
         let beyond = self.beyond(point);
-        let views: Vec<View> = (0..laws.len())
-            .map(|film| {
-                let values = &point.sets[film].camera;
-                let chunk = |own: &[(usize, usize)]| {
-                    let camera = tagged(values, own.iter().map(|&(_, number)| number), 0);
-                    (camera, own.iter().map(|&(column, _)| column).collect())
-                };
-                View {
-                    plain: tagged(values, [].into_iter(), 0),
-                    model: acting(&self.free, film, model).into_iter().map(|(column, _)| column).collect(),
-                    tagged: acting(&self.free, film, camera).chunks(WIDTH).map(chunk).collect(),
-                }
-            })
-            .collect();
+        let views = views(&point.sets, &self.free);
         let mut slots: Vec<(&mut Sight<D, M>, &mut [f64])> = Vec::with_capacity(n);
         let mut blocks = seen.blocks_mut(M);
         for sight in sights.iter_mut() {
@@ -127,10 +124,12 @@ where
     /// What was seen in frame `i` less what should have been.
     #[inline(always)]
     fn misfit(&self, i: usize, expected: &[f64; M]) -> SVector<f64, M> {
-        SVector::from_fn(|m, _| {
+        let mut misfit: SVector<f64, M> = zeros();
+        for m in 0..M {
             let difference = self.record.seen[i][m] - expected[m];
-            if self.sensor.is_angle(m) { wrap(difference) } else { difference }
-        })
+            misfit[m] = if self.sensor.is_angle(m) { wrap(difference) } else { difference };
+        }
+        misfit
     }
 }
 
@@ -141,6 +140,18 @@ struct View {
     model: Vec<usize>,
     /// The camera differentiated by its free parameters, some at a time, with their columns.
     tagged: Vec<(Vec<Wide>, Vec<usize>)>,
+}
+
+fn views(sets: &[Set], free: &[Free]) -> Vec<View> {
+    let one = |(film, set): (usize, &Set)| {
+        let tagged = |own: &[_]| (tagged(&set.camera, own, 0), columns_of(own));
+        View {
+            plain: constants(&set.camera),
+            model: columns_of(&acting(free, film, model)),
+            tagged: acting(free, film, camera).chunks(WIDTH).map(tagged).collect(),
+        }
+    };
+    sets.iter().enumerate().map(one).collect()
 }
 
 /// One frame's share of a linearisation.
@@ -168,9 +179,14 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
         // The parameters of the model are seen through the rate, by a camera that looks at it.
         let seen = sensor.observe(&view.plain, &x, &rate);
         fill(rows, p, &seen, D, &view.model);
-        sight.misfit = self.of.misfit(i, &seen.map(|s| s.re));
-        sight.h = SMatrix::from_fn(|m, k| seen[m].d[k]);
-        let (x, rate) = (state.map(Wide::constant), rate.map(|rate| Wide::constant(rate.re)));
+        sight.misfit = self.of.misfit(i, &vector!(f64, M; m => seen[m].re));
+        for m in 0..M {
+            for k in 0..D {
+                sight.h[(m, k)] = seen[m].d[k];
+            }
+        }
+        let x = vector!(Wide, D; k => Wide::constant(state[k]));
+        let rate = vector!(Wide, D; k => Wide::constant(rate[k].re));
         for (camera, columns) in &view.tagged {
             fill(rows, p, &sensor.observe(camera, &x, &rate), 0, columns);
         }
@@ -184,9 +200,10 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
 /// Takes the derivatives from direction `first` on over to the columns of `p`.
 #[inline(always)]
 fn fill<const M: usize>(rows: &mut [f64], p: usize, seen: &[Wide; M], first: usize, columns: &[usize]) {
-    for (m, seen) in seen.iter().enumerate() {
-        for (&column, slope) in columns.iter().zip(&seen.d[first..]) {
-            rows[m * p + column] = *slope;
+    for m in 0..M {
+        // Those that find no room beside the state are told of elsewhere.
+        for k in 0..columns.len().min(WIDTH - first) {
+            rows[m * p + columns[k]] = seen[m].d[first + k];
         }
     }
 }

@@ -128,29 +128,33 @@ impl Squares {
     pub fn flush(&mut self, sum: &mut Rows) {
         let (width, count) = (sum.width(), sum.count());
         let rows = &self.rows.numbers[..self.collected * width];
-        for first in (0..count).step_by(TOGETHER) {
+        for first in 0..count.div_ceil(TOGETHER) {
+            let first = first * TOGETHER;
             let many = TOGETHER.min(count - first);
-            for start in (first / CHUNK * CHUNK..width).step_by(CHUNK) {
+            for start in first / CHUNK..width.div_ceil(CHUNK) {
+                let start = start * CHUNK;
                 if many == TOGETHER && start + CHUNK <= width {
                     let mut sums = [[0.0; CHUNK]; TOGETHER];
-                    for row in rows.chunks_exact(width) {
+                    for i in 0..self.collected {
+                        let row = &rows[i * width..(i + 1) * width];
                         let factors: &[f64; TOGETHER] = row[first..].first_chunk().expect("rows of the sum");
                         let chunk: &[f64; CHUNK] = row[start..].first_chunk().expect("a whole chunk");
-                        for (sum, factor) in sums.iter_mut().zip(factors) {
-                            for (to, value) in sum.iter_mut().zip(chunk) {
-                                *to += factor * value;
+                        for j in 0..TOGETHER {
+                            for k in 0..CHUNK {
+                                sums[j][k] += factors[j] * chunk[k];
                             }
                         }
                     }
-                    for (j, own) in sums.iter().enumerate() {
-                        add(&mut sum.row_mut(first + j)[start..start + CHUNK], self.sign, own);
+                    for j in 0..TOGETHER {
+                        add(&mut sum.row_mut(first + j)[start..start + CHUNK], self.sign, &sums[j]);
                     }
                     continue;
                 }
                 for j in first..first + many {
                     let end = width.min(start + CHUNK);
                     let to = &mut sum.numbers[j * width..][start..end];
-                    for row in rows.chunks_exact(width) {
+                    for i in 0..self.collected {
+                        let row = &rows[i * width..(i + 1) * width];
                         add(to, self.sign * row[j], &row[start..end]);
                     }
                 }
@@ -165,33 +169,45 @@ impl Squares {
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<CHUNK>(), b.as_chunks::<CHUNK>());
     let mut sums = [0.0; CHUNK];
-    for (a, b) in a.iter().zip(b) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
+    for c in 0..a.len() {
+        for k in 0..CHUNK {
+            sums[k] += a[c][k] * b[c][k];
         }
     }
-    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+    let (mut whole, mut rest) = (-0.0, -0.0);
+    for k in 0..CHUNK {
+        whole += sums[k];
+    }
+    for k in 0..a_rest.len() {
+        rest += a_rest[k] * b_rest[k];
+    }
+    whole + rest
 }
 
 /// Adds multiples of rows that lie one after the other, each as wide as `to`.
 #[inline(always)]
 pub(super) fn combine(to: &mut [f64], factors: &[f64], rows: &[f64]) {
     let width = to.len();
+    let count = factors.len().min(rows.len() / width);
     let (chunks, rest) = to.as_chunks_mut::<CHUNK>();
-    for (c, to) in chunks.iter_mut().enumerate() {
-        let mut sum = *to;
-        for (factor, row) in factors.iter().zip(rows.chunks_exact(width)) {
-            let row: &[f64; CHUNK] = row[c * CHUNK..].first_chunk().expect("as wide");
-            for (sum, value) in sum.iter_mut().zip(row) {
-                *sum += factor * value;
+    for c in 0..chunks.len() {
+        let mut sum = chunks[c];
+        for j in 0..count {
+            let row: &[f64; CHUNK] = rows[j * width + c * CHUNK..].first_chunk().expect("as wide");
+            for k in 0..CHUNK {
+                sum[k] += factors[j] * row[k];
             }
         }
-        *to = sum;
+        chunks[c] = sum;
+    }
+    if rest.is_empty() {
+        return;
     }
     let done = width - rest.len();
-    for (factor, row) in factors.iter().zip(rows.chunks_exact(width)) {
-        for (to, value) in rest.iter_mut().zip(&row[done..]) {
-            *to += factor * value;
+    for j in 0..count {
+        let row = &rows[j * width + done..(j + 1) * width];
+        for k in 0..rest.len() {
+            rest[k] += factors[j] * row[k];
         }
     }
 }
@@ -200,12 +216,12 @@ pub(super) fn combine(to: &mut [f64], factors: &[f64], rows: &[f64]) {
 #[inline(always)]
 pub(super) fn add(to: &mut [f64], factor: f64, row: &[f64]) {
     let ((to, to_rest), (row, row_rest)) = (to.as_chunks_mut::<CHUNK>(), row.as_chunks::<CHUNK>());
-    for (to, row) in to.iter_mut().zip(row) {
-        for (to, value) in to.iter_mut().zip(row) {
-            *to += factor * value;
+    for c in 0..to.len() {
+        for k in 0..CHUNK {
+            to[c][k] += factor * row[c][k];
         }
     }
-    for (to, value) in to_rest.iter_mut().zip(row_rest) {
-        *to += factor * value;
+    for k in 0..to_rest.len() {
+        to_rest[k] += factor * row_rest[k];
     }
 }

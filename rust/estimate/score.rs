@@ -44,12 +44,12 @@ where
     pub fn score(&self, point: &Point<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
         let linear = self.around(point)?;
         let places = self.places(point)?;
-        let more: Vec<Columns> = candidates
-            .iter()
-            .map(|candidate| self.candidate_columns(point, &places, candidate, TimeOrigin::Record))
-            .collect();
-        let size = more.iter().map(|columns| columns.seen.width()).sum();
-        let columns = more.iter().fold(linear.columns.clone(), |all, more| all.beside(more));
+        let (mut size, mut columns) = (0, linear.columns.clone());
+        for candidate in candidates {
+            let more = self.candidate_columns(point, &places, candidate, TimeOrigin::Record);
+            size += more.seen.width();
+            columns = columns.beside(&more);
+        }
         let scores = self.score_beside(point, &linear, &columns, &[size])?;
         Ok(scores.into_iter().next().expect("one group"))
     }

@@ -33,19 +33,13 @@ impl Table {
         Ok(table)
     }
 
-    fn push<const D: usize>(&mut self, passage: Option<Passage<D>>) {
-        let Some(Passage { states, t, x, outcome }) = passage else {
-            self.states.extend((0..self.times).flat_map(|_| [f64::NAN; D]));
-            self.end.extend([f64::NAN; D]);
-            self.t_end.push(f64::NAN);
-            self.outcome.push(jobs::INTERRUPTED);
-            return;
-        };
-        self.states.extend(states.as_flattened());
-        self.states.extend((states.len()..self.times).flat_map(|_| [f64::NAN; D]));
-        self.end.extend(x);
+    /// The states that a run met, one after the other, and its end.
+    fn push(&mut self, states: &[f64], t: f64, x: &[f64], outcome: u8) {
+        self.states.extend_from_slice(states);
+        self.states.resize(self.states.len() + self.times * x.len() - states.len(), f64::NAN);
+        self.end.extend_from_slice(x);
         self.t_end.push(t);
-        self.outcome.push(outcome_code(outcome));
+        self.outcome.push(outcome);
     }
 }
 
@@ -54,7 +48,14 @@ fn collect<F: Family<D>, const D: usize>(
     mut table: Table,
     crew: Crew<'_>,
 ) -> Table {
-    ensemble.run(crew).into_iter().for_each(|passage| table.push(passage));
+    for passage in ensemble.run(crew) {
+        match passage {
+            Some(Passage { states, t, x, outcome }) => {
+                table.push(states.as_flattened(), t, &x, outcome_code(outcome));
+            }
+            None => table.push(&[], f64::NAN, &[f64::NAN; D], jobs::INTERRUPTED),
+        }
+    }
     table
 }
 

@@ -2,6 +2,7 @@
 
 use std::any::Any;
 
+use nalgebra::SVector;
 use pyo3::prelude::*;
 
 use crate::estimate::{Estimator, Free, Known, Role, Sensor};
@@ -36,14 +37,23 @@ impl Linearised {
     {
         let kept: &Estimator<F, C, D, M> = self.0.downcast_ref()?;
         let (own, other) = (&kept.record, &of.record);
-        // What was not seen is not a number: only its bits are the same.
-        let bits = |seen: &f64| seen.to_bits();
         let same = roles(&kept.free) == roles(&of.free)
             && kept.family == of.family
             && (&own.t, &own.linked, &own.film) == (&other.t, &other.linked, &other.film)
-            && own.seen.iter().flatten().map(bits).eq(other.seen.iter().flatten().map(bits));
+            && same_bits(&own.seen, &other.seen);
         if same { kept.known.clone() } else { None }
     }
+}
+
+/// Whether the same was seen. What was not is not a number: only its bits are the same.
+fn same_bits<const M: usize>(own: &[SVector<f64, M>], other: &[SVector<f64, M>]) -> bool {
+    let mut same = own.len() == other.len();
+    for i in 0..own.len().min(other.len()) {
+        for m in 0..M {
+            same &= own[i][m].to_bits() == other[i][m].to_bits();
+        }
+    }
+    same
 }
 
 /// Which parameters are free.

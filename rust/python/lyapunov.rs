@@ -10,7 +10,7 @@ use super::model::{AnyModel, state, with_wide_model};
 use crate::integrate::{Dopri5, Failure, Taylor, Tolerance, order};
 use crate::model::Family;
 use crate::run::{Crew, Exponents, Frames, Lyapunov, LyapunovOptions, Stop, frames as frames_of, rows};
-use crate::scalar::{Dual, Isa, Scalar};
+use crate::scalar::{Dual, Isa, constants};
 
 /// Columns, one row for each orbit.
 #[derive(Default)]
@@ -24,34 +24,57 @@ struct Table {
     outcome: Vec<u8>,
 }
 
+/// What one orbit puts into the columns.
+struct Row<'a> {
+    value: &'a [f64],
+    standard_error: &'a [f64],
+    time: f64,
+    mean: &'a [f64],
+    product: &'a [f64],
+    end: &'a [f64],
+    outcome: u8,
+}
+
 impl Table {
-    fn push<const D: usize, const N: usize>(&mut self, orbit: Option<Exponents<D, N>>) {
-        let Some(orbit) = orbit else {
-            self.value.extend([f64::NAN; N]);
-            self.standard_error.extend([f64::NAN; N]);
-            self.time.push(f64::NAN);
-            self.mean.extend([f64::NAN; D]);
-            self.product.extend([[f64::NAN; D]; D].as_flattened());
-            self.end.extend([f64::NAN; D]);
-            self.outcome.push(jobs::INTERRUPTED);
-            return;
-        };
-        self.value.extend(orbit.exponents.value);
-        self.standard_error.extend(orbit.exponents.standard_error);
-        self.time.push(orbit.exponents.time);
-        self.mean.extend(orbit.moments.first);
-        self.product.extend(orbit.moments.second.as_flattened());
-        self.end.extend(orbit.x);
-        self.outcome.push(outcome_code(orbit.outcome));
+    fn push(&mut self, row: &Row<'_>) {
+        self.value.extend_from_slice(row.value);
+        self.standard_error.extend_from_slice(row.standard_error);
+        self.time.push(row.time);
+        self.mean.extend_from_slice(row.mean);
+        self.product.extend_from_slice(row.product);
+        self.end.extend_from_slice(row.end);
+        self.outcome.push(row.outcome);
     }
 }
 
 fn table<F: Family<D>, const D: usize>(orbits: &Lyapunov<'_, F, D>, all: bool, crew: Crew<'_>) -> Table {
+    if all { collect(&orbits.run::<D>(crew)) } else { collect(&orbits.run::<1>(crew)) }
+}
+
+fn collect<const D: usize, const N: usize>(orbits: &[Option<Exponents<D, N>>]) -> Table {
     let mut table = Table::default();
-    if all {
-        orbits.run::<D>(crew).into_iter().for_each(|orbit| table.push(orbit));
-    } else {
-        orbits.run::<1>(crew).into_iter().for_each(|orbit| table.push(orbit));
+    let lost = [[f64::NAN; D]; D];
+    for orbit in orbits {
+        table.push(&match orbit {
+            Some(orbit) => Row {
+                value: &orbit.exponents.value,
+                standard_error: &orbit.exponents.standard_error,
+                time: orbit.exponents.time,
+                mean: &orbit.moments.first,
+                product: orbit.moments.second.as_flattened(),
+                end: &orbit.x,
+                outcome: outcome_code(orbit.outcome.clone()),
+            },
+            None => Row {
+                value: &lost.as_flattened()[..N],
+                standard_error: &lost.as_flattened()[..N],
+                time: f64::NAN,
+                mean: &lost.as_flattened()[..D],
+                product: lost.as_flattened(),
+                end: &lost.as_flattened()[..D],
+                outcome: jobs::INTERRUPTED,
+            },
+        });
     }
     table
 }
@@ -137,7 +160,7 @@ fn follow<F: Family<D>, const D: usize>(
     tolerance: &Tolerance,
     stop: &Stop,
 ) -> Result<Frames<D>, Failure> {
-    let wide: Vec<Dual<f64, D>> = values.iter().map(|&value| Dual::constant(value)).collect();
+    let wide: Vec<Dual<f64, D>> = constants(values);
     let system = family.build(&wide);
     match &rows::tape(family, &[values.to_vec()]) {
         Some(tape) => {

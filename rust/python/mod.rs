@@ -4,6 +4,7 @@ mod effects;
 mod ensemble;
 mod errors;
 mod estimate;
+mod fitted;
 mod interrupt;
 mod jobs;
 mod linearised;

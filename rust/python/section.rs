@@ -69,32 +69,27 @@ impl Table {
         Ok(table)
     }
 
-    fn push<const D: usize>(&mut self, crossings: Option<Crossings<D>>) {
-        let Some(crossings) = crossings else {
-            self.fill::<D>(0);
-            self.end.extend([f64::NAN; D]);
-            self.t_end.push(f64::NAN);
-            self.residual.push(0.0);
-            self.outcome.push(jobs::INTERRUPTED);
-            return;
-        };
-        self.points.extend(crossings.x.as_flattened());
-        self.t.extend(&crossings.t);
-        self.which.extend(&crossings.which);
-        self.fill::<D>(crossings.t.len());
-        self.end.extend(crossings.end.1);
-        self.t_end.push(crossings.end.0);
-        self.residual.push(crossings.residual);
-        self.outcome.push(code(crossings.ended));
-    }
-
-    /// Completes a row in which there are so many points.
-    fn fill<const D: usize>(&mut self, found: usize) {
+    /// The points of a trajectory: where, when, and of which surface; then its end, and how large the surfaces'
+    /// functions are.
+    fn push(
+        &mut self,
+        (points, t, which): (&[f64], &[f64], &[u8]),
+        (t_end, end, outcome): (f64, &[f64], u8),
+        residual: f64,
+    ) {
+        let found = t.len();
         let missing = self.count - found;
-        self.points.extend((0..missing).flat_map(|_| [f64::NAN; D]));
-        self.t.extend((0..missing).map(|_| f64::NAN));
-        self.which.extend((0..missing).map(|_| 0));
+        self.points.extend_from_slice(points);
+        self.points.resize(self.points.len() + missing * end.len(), f64::NAN);
+        self.t.extend_from_slice(t);
+        self.t.resize(self.t.len() + missing, f64::NAN);
+        self.which.extend_from_slice(which);
+        self.which.resize(self.which.len() + missing, 0);
         self.found.push(found as u64);
+        self.end.extend_from_slice(end);
+        self.t_end.push(t_end);
+        self.residual.push(residual);
+        self.outcome.push(outcome);
     }
 }
 
@@ -103,7 +98,14 @@ fn collect<F: Family<D>, const D: usize>(
     mut table: Table,
     crew: Crew<'_>,
 ) -> Table {
-    sections.run(crew).into_iter().for_each(|crossings| table.push(crossings));
+    for crossings in sections.run(crew) {
+        match crossings {
+            Some(Crossings { t, x, which, residual, end, ended }) => {
+                table.push((x.as_flattened(), &t, &which), (end.0, &end.1, code(ended)), residual);
+            }
+            None => table.push((&[], &[], &[]), (f64::NAN, &[f64::NAN; D], jobs::INTERRUPTED), 0.0),
+        }
+    }
     table
 }
 

@@ -38,29 +38,36 @@ fn shoot<'py>(
             "at most {MOST_PARAMETERS} of the parameters can be wanted"
         )));
     }
-    let dict = PyDict::new(py);
-    with_wide_model!(&model, |family, _values| {
+    let (flown, dimension) = with_wide_model!(&model, |family, _values| {
         let starts = jobs::starts(&starts)?;
-        let count = starts.len();
-        if [rows.len(), t.len(), spans.len()] != [count; 3] {
+        if [rows.len(), t.len(), spans.len()] != [starts.len(); 3] {
             return Err(ModelError::new_err("pieces need as many parameters, times and spans as starts"));
         }
-        let list: Vec<_> = (0..count)
-            .map(|i| Piece { values: rows[i].clone(), t: t[i], x: starts[i], span: spans[i] })
-            .collect();
-        let dimension = starts[0].len();
-        let flown = run(py, family, &list, &wanted, &tolerance)?;
-        let flat = |of: &dyn Fn(&Flown<_>) -> Vec<f64>| -> Vec<f64> { flown.iter().flat_map(of).collect() };
-        let set = |name: &str, values: Vec<f64>, shape: &[usize]| {
-            dict.set_item(name, PyArray1::from_vec(py, values).reshape(shape.to_vec())?)
-        };
-        set("x", flat(&|f| f.x.to_vec()), &[count, dimension])?;
-        set("by_state", flat(&|f| f.by_state.as_flattened().to_vec()), &[count, dimension, dimension])?;
-        let by_parameter = flat(&|f| f.by_parameter.as_flattened().to_vec());
-        set("by_parameter", by_parameter, &[count, dimension, MOST_PARAMETERS])?;
-        set("rate", flat(&|f| f.rate.to_vec()), &[count, dimension])?;
+        let mut list = Vec::with_capacity(starts.len());
+        for (i, values) in rows.into_iter().enumerate() {
+            list.push(Piece { values, t: t[i], x: starts[i], span: spans[i] });
+        }
+        (run(py, family, &list, &wanted, &tolerance)?, starts[0].len())
     });
+    let dict = PyDict::new(py);
+    let set = |name: &str, values: Vec<f64>, shape: &[usize]| {
+        dict.set_item(name, PyArray1::from_vec(py, values).reshape(shape.to_vec())?)
+    };
+    let count = t.len();
+    set("x", flown.x, &[count, dimension])?;
+    set("by_state", flown.by_state, &[count, dimension, dimension])?;
+    set("by_parameter", flown.by_parameter, &[count, dimension, MOST_PARAMETERS])?;
+    set("rate", flown.rate, &[count, dimension])?;
     Ok(dict)
+}
+
+/// The ends of all pieces, their dimension forgotten.
+#[derive(Default)]
+struct Flat {
+    x: Vec<f64>,
+    by_state: Vec<f64>,
+    by_parameter: Vec<f64>,
+    rate: Vec<f64>,
 }
 
 fn run<F: Family<D>, const D: usize>(
@@ -69,8 +76,18 @@ fn run<F: Family<D>, const D: usize>(
     list: &[Piece<D>],
     wanted: &[usize],
     tolerance: &Tolerance,
-) -> PyResult<Vec<Flown<D>>> {
-    interrupt::run(py, |stop: &Stop| -> Result<_, Failure> { pieces(family, list, wanted, tolerance, stop) })
+) -> PyResult<Flat> {
+    let flown = interrupt::run(py, |stop: &Stop| -> Result<_, Failure> {
+        pieces(family, list, wanted, tolerance, stop)
+    })?;
+    let mut flat = Flat::default();
+    for Flown { x, by_state, by_parameter, rate } in &flown {
+        flat.x.extend_from_slice(x);
+        flat.by_state.extend_from_slice(by_state.as_flattened());
+        flat.by_parameter.extend_from_slice(by_parameter.as_flattened());
+        flat.rate.extend_from_slice(rate);
+    }
+    Ok(flat)
 }
 
 /// The rates at a state with their first derivatives by the state and by all parameters, and where asked for
@@ -84,23 +101,24 @@ fn expansion<'py>(
     all: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    let dict = PyDict::new(py);
-    with_wide_model!(&model, |family, values| {
+    let (d, rate, by_state, by_parameter, surfaces, more) = with_wide_model!(&model, |family, values| {
         let x = state(&x)?;
-        let (d, found) = (x.len(), linear(family, values, t, &x));
-        let set = |name: &str, values: Vec<f64>, shape: Vec<usize>| {
-            dict.set_item(name, PyArray1::from_vec(py, values).reshape(shape)?)
-        };
-        set("rate", found.rate.to_vec(), vec![d])?;
-        set("by_state", found.by_state.as_flattened().to_vec(), vec![d, d])?;
-        let parameters = found.by_parameter.len();
-        set("by_parameter", found.by_parameter.into_flattened(), vec![parameters, d])?;
-        set("surfaces", found.surfaces.clone(), vec![found.surfaces.len()])?;
-        let (second, third) = if all { higher(family, values, t, &x) } else { Default::default() };
-        let wide = if all { d } else { 0 };
-        set("second", second, vec![wide; 3])?;
-        set("third", third, vec![wide; 4])?;
+        let found = linear(family, values, t, &x);
+        let more = if all { higher(family, values, t, &x) } else { Default::default() };
+        let by_state = found.by_state.as_flattened().to_vec();
+        (x.len(), found.rate.to_vec(), by_state, found.by_parameter.into_flattened(), found.surfaces, more)
     });
+    let dict = PyDict::new(py);
+    let set = |name: &str, values: Vec<f64>, shape: &[usize]| {
+        dict.set_item(name, PyArray1::from_vec(py, values).reshape(shape.to_vec())?)
+    };
+    let (parameters, crossed, wide) = (by_parameter.len() / d, surfaces.len(), if all { d } else { 0 });
+    set("rate", rate, &[d])?;
+    set("by_state", by_state, &[d, d])?;
+    set("by_parameter", by_parameter, &[parameters, d])?;
+    set("surfaces", surfaces, &[crossed])?;
+    set("second", more.0, &[wide; 3])?;
+    set("third", more.1, &[wide; 4])?;
     Ok(dict)
 }
 

@@ -73,13 +73,19 @@ fn run<F: Family<D>, const D: usize>(
         }
     };
     let system = system();
+    let (mut event_kinds, mut event_t, mut event_x) = (Vec::new(), Vec::new(), Vec::new());
+    for event in &events {
+        event_kinds.push(event.name(&system));
+        event_t.push(event.t);
+        event_x.extend_from_slice(&event.x);
+    }
     Ok(Flat {
         dimension: D,
         t,
         x: x.into_flattened(),
-        event_kinds: events.iter().map(|event| event.name(&system)).collect(),
-        event_t: events.iter().map(|event| event.t).collect(),
-        event_x: events.iter().flat_map(|event| event.x).collect(),
+        event_kinds,
+        event_t,
+        event_x,
         outcome: outcome.name(),
         counts: (counts.accepted, counts.rejected, counts.evaluations, counts.grazes),
         record: record.map(|record| Box::new(record) as Box<dyn Piecewise>),

@@ -1,13 +1,12 @@
 //! Pieces of orbits with their derivatives: what multiple shooting is made of.
 
-use std::array::from_fn;
-
 use super::Stop;
 use super::parallel::try_map;
 use crate::integrate::{Dop853, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
 use crate::model::{Family, System};
 use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
+use crate::unroll::vector;
 
 /// So many parameters can be differentiated by at once.
 pub const MOST_PARAMETERS: usize = 2;
@@ -96,7 +95,7 @@ where
     M: System<Number, D>,
     K: Method<Number, D>,
 {
-    let start: [Number; D] = from_fn(|n| Dual::variable(piece.x[n], n));
+    let start = vector!(Number, D; n => Dual::variable(piece.x[n], n));
     let end = piece.t + piece.span;
     let norm = WithTangents(*tolerance);
     let mut driver = Driver::by(method, system, piece.t, start, Some(piece.span), &norm);
@@ -109,10 +108,17 @@ where
     }
     let x = driver.x();
     let rate = driver.system().rates(Dual::constant(end), x, driver.sides());
-    Ok(Flown {
-        x: x.map(|x| x.re),
-        by_state: from_fn(|n| from_fn(|k| x[n].d[k])),
-        by_parameter: from_fn(|n| from_fn(|i| x[n].d[D + i])),
-        rate: rate.map(|rate| rate.re),
-    })
+    let mut flown = Flown {
+        x: [0.0; D],
+        by_state: [[0.0; D]; D],
+        by_parameter: [[0.0; MOST_PARAMETERS]; D],
+        rate: [0.0; D],
+    };
+    for n in 0..D {
+        flown.x[n] = x[n].re;
+        flown.by_state[n].copy_from_slice(&x[n].d[..D]);
+        flown.by_parameter[n].copy_from_slice(&x[n].d[D..D + MOST_PARAMETERS]);
+        flown.rate[n] = rate[n].re;
+    }
+    Ok(flown)
 }

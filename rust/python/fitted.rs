@@ -1,0 +1,332 @@
+//! The estimator whatever its family and its sensor: plain numbers in, plain numbers out. What is on Python's side
+//! of it is compiled once.
+
+use std::sync::Arc;
+
+use nalgebra::{SMatrix, SVector};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::linearised::Linearised;
+use super::model::AnyModel;
+use crate::estimate::{
+    AngleSensor, Candidate, Columns, Cost, Direct, DiskCamera, EstimateError, Estimator, Free, Known,
+    Options, Point, Record, Role, Rows, Score, Sensor, Set,
+};
+use crate::integrate::Tolerance;
+use crate::model::{Family, OwnFamily};
+use crate::run::Stop;
+
+/// A frame's flow is followed much more closely than the model's smallest assumed error.
+const TOLERANCE: Tolerance = Tolerance { rtol: 1e-7, atol: 1e-9 };
+
+/// An array: its numbers in C order.
+pub struct Array {
+    pub shape: Vec<usize>,
+    pub numbers: Vec<f64>,
+}
+
+impl Array {
+    fn needs_columns(&self, wanted: usize, what: &str) -> PyResult<()> {
+        if self.shape[1] == wanted {
+            return Ok(());
+        }
+        Err(PyValueError::new_err(format!("{what} must have {wanted} columns, not {}", self.shape[1])))
+    }
+}
+
+/// Frame by frame: time, what was seen, its information, whether the next frame is linked, which film it
+/// belongs to; and how much of the noise each channel remembers.
+pub struct Data {
+    pub t: Vec<f64>,
+    pub seen: Array,
+    pub information: Array,
+    pub linked: Vec<bool>,
+    pub film: Vec<usize>,
+    pub memory: Vec<f64>,
+}
+
+/// All that makes a problem beside the model.
+pub struct Asked<'a> {
+    /// None where nothing was measured.
+    pub data: Option<&'a Data>,
+    pub states: &'a Array,
+    pub sets: Vec<Set>,
+    pub free: Vec<Free>,
+    /// None where it plays no part.
+    pub diffusion: Option<&'a [f64]>,
+    /// What a solve left at this point.
+    pub linear: Option<&'a Linearised>,
+}
+
+impl Asked<'_> {
+    /// Whether all fits together, for so many states and channels, and parameters of the model and of the camera.
+    fn check(&self, (d, m): (usize, usize), (model, camera): (usize, usize)) -> PyResult<()> {
+        let wrong = |what: String| Err(PyValueError::new_err(what));
+        if self.diffusion.is_some_and(|diffusion| diffusion.len() != d) {
+            return wrong(format!("diffusion must have {d} numbers"));
+        }
+        if let Some(data) = self.data {
+            if data.information.shape[1..] != [m, m] {
+                return wrong(format!("information must hold {m} x {m} matrices"));
+            }
+            data.seen.needs_columns(m, "seen")?;
+            if data.memory.len() != m {
+                return wrong("memory: one per channel".into());
+            }
+            let n = data.t.len();
+            let others =
+                [data.seen.shape[0], data.information.shape[0], data.film.len(), data.linked.len() + 1];
+            if n == 0 || others.iter().any(|&length| length != n) {
+                return wrong("t, seen, information, linked and film have different lengths".into());
+            }
+        }
+        let fits = |set: &Set| set.model.len() == model && set.camera.len() == camera;
+        if self.sets.is_empty() || !self.sets.iter().all(fits) {
+            return wrong("every film needs the model's and the camera's parameters".into());
+        }
+        self.states.needs_columns(d, "states")?;
+        let films = self.sets.len();
+        if let Some(data) = self.data
+            && (self.states.shape[0] != data.t.len() || data.film.iter().any(|&film| film >= films))
+        {
+            return wrong("states and parameters do not fit the record".into());
+        }
+        for free in &self.free {
+            let (index, most) = match free.role {
+                Role::Model(index) => (index, model),
+                Role::Camera(index) => (index, camera),
+                Role::Clock => (0, 1),
+            };
+            if index >= most || free.film.is_some_and(|film| film >= films) {
+                return wrong(format!("there is no parameter {index} of {most}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The numbers of frames, free parameters, states and channels.
+pub struct Size {
+    pub frames: usize,
+    pub free: usize,
+    pub states: usize,
+    pub channels: usize,
+}
+
+/// A solution, its arrays flat.
+pub struct Solved {
+    pub states: Vec<f64>,
+    pub sets: Vec<Set>,
+    pub covariance: Vec<f64>,
+    pub state_covariance: Vec<f64>,
+    pub misfit: Vec<f64>,
+    pub seen_variance: Vec<f64>,
+    pub defect: Vec<f64>,
+    pub cost: Cost,
+    pub evidence: f64,
+    pub converged: bool,
+    pub iterations: usize,
+    pub linear: Linearised,
+}
+
+/// An estimator at a point; see the methods of the same names in `rust/estimate`. Arrays are flat.
+pub trait Fitted: Send + Sync {
+    fn size(&self) -> Size;
+    fn solve(self: Box<Self>, options: &Options, stop: &Stop) -> Result<Solved, EstimateError>;
+    /// The candidates: wider models of the same kind, and which of their parameters are amplitudes.
+    fn score(&self, candidates: Vec<(AnyModel, Vec<usize>)>) -> PyResult<Score>;
+    /// The columns: what they add to the states at the links' ends.
+    fn score_groups(&self, state: Rows, groups: &[usize]) -> Result<Vec<Score>, EstimateError>;
+    /// Times, states and responses.
+    fn places(&self) -> Result<[Vec<f64>; 3], EstimateError>;
+    /// The states at the first and at the last frames, and the covariances there.
+    fn filter(&self, windows: &[(usize, usize)], stop: &Stop) -> Result<[Vec<f64>; 3], EstimateError>;
+    /// `vague`: one per state.
+    fn innovations(&self, vague: &[f64]) -> Result<Vec<f64>, EstimateError>;
+    /// After the point's states, which are the starts, of these films at these times.
+    fn predict(&self, film: &[usize], t0: &[f64], times: &[Vec<f64>]) -> Result<Vec<f64>, EstimateError>;
+}
+
+/// An estimator at a point, and how a model of its own kind is told from others.
+pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
+    pub estimator: Estimator<F, C, D, M>,
+    pub point: Point<D>,
+    own: fn(AnyModel) -> Option<(F, Vec<f64>)>,
+}
+
+/// The problem that is asked of a model.
+pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
+    macro_rules! of {
+        ($Kind:ident, $model:expr) => {{
+            let own = |model| match model {
+                AnyModel::$Kind(family, values) => Some((family, values)),
+                _ => None,
+            };
+            Box::new(problem($model, own, asked)?)
+        }};
+    }
+    Ok(match model {
+        AnyModel::Disk(family, values) => of!(Disk, (family, &values, DiskCamera)),
+        AnyModel::Pendulum(family, values) => of!(Pendulum, (family, &values, AngleSensor)),
+        AnyModel::Own1(family, values) => of!(Own1, seen_as_it_is(family, &values)),
+        AnyModel::Own2(family, values) => of!(Own2, seen_as_it_is(family, &values)),
+        AnyModel::Own3(family, values) => of!(Own3, seen_as_it_is(family, &values)),
+        AnyModel::Own4(family, values) => of!(Own4, seen_as_it_is(family, &values)),
+        AnyModel::Own5(..) | AnyModel::Own6(..) => {
+            return Err(PyValueError::new_err("a model that is fitted has at most 4 states"));
+        }
+        _ => return Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
+    })
+}
+
+/// A user's own model with what sees its states.
+fn seen_as_it_is<const D: usize>(family: OwnFamily<D>, values: &[f64]) -> (OwnFamily<D>, &[f64], Direct<D>) {
+    let states = family.states();
+    let mut angles = [false; D];
+    for n in 0..D {
+        angles[n] = states[n].1;
+    }
+    (family, values, Direct { angles })
+}
+
+/// The same for one family and one sensor.
+pub fn problem<F, C, const D: usize, const M: usize>(
+    (family, values, sensor): (F, &[f64], C),
+    own: fn(AnyModel) -> Option<(F, Vec<f64>)>,
+    asked: Asked<'_>,
+) -> PyResult<Fit<F, C, D, M>>
+where
+    F: Family<D> + 'static,
+    C: Sensor<D, M> + 'static,
+{
+    asked.check((D, M), (values.len(), C::PARAMETERS.len()))?;
+    let mut record = Record::default();
+    if let Some(data) = asked.data {
+        (record.t, record.linked, record.film) = (data.t.clone(), data.linked.clone(), data.film.clone());
+        record.memory.copy_from_slice(&data.memory);
+        for i in 0..data.t.len() {
+            record.seen.push(SVector::from_column_slice(&data.seen.numbers[M * i..M * (i + 1)]));
+            let information = &data.information.numbers[M * M * i..M * M * (i + 1)];
+            record.information.push(SMatrix::from_row_slice(information));
+        }
+    }
+    let mut diffusion = [1.0; D];
+    if let Some(given) = asked.diffusion {
+        diffusion.copy_from_slice(given);
+    }
+    let point = Point { states: asked.states.numbers.as_chunks().0.to_vec(), sets: asked.sets };
+    let tolerance = TOLERANCE;
+    let mut estimator =
+        Estimator { family, sensor, record, free: asked.free, diffusion, tolerance, known: None };
+    estimator.known = asked.linear.and_then(|linear| linear.known(&estimator));
+    Ok(Fit { estimator, point, own })
+}
+
+impl<F, C, const D: usize, const M: usize> Fitted for Fit<F, C, D, M>
+where
+    F: Family<D> + 'static,
+    C: Sensor<D, M> + 'static,
+{
+    fn size(&self) -> Size {
+        let (frames, free) = (self.estimator.record.t.len(), self.estimator.free.len());
+        Size { frames, free, states: D, channels: M }
+    }
+
+    fn solve(self: Box<Self>, options: &Options, stop: &Stop) -> Result<Solved, EstimateError> {
+        let Self { estimator, point, .. } = *self;
+        let s = estimator.solve(point, options, stop)?;
+        Ok(Solved {
+            states: s.point.states.as_flattened().to_vec(),
+            sets: s.point.sets.clone(),
+            covariance: s.covariance.as_slice().to_vec(),
+            state_covariance: numbers(&s.state_covariance),
+            misfit: numbers(&s.misfit),
+            seen_variance: numbers(&s.seen_variance),
+            defect: numbers(&s.defect[..estimator.record.t.len() - 1]),
+            cost: s.cost,
+            evidence: s.evidence,
+            converged: s.converged,
+            iterations: s.iterations,
+            linear: Linearised::new(estimator, Known { point: Arc::new(s.point), linear: s.linear }),
+        })
+    }
+
+    fn score(&self, candidates: Vec<(AnyModel, Vec<usize>)>) -> PyResult<Score> {
+        let own = self.point.sets[0].model.len();
+        let mut all = Vec::with_capacity(candidates.len());
+        for (model, indices) in candidates {
+            let Some((family, values)) = (self.own)(model) else {
+                return Err(PyValueError::new_err("a candidate is a model of another kind"));
+            };
+            let (more, amplitudes) = added(&values, own, &indices)?;
+            all.push(Candidate { family, more, amplitudes });
+        }
+        Ok(self.estimator.score(&self.point, &all)?)
+    }
+
+    fn score_groups(&self, state: Rows, groups: &[usize]) -> Result<Vec<Score>, EstimateError> {
+        let seen = Rows::zeros(self.estimator.record.t.len() * M, state.width());
+        self.estimator.score_groups(&self.point, &Columns { seen, state }, groups)
+    }
+
+    fn places(&self) -> Result<[Vec<f64>; 3], EstimateError> {
+        let (mut t, mut states, mut responses) = (Vec::new(), Vec::new(), Vec::new());
+        for link in self.estimator.places(&self.point)? {
+            for place in &link.places {
+                t.push(place.t);
+                states.extend_from_slice(&place.state);
+                responses.push(place.response);
+            }
+        }
+        Ok([t, states, numbers(&responses)])
+    }
+
+    fn filter(&self, windows: &[(usize, usize)], stop: &Stop) -> Result<[Vec<f64>; 3], EstimateError> {
+        let (mut first, mut last, mut covariance) = (Vec::new(), Vec::new(), Vec::new());
+        for end in self.estimator.filter(&self.point, windows, &Options::default(), stop)? {
+            first.extend_from_slice(&end.first);
+            last.extend_from_slice(&end.last);
+            covariance.push(end.covariance);
+        }
+        Ok([first, last, numbers(&covariance)])
+    }
+
+    fn innovations(&self, vague: &[f64]) -> Result<Vec<f64>, EstimateError> {
+        let vague = vague.first_chunk().expect("one per state");
+        Ok(self.estimator.innovations(&self.point, vague)?.into_flattened())
+    }
+
+    fn predict(&self, film: &[usize], t0: &[f64], times: &[Vec<f64>]) -> Result<Vec<f64>, EstimateError> {
+        let mut starts = Vec::with_capacity(times.len());
+        for i in 0..times.len() {
+            starts.push((film[i], t0[i], self.point.states[i]));
+        }
+        let mut all = Vec::new();
+        for seen in self.estimator.predict(&self.point.sets, &starts, times)? {
+            all.extend_from_slice(seen.as_flattened());
+        }
+        Ok(all)
+    }
+}
+
+/// What a candidate with these values has more than the model, and its amplitudes.
+fn added(values: &[f64], own: usize, indices: &[usize]) -> PyResult<(Vec<f64>, Vec<Role>)> {
+    if values.len() < own || indices.iter().any(|&index| index >= values.len()) {
+        return Err(PyValueError::new_err("a candidate has no parameter of that number"));
+    }
+    Ok((values[own..].to_vec(), indices.iter().map(|&index| Role::Model(index)).collect()))
+}
+
+/// The numbers of small matrices in C order.
+fn numbers<const A: usize, const B: usize>(blocks: &[SMatrix<f64, A, B>]) -> Vec<f64> {
+    let mut all = Vec::with_capacity(A * B * blocks.len());
+    for block in blocks {
+        for i in 0..A {
+            for j in 0..B {
+                all.push(block[(i, j)]);
+            }
+        }
+    }
+    all
+}
