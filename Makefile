@@ -22,8 +22,8 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # Says what is done, and then how many seconds it took.
 STEP := @bash .ci/step
 PIP := $(PY) -m pip install --disable-pip-version-check --progress-bar off --no-input
-# Of what pip says: each download with its size, and errors (which go past this).
-BRIEFLY := awk '/\.metadata/ { next } /^==>/ { print; fflush() } / (Downloading|Using cached) / { sub(/-(cp|py)[0-9][^ ]*/, ""); print "   " $$0; fflush() }'
+# Of what pip says, each download with its size; errors go past this.
+BRIEFLY := grep --line-buffered -E '^==>|(Downloading|Using cached) .*\.whl \('
 
 # One goal after another, whatever -j says: two of them would install into .venv at once. Where everything is
 # installed, BESIDE=1 lets -j do several.
