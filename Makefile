@@ -67,7 +67,7 @@ lint-rust: .venv/.made
 	cargo fmt --check
 	$(STEP) "clippy" cargo clippy --locked --all-targets --features python -- -D warnings
 
-lint-python: .venv/.ready-lint
+lint-python: .venv/.ready-user .venv/.ready-lint
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(STEP) "mypy" $(BIN)/mypy --strict python/udd
@@ -135,7 +135,7 @@ clean: ## remove .venv and everything that was built
 	if [ -z "$$python" ]; then echo "make: no Python 3.11 or newer found among: $(PYTHONS)" >&2; exit 1; fi; \
 	if ! command -v cargo >/dev/null; then echo "make: no cargo found; a Rust toolchain is needed" >&2; exit 1; fi; \
 	rm -rf .venv; \
-	if ! "$$python" -m venv .venv; then \
+	if ! bash .ci/step "a virtual environment in .venv" "$$python" -m venv .venv; then \
 	  rm -rf .venv; \
 	  echo "make: $$python cannot make a virtual environment (on Debian and Ubuntu: install python3-venv)" >&2; \
 	  exit 1; \
@@ -147,8 +147,8 @@ clean: ## remove .venv and everything that was built
 	$(STEP) "packages of requirements/$*.txt" $(PIP) --require-hashes --no-deps --only-binary :all: -r $< | $(BRIEFLY)
 	@touch $@
 
-# What a list is beside of.
-.venv/.has-test .venv/.has-lint .venv/.has-docs: .venv/.has-user
+# The tests and the documentation use all of udd.
+.venv/.has-test .venv/.has-docs: .venv/.has-user
 
 # The module is compiled into python/udd, which needs only maturin.
 .venv/.module: .venv/.has-build $(SOURCES)
@@ -160,8 +160,13 @@ clean: ## remove .venv and everything that was built
 	$(STEP) "udd into .venv" env MATURIN_PEP517_ARGS=--locked $(PIP) --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
+# All lists that the checks need, one after the other.
+.venv/.packages: $(addprefix requirements/,build.txt user.txt test.txt lint.txt docs.txt) .venv/.made
+	+@$(MAKE) --no-print-directory BESIDE= $(addprefix .venv/.has-,user test lint docs)
+	@touch $@
+
 # Packages are downloaded while the module is compiled.
-.venv/.ready-%: requirements/%.txt requirements/build.txt $(SOURCES)
+.venv/.ready-%: $(wildcard requirements/*.txt) $(SOURCES)
 	+@$(MAKE) --no-print-directory -j2 BESIDE=1 .venv/.has-$* .venv/.module
 	+@$(MAKE) --no-print-directory .venv/.udd
 	@touch $@
