@@ -1,4 +1,4 @@
-# Everything happens in .venv, made from requirements.lock (pinned, with hashes); nothing else is set up
+# Everything happens in .venv, made from requirements/*.txt (pinned, with hashes); nothing else is set up
 # on the machine. Needed beforehand: a Rust toolchain, Python 3.11+ and make.
 
 SHELL := bash
@@ -19,6 +19,18 @@ unexport PYTHONPATH PYTHONHOME
 # The peers of `bench-peers` live in an environment of their own.
 PEERS := .venv-peers/$(notdir $(BIN))
 
+# Says what is done, and then how many seconds it took.
+STEP := @bash .ci/step
+PIP := $(PY) -m pip install --disable-pip-version-check --progress-bar off --no-input
+# Of what pip says, each download with its size; errors go past this.
+BRIEFLY := grep --line-buffered -E '^==>|(Downloading|Using cached) .*\.whl \('
+
+# One goal after another, whatever -j says: two of them would install into .venv at once. Where everything is
+# installed, BESIDE=1 lets -j do several.
+ifndef BESIDE
+.NOTPARALLEL:
+endif
+
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
@@ -27,24 +39,24 @@ SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-install: .venv/.udd ## make .venv from the lock file and install the release build into it
+install: .venv/.ready-user ## make .venv with all that udd can use (no docs, test or lint), and the release build in it
 
-demo: .venv/.udd ## from the sample film to the report: run the main job and print where its report is
-	$(BIN)/udd demo
+demo: .venv/.ready-demo ## from the sample film to the report: run the main job and print where its report is
+	$(STEP) "udd demo" $(BIN)/udd demo
 
-docs: .venv/.udd ## build the documentation into docs/_build/html; every page is run, and a warning is an error
-	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+docs: .venv/.ready-docs ## build the documentation into docs/_build/html; every page is run, and a warning is an error
+	$(STEP) "docs" $(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
-test: test-rust test-python ## build everything and run all tests (cargo and pytest)
+test: .venv/.ready-test test-rust test-python ## build everything and run all tests (cargo and pytest)
 
 test-rust: ## only the tests of the Rust core; needs no Python
-	cargo test --release --locked --no-fail-fast
+	$(STEP) "cargo test" cargo test --release --locked --no-fail-fast
 
-test-python: .venv/.udd ## only the tests of the Python package
-	$(PY) -m pytest -n auto --dist loadfile
+test-python: .venv/.ready-test ## only the tests of the Python package (ARGS="-k section" for some of them)
+	$(STEP) "pytest" $(PY) -m pytest -n auto --dist loadfile --durations=25 $(ARGS)
 
 test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" for some of it)
-	UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)
+	$(STEP) "pytest in a browser" env UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)
 
 bench-page: .venv/.browser ## the page's frames per second and its delay from slider to frame
 	$(PY) benches/python/page.py
@@ -53,58 +65,68 @@ lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stu
 
 lint-rust: .venv/.made
 	cargo fmt --check
-	cargo clippy --locked --all-targets --features python -- -D warnings
+	$(STEP) "clippy" cargo clippy --locked --all-targets --features python -- -D warnings
 
-lint-python: .venv/.udd
+lint-python: .venv/.ready-user .venv/.ready-lint
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy --strict python/udd
-	$(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
+	$(STEP) "mypy" $(BIN)/mypy --strict python/udd
+	$(STEP) "stubtest" $(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
 
-format: .venv/.deps ## format the Rust and the Python code
+format: .venv/.has-lint ## format the Rust and the Python code
 	cargo fmt
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-dist: .venv/.deps ## build the wheel and the source distribution into dist/
+dist: .venv/.has-build ## build the wheel and the source distribution into dist/
 	$(BIN)/maturin build --release --locked --strip --sdist --out dist
 
 bench: ## time the core's hot paths (ARGS="section --quick" for some of them, in short)
 	cargo bench --locked --bench paths -- $(ARGS)
 
 bench-count: .venv/.made ## count their instructions; fails where one takes over 3 % more than committed (ARGS=--update to refresh)
-	$(PY) benches/count.py $(ARGS)
+	$(STEP) "bench-count" $(PY) benches/count.py $(ARGS)
 
-bench-startup: .venv/.udd ## what importing udd takes in seconds, and a long sweep in memory
+bench-startup: .venv/.ready-user ## what importing udd takes in seconds, and a long sweep in memory
 	$(PY) benches/python/startup.py
 	$(PY) benches/python/memory.py
 
-bench-fit: .venv/.udd ## what fits of simulated films take on one core (ARGS="--frames 3000 --turns 9")
+bench-fit: .venv/.ready-user ## what fits of simulated films take on one core (ARGS="--frames 3000 --turns 9")
 	$(PY) benches/python/fit.py $(ARGS)
 
-bench-discovery: .venv/.udd ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
-	$(PY) benches/python/discovery $(ARGS)
+bench-discovery: .venv/.ready-user ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
+	$(STEP) "bench-discovery" $(PY) benches/python/discovery $(ARGS)
 
-bench-tracker: .venv/.udd ## the tracker on films with every defect in turn (ARGS="--only clean,standard --trackers udd,fast,HSV")
+bench-tracker: .venv/.ready-user ## the tracker on films with every defect in turn (ARGS="--only clean,standard --trackers udd,fast,HSV")
 	$(PY) benches/python/tracker $(ARGS)
 
 bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)
 	cd benches/python && PYTHONPATH=. $(CURDIR)/$(PEERS)/python -m peers $(ARGS)
 
-lock: .venv/.deps ## write requirements.lock anew, with today's versions
+# All is resolved together, with today's versions; each list is that part of it which it needs.
+LOCK = .venv/lock/$(notdir $(BIN))/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+  --no-emit-index-url --no-emit-find-links --no-annotate --custom-compile-command "make lock"
+PART = $(LOCK) --constraint .venv/lock/all.txt --output-file
+
+lock: .venv/.made ## write requirements/*.txt anew, with today's versions
 	rm -rf .venv/lock
 	$(PY) -m venv .venv/lock
 	.venv/lock/$(notdir $(BIN))/python -m pip install --quiet uv
-	.venv/lock/$(notdir $(BIN))/uv pip compile pyproject.toml --all-extras --group dev --upgrade --quiet \
-	  --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --custom-compile-command "make lock" --output-file requirements.lock
+	$(LOCK) pyproject.toml --all-extras --group build --group test --group lint --output-file .venv/lock/all.txt
+	rm -f requirements/*.txt
+	$(PART) requirements/build.txt --group build
+	$(PART) requirements/demo.txt pyproject.toml --extra track
+	$(PART) requirements/user.txt pyproject.toml $(addprefix --extra ,app formula parquet scale track)
+	$(PART) requirements/test.txt --group test
+	$(PART) requirements/lint.txt --group lint
+	$(PART) requirements/docs.txt pyproject.toml --extra docs
 
 clean: ## remove .venv and everything that was built
 	rm -rf .venv .venv-peers build dist demo paper docs/_build target .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 
-# --- the three steps behind `install`; a stamp file marks each, so that only what changed is done again
+# --- the steps behind `install`, `demo` and the like; a stamp file marks each, so that only what changed is done again
 
 .venv/.made:
 	@python=; for p in $(PYTHONS); do \
@@ -113,22 +135,43 @@ clean: ## remove .venv and everything that was built
 	if [ -z "$$python" ]; then echo "make: no Python 3.11 or newer found among: $(PYTHONS)" >&2; exit 1; fi; \
 	if ! command -v cargo >/dev/null; then echo "make: no cargo found; a Rust toolchain is needed" >&2; exit 1; fi; \
 	rm -rf .venv; \
-	if ! "$$python" -m venv .venv; then \
+	if ! bash .ci/step "a virtual environment in .venv" "$$python" -m venv .venv; then \
 	  rm -rf .venv; \
 	  echo "make: $$python cannot make a virtual environment (on Debian and Ubuntu: install python3-venv)" >&2; \
 	  exit 1; \
 	fi
 	@touch $@
 
-.venv/.deps: requirements.lock .venv/.made
-	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --require-hashes --only-binary :all: -r requirements.lock
+# The packages of one list of requirements/.
+.venv/.has-%: requirements/%.txt .venv/.made
+	$(STEP) "packages of requirements/$*.txt" $(PIP) --require-hashes --no-deps --only-binary :all: -r $< | $(BRIEFLY)
 	@touch $@
 
-.venv/.udd: .venv/.deps $(SOURCES)
-	MATURIN_PEP517_ARGS=--locked $(PY) -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable . --verbose
+# The tests and the documentation use all of udd.
+.venv/.has-test .venv/.has-docs: .venv/.has-user
+
+# The module is compiled into python/udd, which needs only maturin.
+.venv/.module: .venv/.has-build $(SOURCES)
+	$(STEP) "compiling the module" env VIRTUAL_ENV=$(CURDIR)/.venv $(BIN)/maturin develop --release --locked --skip-install
 	@touch $@
 
-.venv/.browser: tests/browser/requirements.txt .venv/.udd
+# The package in .venv points to python/udd; this is done again only where its description changes.
+.venv/.udd: pyproject.toml Cargo.toml | .venv/.module
+	$(STEP) "udd into .venv" env MATURIN_PEP517_ARGS=--locked $(PIP) --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# All lists that the checks need, one after the other.
+.venv/.packages: $(addprefix requirements/,build.txt user.txt test.txt lint.txt docs.txt) .venv/.made
+	+@$(MAKE) --no-print-directory BESIDE= $(addprefix .venv/.has-,user test lint docs)
+	@touch $@
+
+# Packages are downloaded while the module is compiled.
+.venv/.ready-%: $(wildcard requirements/*.txt) $(SOURCES)
+	+@$(MAKE) --no-print-directory -j2 BESIDE=1 .venv/.has-$* .venv/.module
+	+@$(MAKE) --no-print-directory .venv/.udd
+	@touch $@
+
+.venv/.browser: tests/browser/requirements.txt .venv/.ready-test
 	@command -v chromium chromium-browser google-chrome >/dev/null || \
 	  { as=$$([ "$$(id -u)" = 0 ] || echo sudo); $$as apt-get update -qq && $$as apt-get install -qq --yes --no-install-recommends chromium; }
 	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --only-binary :all: -r $<
