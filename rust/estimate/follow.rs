@@ -139,6 +139,7 @@ where
 
     /// What `one` makes of every link, given its number, its span and where to keep it; `none` for frames that are
     /// not linked. It is kept where `found` was.
+    #[allow(clippy::type_complexity, reason = "a name for it would take as many parameters")]
     pub(super) fn each_link<S, T: Clone + Send + Sync>(
         &self,
         point: &Point<D>,

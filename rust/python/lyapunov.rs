@@ -63,7 +63,7 @@ fn collect<const D: usize, const N: usize>(orbits: &[Option<Exponents<D, N>>]) -
                 mean: &orbit.moments.first,
                 product: orbit.moments.second.as_flattened(),
                 end: &orbit.x,
-                outcome: outcome_code(orbit.outcome.clone()),
+                outcome: outcome_code(orbit.outcome),
             },
             None => Row {
                 value: &lost.as_flattened()[..N],

@@ -7,6 +7,9 @@ use std::sync::{Mutex, PoisonError};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
+/// Work on a part of a list, given the number of its first.
+type Parts<'a, T, E> = dyn Fn(usize, &mut [T]) -> Result<(), E> + Sync + 'a;
+
 /// Parts for each thread: not all take equally long.
 const PARTS: usize = 8;
 
@@ -39,11 +42,7 @@ pub fn in_parts<T: Send>(list: &mut [T], least: usize, work: &(dyn Fn(usize, &mu
 ///
 /// # Errors
 /// That of the first part that fails, which is to be that of the first in it.
-pub fn try_in_parts<T: Send, E: Send>(
-    list: &mut [T],
-    least: usize,
-    work: &(dyn Fn(usize, &mut [T]) -> Result<(), E> + Sync),
-) -> Result<(), E> {
+pub fn try_in_parts<T: Send, E: Send>(list: &mut [T], least: usize, work: &Parts<'_, T, E>) -> Result<(), E> {
     let size = list.len().div_ceil(PARTS * rayon::current_num_threads()).max(least).max(1);
     let mut parts = Vec::with_capacity(list.len().div_ceil(size));
     for part in list.chunks_mut(size) {
