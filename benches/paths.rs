@@ -10,7 +10,7 @@ use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, S
 use udd::formula::{Expression, Names};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
-use udd::model::{DiskFamily, DleFamily, Family};
+use udd::model::{DiskFamily, DleFamily, Family, OwnFamily};
 use udd::run::{
     Crew, Ensemble, Lyapunov, LyapunovOptions, Output, Section, Sections, Stepper, Stop, trajectory,
 };
@@ -47,18 +47,33 @@ fn drives(n: u32) -> Vec<Vec<f64>> {
     (0..n).map(|i| vec![0.05 + 9.95 * f64::from(i) / f64::from(n), 0.0]).collect()
 }
 
-fn ensemble(name: &'static str, stepper: Stepper, rtol: f64, starts: Vec<[f64; 3]>, end: u32) -> Path {
+fn ensemble<F: Family<3> + 'static>(
+    name: &'static str,
+    (family, values): (F, Vec<f64>),
+    stepper: Stepper,
+    rtol: f64,
+    starts: Vec<[f64; 3]>,
+    end: u32,
+) -> Path {
     let units = u64::from(end) * starts.len() as u64;
+    let values = [values];
     let work = move |isa| {
         let times = [0.0, f64::from(end)];
-        let values = [vec![1.0, 0.0]];
         let tolerance = tolerance(rtol);
-        let (family, starts) = (&DleFamily, &starts[..]);
+        let (family, values, starts) = (&family, &values[..], &starts[..]);
         with_crew(isa, |crew| {
-            Ensemble { family, values: &values, starts, times: &times, tolerance, stepper }.run(crew)
+            Ensemble { family, values, starts, times: &times, tolerance, stepper }.run(crew)
         });
     };
     Path { name, units, work: Box::new(work) }
+}
+
+/// A model as text, none of those whose series are written out: Lorenz's of 1963.
+fn lorenz() -> (OwnFamily<3>, Vec<f64>) {
+    let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+    let equations = ["sigma*(y-x)", "x*(rho-z)-y", "x*y-beta*z"];
+    let family = OwnFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]));
+    (family.unwrap(), vec![10.0, 28.0, 8.0 / 3.0])
 }
 
 fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>>, end: u32) -> Path {
@@ -151,11 +166,13 @@ fn fit(name: &'static str, frames: usize) -> Path {
 
 fn paths() -> Vec<Path> {
     let one = || vec![vec![1.0, 0.0]];
+    let dle = || (DleFamily, vec![1.0, 0.0]);
     vec![
-        ensemble("trajectory", Stepper::Taylor, TIGHT, vec![START], 10_000),
-        ensemble("trajectory by dopri5", Stepper::Dopri5, LOOSE, vec![START], 2_000),
-        ensemble("starts", Stepper::Taylor, LOOSE, starts(400), 100),
-        ensemble("starts by dopri5", Stepper::Dopri5, LOOSE, starts(400), 100),
+        ensemble("trajectory", dle(), Stepper::Taylor, TIGHT, vec![START], 10_000),
+        ensemble("trajectory by dopri5", dle(), Stepper::Dopri5, LOOSE, vec![START], 2_000),
+        ensemble("starts", dle(), Stepper::Taylor, LOOSE, starts(400), 100),
+        ensemble("starts by dopri5", dle(), Stepper::Dopri5, LOOSE, starts(400), 100),
+        ensemble("starts of own model", lorenz(), Stepper::Taylor, LOOSE, starts(400), 10),
         exponents::<1>("exponents", LOOSE, drives(64), 500),
         exponents::<3>("spectrum", TIGHT, one(), 2_000),
         exponents::<3>("spectra", TIGHT, drives(64), 100),

@@ -156,6 +156,8 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// Whether many runs are taken in packets: it makes a short law several times as fast, at the cost of
     /// compiling every analysis of it for each instruction set. Others run one by one, with the same bits.
     const PACKETS: bool = false;
+    /// The same for ensembles by the Taylor method alone, where many runs are most wanted.
+    const STARTS_IN_PACKETS: bool = Self::PACKETS;
 
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::{Family, Parameter, Sides, System, parameter};
 use crate::formula::{Expression, Leaf, Mistake, Names};
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
+use crate::unroll::vector;
 
 /// The most intermediate values of an equation; most need few.
 const DEEP: usize = 64;
@@ -19,6 +20,24 @@ pub struct Own<S, const D: usize> {
 }
 
 impl<S: Scalar, const D: usize> Own<S, D> {
+    /// Over packets, which have their tape, this is asked seldom: not worth compiling their formulas.
+    #[inline(never)]
+    fn lane_by_lane(&self, t: S, x: &[S; D]) -> [S; D] {
+        let mut rates = [S::Real::zero(); D];
+        for lane in 0..S::Real::LANES {
+            let leaf = |leaf| match leaf {
+                Leaf::Number(value) => value,
+                Leaf::Time => t.real().lane(lane),
+                Leaf::State(n) | Leaf::Rate(n) => x[n].real().lane(lane),
+                Leaf::Parameter(i) => self.parameters[i].real().lane(lane),
+            };
+            for n in 0..D {
+                rates[n].set_lane(lane, self.equations[n].value_of(leaf, &mut [0.0; DEEP]));
+            }
+        }
+        vector!(S, D; n => S::lift(rates[n]))
+    }
+
     // One function for each kind of number: its loop is large.
     #[inline(never)]
     fn evaluate(&self, t: S, x: &[S; D], stack: &mut [S]) -> [S; D] {
@@ -41,7 +60,9 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 
     #[inline]
     fn rates(&self, t: S, x: &[S; D], _sides: &Sides<S>) -> [S; D] {
-        if self.deep {
+        if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
+            self.lane_by_lane(t, x)
+        } else if self.deep {
             self.evaluate(t, x, &mut [S::zero(); DEEP])
         } else {
             self.evaluate(t, x, &mut [S::zero(); SHALLOW])
@@ -118,6 +139,9 @@ impl<const D: usize> OwnFamily<D> {
 
 impl<const D: usize> Family<D> for OwnFamily<D> {
     type Built<S: Scalar> = Own<S, D>;
+
+    // The usual numbers of states: every one takes its time to compile.
+    const STARTS_IN_PACKETS: bool = 2 <= D && D <= 4;
 
     fn parameters(&self) -> Vec<Parameter> {
         self.parameters.iter().map(|name| parameter(name, "")).collect()

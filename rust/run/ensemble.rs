@@ -62,12 +62,13 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
         }
     }
 
+    #[inline(always)]
     fn start<S: Scalar>(&self, run: usize) -> Start<'_, S, D> {
-        let x = *rows::of(self.starts, run);
+        let x = rows::of(self.starts, run);
         Start {
             values: rows::of::<Vec<f64>>(self.values, run),
             t: self.times[0],
-            x: x.map(S::constant),
+            x: vector!(S, D; n => S::constant(x[n])),
             end: self.times[self.times.len() - 1],
         }
     }
@@ -82,7 +83,7 @@ struct Sampled<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
     type Yield = Passage<D>;
 
-    const PACKETS: bool = F::PACKETS;
+    const PACKETS: bool = F::PACKETS || (F::STARTS_IN_PACKETS && T::PACKETS);
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
@@ -94,11 +95,11 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
         let mut states: Vec<Vec<[f64; D]>> = vec![Vec::new(); R::LANES];
         // The time of each lane's next sample.
         let mut wanted = R::constant(f64::INFINITY);
-        let after = |taken: usize| times.get(taken).copied().unwrap_or(f64::INFINITY);
+        let after = |taken: usize| if taken < times.len() { times[taken] } else { f64::INFINITY };
         let load = |ship: &mut Ship<'_, F, R, D, _, _>, states: &mut [Vec<[f64; D]>], lane: usize, run| {
             let start = start(run);
             states[lane] = Vec::with_capacity(times.len());
-            states[lane].push(start.x.map(|x| x.lane(lane)));
+            states[lane].push(lane_of(&start.x, lane));
             ship.load(lane, run, start);
             after(1)
         };
@@ -123,16 +124,21 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                     }
                     false => *ship.driver.x(),
                 };
-                for lane in (0..R::LANES).filter(|&lane| due.lane(lane)) {
-                    states[lane].push(x.map(|x| x.lane(lane)));
-                    wanted.set_lane(lane, after(states[lane].len()));
+                for lane in 0..R::LANES {
+                    if due.lane(lane) {
+                        states[lane].push(lane_of(&x, lane));
+                        wanted.set_lane(lane, after(states[lane].len()));
+                    }
                 }
             }
             let over = ship.arrived().or(progress.walled()).or(progress.failed);
             if !over.any() {
                 continue;
             }
-            for lane in (0..R::LANES).filter(|&lane| over.lane(lane)) {
+            for lane in 0..R::LANES {
+                if !over.lane(lane) {
+                    continue;
+                }
                 let outcome = if progress.failed.lane(lane) {
                     Err(ship.driver.failure_of(lane))
                 } else if progress.walled().lane(lane) {
@@ -143,7 +149,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                 let Some(run) = ship.unload(lane) else { continue };
                 wanted.set_lane(lane, f64::INFINITY);
                 let own = std::mem::take(&mut states[lane]);
-                let (t, x) = (ship.driver.t().lane(lane), ship.driver.x().map(|x| x.lane(lane)));
+                let (t, x) = (ship.driver.t().lane(lane), lane_of(ship.driver.x(), lane));
                 yields.push(run, Passage { states: own, t, x, outcome });
                 if let Some(run) = queue.take() {
                     wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));
@@ -151,4 +157,10 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
             }
         }
     }
+}
+
+// Not by an adapter, which would be a function of its own.
+#[inline(always)]
+fn lane_of<R: Real, const D: usize>(x: &[R; D], lane: usize) -> [f64; D] {
+    vector!(f64, D; n => x[n].lane(lane))
 }

@@ -118,7 +118,14 @@ fn interpreted<S: Scalar, const D: usize, const N: usize>(
     sides: &Sides<S>,
 ) {
     unroll!(n in 0..D => { work[n][0] = x[n]; });
-    begin(steps, work, held, t, sides);
+    if const { S::Real::LANES > 1 } {
+        // Packets are only fast with their own instructions.
+        for step in steps {
+            step.start(work, held, t, sides);
+        }
+    } else {
+        begin(steps, work, held, t, sides);
+    }
     unroll!(n in 0..D => { work[n][1] = work[usize::from(rates[n])][0]; });
     for k in 1..order.min(N - 1) {
         for step in steps {
@@ -128,7 +135,7 @@ fn interpreted<S: Scalar, const D: usize, const N: usize>(
     }
 }
 
-/// Coefficient 0 of every operation. Once per step: not worth a copy for each instruction set.
+/// Coefficient 0 of every operation. Once per step: over single numbers not worth a copy for each instruction set.
 #[inline(never)]
 fn begin<S: Scalar, const N: usize>(steps: &[Step], work: &mut [[S; N]], held: &[S], t: S, sides: &Sides<S>) {
     for step in steps {

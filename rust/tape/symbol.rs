@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::{Isa, Mask, Plain, Real, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work, elementary};
 
 /// What is known of a number while its model is recorded: how it was made, not its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -52,6 +52,10 @@ impl Function {
     // Never inlined: it would fill the loops over the orders, which need it once per step.
     #[inline(never)]
     pub fn of<S: Scalar>(self, x: S) -> S {
+        if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
+            // The instructions are those that the packets are made of.
+            return S::lift(S::Real::work(Isa::Baseline, Apply(self, x.real())));
+        }
         match self {
             Function::Sqrt => x.sqrt(),
             Function::Exp => x.exp(),
@@ -59,6 +63,26 @@ impl Function {
             Function::Sin => x.sin(),
             Function::Cos => x.cos(),
             Function::Tanh => x.tanh(),
+        }
+    }
+}
+
+/// An elementary function of packets, by their own instructions: the same formulas as [`Function::of`] has.
+struct Apply<R>(Function, R);
+
+impl<R: Real> Work for Apply<R> {
+    type Output = R;
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> R {
+        let Self(function, x) = self;
+        match function {
+            Function::Sqrt => x.sqrt(),
+            Function::Exp => elementary::exp(x),
+            Function::Ln => elementary::ln(x),
+            Function::Sin => elementary::sin_cos(x).0,
+            Function::Cos => elementary::sin_cos(x).1,
+            Function::Tanh => elementary::tanh(x),
         }
     }
 }
