@@ -78,7 +78,7 @@ fn elsewhere<const D: usize>(
 ) -> Vec<[f64; D]> {
     let times: Vec<f64> = std::iter::once(0.0).chain(t.iter().copied()).collect();
     let run = trajectory(
-        &family.build(values),
+        family.build(values),
         Dopri5::default(),
         Output::At(&times),
         x0,
