@@ -34,7 +34,7 @@ endif
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo docs test test-rust test-python lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-discovery bench-tracker bench-page test-browser
+.PHONY: help install demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-discovery bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -54,6 +54,9 @@ test-rust: ## only the tests of the Rust core; needs no Python
 
 test-python: .venv/.ready-test ## only the tests of the Python package (ARGS="-k section" for some of them)
 	$(STEP) "pytest" $(PY) -m pytest -n auto --dist loadfile --durations=25 $(ARGS)
+
+test-slow: .venv/.ready-test ## the tests that `make test` leaves out: what faster ones ask, more precisely
+	$(STEP) "pytest, the slow tests" $(PY) -m pytest -m nightly -n auto --durations=0 $(ARGS)
 
 test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" for some of it)
 	$(STEP) "pytest in a browser" env UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)
