@@ -45,8 +45,8 @@ fn failures<const D: usize>(family: &OwnFamily<D>, centre: [f64; D], times: &[f6
         for (n, threads) in [(2, 1), (3, 1), (11, 1), (21, 1), (21, 2)] {
             let together = run(&starts[..n], isa, threads);
             assert_eq!(together.len(), n);
-            for i in 0..n {
-                assert_eq!(told(&together[i]), told(&alone[i]), "{isa:?}, run {i} of {n}, {:?}", starts[i]);
+            for (i, (one, single)) in together.iter().zip(&alone).enumerate() {
+                assert_eq!(told(one), told(single), "{isa:?}, run {i} of {n}, {:?}", starts[i]);
             }
         }
     }

@@ -141,7 +141,7 @@ impl<const D: usize> Family<D> for OwnFamily<D> {
     type Built<S: Scalar> = Own<S, D>;
 
     // The usual numbers of states: every one takes its time to compile.
-    const STARTS_IN_PACKETS: bool = 2 <= D && D <= 4;
+    const STARTS_IN_PACKETS: bool = matches!(D, 2..=4);
 
     fn parameters(&self) -> Vec<Parameter> {
         self.parameters.iter().map(|name| parameter(name, "")).collect()
