@@ -11,7 +11,7 @@ from udd import _beside
 from udd._expressions import Expression
 from udd.effects.own import is_spline
 from udd.errors import FitError
-from udd.fitting import Fit, fit_record, record_of, refit
+from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
 from udd.measurement import Measurement
 from udd.models import Model
 from udd.own_models import OwnModel
@@ -28,7 +28,6 @@ TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
 #: one drive.
 SAME = 0.9999
-_UNEXPLAINED = 2.5  # chi2 per degree of freedom above which a model does not explain its data, whatever lacks
 _SHORTEST = 60  # frames
 
 
@@ -94,7 +93,7 @@ def discover(
     ['quadratic drag']
     """
     tell = progress or (lambda _text: None)
-    free = None if free is None else list(free)
+    free = free if free is None or isinstance(free, str) else list(free)
     record = record_of(measurement, model)
     one = model if isinstance(model, Model) else next(iter(model))
     given = _given(one, candidates)
@@ -102,26 +101,32 @@ def discover(
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
     train = record.first(TRAIN)
-    options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each, "search": True}
+    options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
 
     tell("fitting the known model")
     _beside.importing("scipy.stats", "pyoperon.sklearn")
-    base, baseline = together(
-        lambda frames: fit_record(measurement, frames, model, free, **options), (record.part(train), record)
-    )
-    search = Search(record, ~train, tell, pace(base), given)
+
+    def fits() -> tuple[Fit, ...]:
+        parts = (record.part(train), record)
+        return tuple(
+            together(lambda some: fit_record(measurement, some, model, **options, search=True), parts)
+        )
+
+    base, baseline = checked_units(measurement, model, options, fits)
+    search = Search(record, ~train, tell, pace(base), given, base.problem.free)
     before = search.errors(base)
-    end = search.run(base, baseline, before)
+    begin = _begin(search, State(base, baseline, before))
+    end = search.run(begin.part, begin.whole, begin.errors)
     tell("fitting the model as found")
     final = refit(end.whole)
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    unexplained = not found and baseline.scatter > _UNEXPLAINED
+    unexplained = not found and baseline.scatter > UNEXPLAINED
     refused: list[Refused] = []
     if unexplained:
         tell("trying what comes nearest")
-        refused = search.refused(State(base, baseline, before), end.looks[-1])
+        refused = search.refused(begin, end.looks[-1])
     if unexplained or doubtful or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     else:
@@ -142,6 +147,20 @@ def discover(
         trained=end.part.put_away(),
         refused=refused,
     )
+
+
+def _begin(search: Search, known: State) -> State:
+    """Where the search begins: the known model's fit, but for one whose drive or camera ran away.
+
+    There a strong effect is missing, and what else could be free bends until it hides what that is.
+    """
+    if not (ran_away(known.part) or ran_away(known.whole)):
+        return known
+    try:
+        part, whole = together(as_stated, (known.part, known.whole))
+        return State(part, whole, search.errors(part))
+    except FitError:
+        return known
 
 
 def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:

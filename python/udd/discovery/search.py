@@ -6,13 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd import _chi2
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level
+from udd.fitting import Fit, Record, at_level, ran_away, released
+from udd.fitting.parameters import Free
 
 from .bearing import ALPHA, Pair, borne_out, same_level
 from .candidates import Candidate
@@ -140,9 +142,10 @@ class Search:
         tell: Callable[[str], None],
         unit: float = 1.0,
         given: Sequence[Candidate] = (),
+        free: Sequence[Free] = (),
     ) -> None:
         self.record, self.held, self.tell = record, held, tell
-        self.unit, self.given = unit, given
+        self.unit, self.given, self.free = unit, given, free
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -175,9 +178,24 @@ class Search:
             accepted.append(found[0])
             states.append(found[1])
             self._prune(accepted, states, looks)
+            states[-1] = self._released(states[-1])
         self._simplify(accepted, states, looks)
-        end = states[-1]
+        end = self._released(states[-1])
         return Outcome(end.part, end.whole, end.errors, accepted, looks)
+
+    def _released(self, state: State) -> State:
+        """With everything free that the user leaves free, unless that goes astray."""
+        names = set(state.part.parameters)
+        if all(f.name in names for f in self.free):
+            return state
+        try:
+            part, whole = together(partial(released, free=self.free), (state.part, state.whole))
+            if not (part.converged and whole.converged) or ran_away(part) or ran_away(whole):
+                return state
+            errors = self.errors(part)
+        except FitError:
+            return state
+        return state if self._worse(state.errors, errors) else State(part, whole, errors)
 
     def refused(self, base: State, look: Look) -> list[Refused]:
         """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
