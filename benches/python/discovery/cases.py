@@ -55,7 +55,7 @@ BATCHES = ("three", "library", "foreign", "strong", "pairs", "nulls", "films")
 _STRONG = (0.3, 3.0)  # times gravity's pull on the motion, see `_strength`
 _RESTING = ("stribeck",)  # it brakes slow disks alone: as strong as that on average it holds them at rest
 _ROUNDS_STRONG = 3
-_LIVELY = 1.0  # rad/s r.m.s.: what brakes so hard that the disk rests makes no record
+_LIVELY = (1.0, 0.01)  # rad/s and m, r.m.s.: what brakes or binds so hard that the disk rests is no record
 
 
 def cases(batch: str, records: int) -> Iterator[Case]:
@@ -164,12 +164,18 @@ def _at_strength(
         law = law.scaled(wanted / size)
         world = World(world.device, (law,))
         motion = staying(world, duration, rng)
-        if motion is None or float(np.sqrt((motion(t)[:, 0] ** 2).mean())) < _LIVELY:
+        if motion is None or not _lively(motion(t)):
             return None
         size = _strength(world, law, motion, t)
         if _STRONG[0] <= size <= _STRONG[1]:
             return world, motion, (size,)
     return None
+
+
+def _lively(states: np.ndarray) -> bool:
+    """Whether the disk turns and its centre moves about."""
+    omega, y, z = states.T[:3]
+    return bool(np.sqrt((omega**2).mean()) > _LIVELY[0] and np.hypot(y.std(), z.std()) > _LIVELY[1])
 
 
 def _strength(world: World, law: Law, motion: Run, t: np.ndarray) -> float:

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 #: Decades by which a stated speed or length may be off: cm, mm and their inverses.
 _DECADES = (-3, -2, -1, 1, 2, 3)
+_DECADE = 4.0  # times that what the frames show may be off a drive in the right unit
 _FRAMES = 250  # of each measurement: enough to tell units apart, and soon done
 #: Nats per number seen by which another unit must be likelier. Right units win by 0.5 and more even where a
 #: strong effect is missing; what a missing effect lends to a wrong one is a tenth of that.
@@ -142,7 +143,10 @@ def other_unit(
     except FitError:
         stated = -np.inf
     best, told = stated + _CLEARLY * sum(int(m.seen.sum()) * len(m.names) for m in short), None
-    for units in zip(*(_units(*pair) for pair in zip(short, models, strict=True)), strict=True):
+    for tried in zip(*(_units(*pair) for pair in zip(short, models, strict=True)), strict=True):
+        units = [unit for unit in tried if unit]
+        if len(units) < len(tried):
+            continue
         try:
             found = evidence([u.measurement for u in units], [u.model for u in units])
             found += sum(u.nats for u in units)
@@ -153,12 +157,16 @@ def other_unit(
     return told
 
 
-def _units(measurement: Measurement, model: Model) -> Iterator[Unit]:
-    """The units that are tried, the same for every measurement."""
+def _units(measurement: Measurement, model: Model) -> Iterator[Unit | None]:
+    """The units that are tried, the same for every measurement; None for one that its frames exclude.
+
+    Of a disk the drive's alone: that its places or its angle are in another unit :func:`ask` sees at once.
+    """
     if isinstance(model, Disk):
         for k in _DECADES if model.W else ():
             drive = model.W * 10.0**k
-            if not 0.1 < drive_seen(measurement) / drive < 10.0:
+            if not 1 / _DECADE < drive_seen(measurement) / drive < _DECADE:
+                yield None
                 continue
             yield Unit(
                 f"the motion is that of a drive of {drive:.3g} m/s, where {model.W:g} m/s was stated: check "
@@ -166,18 +174,6 @@ def _units(measurement: Measurement, model: Model) -> Iterator[Unit]:
                 model.with_parameters({**model.parameters, "W": drive}),
                 measurement,
             )
-        for k in (-2, -3):
-            size = dict.fromkeys(("Y", "Z"), 10.0**k)
-            yield Unit(
-                f"the motion is that of a disk whose Y and Z are in {'cm' if k == -2 else 'mm'}, not in m",
-                model,
-                *_scaled(measurement, size),
-            )
-        yield Unit(
-            "the motion is that of a disk whose beta is in degrees, not in rad",
-            model,
-            *_scaled(measurement, {"beta": _DEGREE}),
-        )
     elif isinstance(model, Pendulum):
         yield Unit(
             "the motion is that of a pendulum whose angle is in degrees, not in rad",
