@@ -17,7 +17,7 @@ from udd.models import Model
 from udd.own_models import OwnModel
 
 from .candidates import Candidate
-from .heldout import pace
+from .heldout import misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
 from .terms import given_terms
@@ -54,8 +54,10 @@ def discover(
     the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
     goes on; effects that do not pass alone are tried in twos and threes. Forms that the data cannot tell
     apart are named. Where no effect passes but the model does not explain the data (chi2 per degree of
-    freedom above 2.5), an effect is present that these data do not name; what comes nearest is listed with
-    its held-out error, but not added.
+    freedom above 2.5, or free runs that miss by the size of the motion), an effect is present that these
+    data do not name; what comes nearest is listed with its held-out error, but not added. Nor is what passes
+    all this while free runs over the last 40 % do not get better beyond doubt, where they are not as good as
+    noise allows already: that fits the first part, and is not confirmed.
 
     Parameters
     ----------
@@ -115,19 +117,23 @@ def discover(
     base, baseline = checked_units(measurement, model, options, fits)
     search = Search(record, ~train, tell, pace(base), given, base.problem.free)
     before = search.errors(base)
-    begin = _begin(search, State(base, baseline, before))
-    end = search.run(begin.part, begin.whole, begin.errors)
+    known = State(base, baseline, before)
+    begin = _begin(search, known)
+    end = search.run(begin, known)
     tell("fitting the model as found")
     final = refit(end.whole)
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    unexplained = not found and baseline.scatter > UNEXPLAINED
-    refused: list[Refused] = []
-    if unexplained:
+    lost = not found and misses_the_motion(before, record, ~train)
+    unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
+    refused: list[Refused] = end.unconfirmed
+    if unexplained and not refused:
         tell("trying what comes nearest")
         refused = search.refused(begin, end.looks[-1])
-    if unexplained or doubtful or any(is_spline(f.effect) for f in found):
+    if not found and end.unconfirmed:
+        verdict = "fits the first part, not confirmed"
+    elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     else:
         verdict = "effect identified" if found else "nothing missing"

@@ -20,8 +20,9 @@ from .scan import Scored
 #: What bears an effect out, of data that were not fitted.
 Witness = Literal["held", "fitted", "halves"]
 #: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; the
-#: held-out data do not bear it out; or another form that fits better fails.
-Failing = Literal["chance", "part", "held", "form"]
+#: held-out data do not bear it out; another form that fits better fails; or it passed all tests but free runs
+#: over the held-out data do not get better beyond doubt.
+Failing = Literal["chance", "part", "held", "form", "unconfirmed"]
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
@@ -135,9 +136,10 @@ class Refused:
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
-    why : {"chance", "part", "held", "form"}
+    why : {"chance", "part", "held", "form", "unconfirmed"}
         Why it is not added: chance does as much, in all data or in the part that effects are sought in; the
-        held-out data do not bear it out; or another form that fits clearly better does not pass.
+        held-out data do not bear it out; another form that fits clearly better does not pass; or it passed,
+        but free runs over the held-out data do not get better beyond doubt.
     """
 
     effect: Effect
@@ -170,7 +172,9 @@ class Discovery:
     Attributes
     ----------
     verdict : str
-        ``"nothing missing"``, ``"effect identified"`` or ``"effect present, form not identified"``.
+        ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or
+        ``"fits the first part, not confirmed"`` where free runs over the held-out data do not bear it out:
+        what that is stands in `refused`.
     baseline, fit : Fit
         The model without and with the added effects, each fitted to all data; the same where none was added.
     effects : list of Found
@@ -191,7 +195,8 @@ class Discovery:
     split : float
         Time from which the data were held out, s; of the first measurement.
     refused : list of Refused
-        Where an effect is present but none passes: what comes nearest, the best first.
+        Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
+        was not confirmed.
     """
 
     verdict: str

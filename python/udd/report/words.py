@@ -11,6 +11,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from udd.discovery.discover import SAME as IDENTICAL
+from udd.discovery.heldout import at_the_floor as floor_reached
 from udd.effects.own import is_spline as is_spline
 
 _SYMBOLS = (
@@ -99,6 +100,13 @@ def enters(effect: Any) -> list[str]:
 def verdict(discovery: Any) -> str:
     """The whole result in one sentence."""
     said = "; and ".join("; or ".join(_meanings(f, discovery)) for f in discovery.effects)
+    if discovery.verdict == "fits the first part, not confirmed":
+        titles = list(dict.fromkeys(near.title for near in discovery.refused if near.why == "unconfirmed"))
+        said = " and ".join(titles)
+        return (
+            f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "
+            "free runs over the part that was held back do not get better by it beyond doubt."
+        )
     if not discovery.effects and discovery.verdict != "nothing missing":
         return "The model lacks something, but no effect of the library explains what."
     if discovery.verdict == "nothing missing" and not at_the_floor(discovery):
@@ -124,6 +132,7 @@ def refused(discovery: Any) -> list[str]:
             "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
             f"as by chance with a probability of {probability(near.p)}",
             "part": "the part in which effects are sought does not show it beyond chance",
+            "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
             "held": "the frames that were held back do not bear it out",
             "form": "another form fits these data clearly better, and does not pass",
         }[near.why]
@@ -137,9 +146,7 @@ def refused(discovery: Any) -> list[str]:
 def at_the_floor(discovery: Any) -> bool:
     """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
     e = discovery.error_before
-    h = discovery.horizon if discovery.horizon is not None else e.horizons[-1]
-    median, low, _high, floor = e.at(h)
-    return bool((low if math.isfinite(low) else median) <= 1.5 * floor)
+    return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
 
 
 def _meanings(found: Any, discovery: Any) -> list[str]:
