@@ -217,7 +217,9 @@ class _Pair:
             return None
         rest = model.with_effects([e for e in model.effects if e.name != effect.name])
         named = renamed(other.effect, rest)
-        return named and cls(found.trained, Candidate(effect, effect.title), replace(other, effect=named))
+        if named is None:
+            return None
+        return cls(found.trained, Candidate(effect, effect.title), replace(other, effect=named))
 
     @cached_property
     def free(self) -> tuple[Free, ...]:
