@@ -17,8 +17,8 @@ import pytest
 import discovered
 import udd
 from udd import _core
-from udd.discovery.innovations import innovations
 from udd.errors import UddError
+from udd.fitting.innovations import innovations
 from udd.report import runs, tables, words
 
 _VOID = {"meta", "img", "br", "link", "input", "hr"}

@@ -251,8 +251,8 @@ class Discovery:
             "held_out_ratio": _named(self.ratio),
             "horizon_s": self.horizon,
             "held_out_from_s": self.split,
-            "baseline": self.baseline.to_dict(),
-            "fit": self.fit.to_dict(),
+            "baseline": self.baseline.numbers(),
+            "fit": self.fit.numbers(),
         }
 
     def report(self, path: str | os.PathLike[str], **details: Any) -> None:

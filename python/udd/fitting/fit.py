@@ -80,6 +80,9 @@ def fit(
     Returns
     -------
     Fit
+        Its ``summary()`` says first whether something is missing: how large an error of the model the record
+        needed beside what a right one needs, whether the innovations are white, what ran off. Where
+        something is, the standard errors contain that.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def fit(
     (found,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
-    return found.put_away()
+    return found.put_away().doubted()
 
 
 def fit_record(
