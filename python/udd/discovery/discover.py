@@ -9,6 +9,7 @@ import numpy as np
 
 from udd import _beside
 from udd._expressions import Expression
+from udd.effects import Effect
 from udd.effects.own import is_spline
 from udd.errors import FitError
 from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
@@ -181,6 +182,19 @@ def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[C
     return []
 
 
+def _title(candidate: Candidate, fitted: Effect) -> str:
+    """What a reader calls an effect: its candidate's title, with the frequency that was fitted."""
+    if fitted.spec.shaped:
+        return fitted.title
+    title = candidate.title
+    for p in fitted.spec.parameters:
+        if p.role == "frequency":
+            tried, found = candidate.effect.parameters[p.name], fitted.parameters[p.name]
+            for digits in (4, 3):
+                title = title.replace(f" {tried:.{digits}g} ", f" {found:.4g} ")
+    return title
+
+
 def _describe(step: Step, final: Fit) -> list[Found]:
     """The effects of a step, with the numbers of the fit to all data."""
     result = []
@@ -190,8 +204,7 @@ def _describe(step: Step, final: Fit) -> list[Found]:
         result.append(
             Found(
                 effect=effect,
-                # A candidate's title states the shape that it was tried with.
-                title=effect.title if effect.spec.shaped else candidate.title,
+                title=_title(candidate, effect),
                 equation=effect.equation,
                 expression=effect.expression,
                 parameters=dict(effect.parameters),
@@ -201,6 +214,7 @@ def _describe(step: Step, final: Fit) -> list[Found]:
                 ratio=step.ratio,
                 witness=step.witness,
                 curve=step.curve,
+                tried=candidate.title,
             )
         )
     return result

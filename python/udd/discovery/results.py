@@ -54,6 +54,8 @@ class Found:
     curve : Curve or None
         Where it was located without a formula: the curve with its band. The effect is that, or a formula
         for it.
+    tried : str
+        What it was called as a candidate, with the shape and the frequency that it was tried with.
     """
 
     effect: Effect
@@ -67,6 +69,7 @@ class Found:
     ratio: Ratio
     witness: Witness
     curve: Curve | None = None
+    tried: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""

@@ -284,13 +284,15 @@ class Fit:
     def summary(self) -> str:
         """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""
         from .doubts import units
+        from .meanings import meaning
 
         known = units(self)
         doubts = self.doubts
         verdict = "converged" if self.converged else "NOT converged"
         head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
         lines = [
-            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {known[name]}".rstrip()
+            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {known[name]:<6} "
+            f"{meaning(name, self.model.kind)}".rstrip()
             for name, value in self.parameters.items()
         ]
         return "\n".join([head, *doubts.sentences, *lines])
