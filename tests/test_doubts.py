@@ -113,3 +113,13 @@ def test_a_pendulum_is_doubted_where_it_lacks_something(seed, drag):
     seen = theta + 2e-3 * np.random.default_rng(seed).standard_normal(len(t))
     found = udd.fit(udd.Measurement(t, {"theta": seen}), udd.Pendulum(0.8, k0=0.02))
     assert found.doubts.missing == bool(drag)
+
+
+def test_an_encoder_has_a_zero_but_no_perspective():
+    t = np.arange(0, 20, 0.04)
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]
+    seen = {"theta": theta + 1e-3 * np.random.default_rng(1).standard_normal(len(t))}
+    filmed = udd.fit(udd.Measurement(t, seen), udd.Pendulum(0.8))
+    assert {"theta0", "aside", "above"} <= set(filmed.parameters)
+    coded = udd.fit(udd.Measurement(t, seen, meta={"sensor": "encoder"}), udd.Pendulum(0.8))
+    assert set(filmed.parameters) - set(coded.parameters) == {"aside", "above"}

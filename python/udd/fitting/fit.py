@@ -70,7 +70,8 @@ def fit(
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
-        ``clock``), or which of them.
+        ``clock``), or which of them. Of a pendulum's angle whose measurement says ``sensor = encoder`` (in its
+        `meta`, or a line of its file) only the zero ``theta0`` is.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional
@@ -130,6 +131,8 @@ def fit_record(
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
     kind = models[0].kind
+    if camera is True and all(own.meta.get("sensor") == "encoder" for own in measurements):
+        camera = _PIVOT.get(kind, ())[:1] if kind == "pendulum" else camera  # its zero, and no perspective
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], OwnModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
