@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import discovered
 import simulated
 import udd
+from udd.cli.discover import describe
 from udd.errors import FitError
 
 E = udd.effects
@@ -109,3 +112,29 @@ def test_a_pendulum_may_go_round():
     theta = udd.simulate(udd.Pendulum(0.5, k0=0.002), t, [12.0, 0.0]).state[:, 1]
     measured = udd.Measurement(t, {"theta": theta + 2e-3 * np.random.default_rng(1).standard_normal(len(t))})
     assert udd.fit(measured, udd.Pendulum(0.5, k0=0.01)).scatter < 1.5
+
+
+def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
+    found = discovered.disk()
+    assert found.remarks == [] and discovered.nothing().remarks == []
+    fit = found.fit
+    far = replace(fit, parameters={**fit.parameters, "W": 0.2 * discovered.DRIVE})
+    doubted = replace(found, fit=far)
+    (remark,) = doubted.remarks
+    assert remark.startswith("The fit leaves what was stated: W = 0.0084 m/s")
+    # It stands beside the verdict, not instead of it.
+    assert describe(doubted).splitlines()[0] == describe(found).splitlines()[0]
+    assert f"  remark: {remark}" in describe(doubted)
+    doubted.report(tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert f'<p class="warn">{remark}</p>' in page and "<strong>effect" in page
+    held = {name: value for name, value in fit.parameters.items() if name not in ("W", "clock")}
+    (remark,) = replace(
+        found,
+        fit=replace(
+            fit,
+            parameters=held,
+            problem=replace(fit.problem, free=tuple(f for f in fit.problem.free if f.name in held)),
+        ),
+    ).remarks
+    assert remark.startswith("Held as stated, because they run away where they are free: W, clock.")

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from udd.effects import Effect
 from udd.fitting import Fit
+from udd.fitting.doubts import ran_off
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -232,6 +233,18 @@ class Discovery:
         """The refitted model with the effects."""
         return self.fit.model
 
+    @property
+    def remarks(self) -> list[str]:
+        """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
+        said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
+        if held:
+            said.append(
+                f"Held as stated, because they run away where they are free: {', '.join(held)}. What was "
+                "found may make up for errors in these."
+            )
+        return said
+
     @cached_property
     def hints(self) -> list[Hint]:
         """What could be filmed to part the forms in doubt, the best first; worked out when asked for."""
@@ -246,6 +259,7 @@ class Discovery:
         """What a machine reads."""
         return {
             "verdict": self.verdict,
+            "remarks": self.remarks,
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],
             "refused": [near.to_dict() for near in self.refused],

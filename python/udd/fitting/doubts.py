@@ -156,7 +156,7 @@ def doubts(fit: Fit) -> Doubts:
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if missing and not tight else 1.0
-    return Doubts(_missed(fit), tight, white, _ran_off(fit), factor)
+    return Doubts(_missed(fit), tight, white, ran_off(fit), factor)
 
 
 def units(fit: Fit) -> dict[str, str]:
@@ -202,7 +202,8 @@ def _white(fit: Fit) -> dict[str, float]:
     return {name: float(value) for name, value in zip(found.names, p, strict=True) if np.isfinite(value)}
 
 
-def _ran_off(fit: Fit) -> list[RanOff]:
+def ran_off(fit: Fit) -> list[RanOff]:
+    """The parameters that left what was stated of them, and frictions that drive."""
     result, known = [], units(fit)
     for free in fit.problem.free:
         value = fit.parameters[free.name]

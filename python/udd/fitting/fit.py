@@ -70,7 +70,7 @@ def fit(
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
-        ``clock``), or which of them. Of a pendulum's angle whose measurement says ``sensor = encoder`` (in its
+        ``clock``), or which of them. Of a pendulum whose measurement says ``sensor = encoder`` (in its
         `meta`, or a line of its file) only the zero ``theta0`` is.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
