@@ -104,7 +104,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
 def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, found):
     monkeypatch.setattr(bearing, "_held_ratio", lambda *_: ratio)
     monkeypatch.setattr(bearing, "_expected", lambda *_: expected)
-    assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=20.0).effects) == found
+    assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0).effects) == found
 
 
 @pytest.mark.parametrize("c", [5e-4, 0.0])
@@ -206,7 +206,7 @@ def test_the_strongest_ripple_is_found_between_lines_too(shift):
 
 
 def test_a_result_is_data():
-    found = search(E.quadratic_drag(c=5e-4), seed=12, duration=20.0)
+    found = search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0)
     text = json.dumps(found.to_dict(), allow_nan=True)
     assert json.dumps(pickle.loads(pickle.dumps(found)).to_dict(), allow_nan=True) == text
     assert json.loads(text)["effects"][0]["parameters"]["c"]["value"] == found.effects[0].parameters["c"]

@@ -202,13 +202,6 @@ def test_bad_input_is_named(change, message):
         udd.fit(**arguments)
 
 
-@pytest.mark.parametrize("factor", [10, 100, 1000])
-def test_a_drive_in_another_unit_is_not_believed(fits, factor):
-    _model, _camera, found = fits[0]
-    with pytest.raises(FitError, match=r"stated: check the drive and its unit|the drive W is in m/s"):
-        udd.fit(found.measurement, udd.Disk(factor * found.model.W))
-
-
 def test_too_little_is_refused():
     t = np.arange(30) * 0.04
     values = np.full((30, 3), np.nan)

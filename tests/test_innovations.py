@@ -11,7 +11,7 @@ import scipy.linalg
 import discovered
 import simulated
 import udd
-from udd.discovery.innovations import Innovations, innovations
+from udd.fitting.innovations import Innovations, innovations
 from udd.measurement import Measurement
 from udd.plot.fits import binned, coordinates
 from udd.report.loose import loosest

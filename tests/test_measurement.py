@@ -201,6 +201,42 @@ def test_semicolons_with_decimal_commas(tmp_path: Path) -> None:
     assert m.t[3] == 0.12 and m["beta"][3] == 0.1 * 3
 
 
+@pytest.mark.parametrize(
+    ("head", "sizes", "told"),
+    [
+        ("Time (ms),Angle (deg)", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
+        ("t_ms,theta_deg", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
+        ("time/min,angle [°]", (1 / 60, 180 / np.pi), "t from min to s, theta from ° to rad"),
+        ("t [s],theta [mrad]", (1.0, 1e3), "theta from mrad to rad"),
+        ("t (s),Y (mm),Z (cm),beta (deg)", (1.0, 1e3, 1e2, 180 / np.pi), "Y from mm to m, Z from cm to m"),
+    ],
+)
+def test_units_in_column_names_are_converted_and_told(
+    tmp_path: Path, head: str, sizes: tuple[float, ...], told: str
+) -> None:
+    truth = np.column_stack([np.arange(40) / 25, *([np.linspace(0.01, 0.7, 40)] * (len(sizes) - 1))])
+    rows = [",".join(f"{x:.12g}" for x in row * sizes) for row in truth]
+    with pytest.warns(UserWarning, match=f"converted {told}"):
+        m = read_measurement(write(tmp_path, "\n".join([head, *rows]) + "\n"))
+    assert np.allclose(np.column_stack([m.t, m.values]), truth, rtol=1e-9)
+
+
+def test_an_angle_in_degrees_is_unwrapped_in_radians(tmp_path: Path) -> None:
+    turned = 9.0 * np.arange(60) / 25
+    rows = [f"{i / 25},{np.degrees(np.angle(np.exp(1j * b))):.12g}" for i, b in enumerate(turned)]
+    with pytest.warns(UserWarning, match="theta from deg to rad"):
+        m = read_measurement(write(tmp_path, "\n".join(["t,theta (deg)", *rows]) + "\n"))
+    assert np.allclose(m["theta"], turned)
+
+
+def test_names_that_only_look_like_units_stay(tmp_path: Path) -> None:
+    rows = "\n".join(f"{i / 25},{i},{0.01 * i},{i}" for i in range(20))
+    m = read_measurement(write(tmp_path, "t,t_ms,theta,x_mm\n" + rows + "\n"))  # the last is not asked for
+    assert m.t[3] == 0.12 and m["theta"][3] == 0.03
+    own = read_measurement(tmp_path / "bad.csv", states=["x_mm"])
+    assert own["x_mm"][3] == 3.0
+
+
 @pytest.mark.skipif(not REAL.is_dir(), reason="the shared real data are not here")
 @pytest.mark.parametrize(
     ("name", "columns", "rows", "first"),

@@ -17,8 +17,11 @@ import pytest
 import discovered
 import udd
 from udd import _core
-from udd.discovery.innovations import innovations
+from udd.discovery.candidates import Candidate
+from udd.discovery.discover import _title
+from udd.discovery.terms import waves
 from udd.errors import UddError
+from udd.fitting.innovations import innovations
 from udd.report import runs, tables, words
 
 _VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -282,3 +285,26 @@ def test_what_no_library_holds_is_told_by_its_curve(tmp_path: Path) -> None:
     assert "torque as a function of beta, with its band" in [image["alt"] for image in page.all("img")]
     assert "Table of the best curves" in page.words
     assert "effects of the library were tried; " not in page.words  # more than these
+
+
+def test_one_equation_s_terms_are_counted() -> None:
+    told = "the rate v' has one more term"
+    assert words._counted([told] * 4) == ["the rate v' has 4 more terms"]
+    assert words._counted([told, "the rate x' has one more term"]) == [told, "the rate x' has one more term"]
+
+
+def test_a_wave_is_called_by_the_frequency_that_was_fitted() -> None:
+    tried = udd.effects.drive_ripple(a=0.1, b=0.0, f=0.284)
+    candidate = Candidate(tried, "drive ripple at 0.284 Hz")
+    assert _title(candidate, tried.replace(f=0.29178)) == "drive ripple at 0.2918 Hz"
+    (wave,) = waves(udd.Model(["v"], {"v": "-v"}), [1.714])
+    assert _title(wave, wave.effect.replace(f=1.7293)) == "a wave of frequency 1.729 in v'"
+
+
+def test_camera_parameters_are_explained_where_they_appear() -> None:
+    t = np.arange(0, 20, 0.05)
+    theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.5]).state[:, 1]
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    text = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0)).summary()
+    assert "zero of the angle" in text
+    assert "pivot above where it was taken to be, in lengths of the pendulum" in text

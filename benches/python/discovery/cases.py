@@ -10,7 +10,7 @@ import numpy as np
 from camera import ALONE, FPS, Camera, drawn, film
 from filmed import filmed
 from information import information
-from laws import FOREIGN, LIBRARY, Kind, Law
+from laws import ASTRAY, FOREIGN, LIBRARY, Kind, Law, Look
 from motion import Device, Run, World, staying
 from units import TRAIN, assumed, threshold
 
@@ -51,7 +51,11 @@ class Record:
     measurement: udd.Measurement
 
 
-BATCHES = ("three", "library", "foreign", "pairs", "nulls", "films")
+BATCHES = ("three", "library", "foreign", "strong", "pairs", "nulls", "films")
+_STRONG = (0.3, 3.0)  # times gravity's pull on the motion, see `_strength`
+_RESTING = ("stribeck",)  # it brakes slow disks alone: as strong as that on average it holds them at rest
+_ROUNDS_STRONG = 3
+_LIVELY = (1.0, 0.01)  # rad/s and m, r.m.s.: what brakes or binds so hard that the disk rests is no record
 
 
 def cases(batch: str, records: int) -> Iterator[Case]:
@@ -64,6 +68,9 @@ def cases(batch: str, records: int) -> Iterator[Case]:
             yield from (Case(batch, (name,), number, (1.0, 10.0)) for name in names)
         elif batch == "foreign":
             yield from (Case(batch, (name,), number, (3.0, 10.0)) for name in FOREIGN)
+        elif batch == "strong":
+            some = [name for name in (*LIBRARY, *FOREIGN, *ASTRAY) if name not in _RESTING]
+            yield from (Case(batch, (name,), number, _STRONG) for name in some)
         elif batch == "pairs":
             rng = np.random.default_rng([zlib.crc32(b"pairs"), number])
             for _ in range(6):
@@ -78,7 +85,7 @@ def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
     """The record of a case; the same for the same seed."""
     rng = np.random.default_rng([seed, zlib.crc32(f"{case.batch} {case.title}".encode()), case.number])
     t = np.arange(0, TRAIN * duration, 1 / FPS)
-    kinds = [(LIBRARY | FOREIGN)[name] for name in case.names]
+    kinds = [(LIBRARY | FOREIGN | ASTRAY)[name] for name in case.names]
     for _ in range(_DRAWS):
         drive = rng.uniform(*DRIVES)
         known = udd.Disk(drive)
@@ -88,7 +95,10 @@ def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
         camera = _camera(case, rng, precise)
         wanted = np.exp(rng.uniform(*np.log(case.multiples), len(kinds)))
         close = _CLOSE if case.multiples[0] == case.multiples[1] else _NEAR
-        made = _at_multiples(World(device), kinds, wanted, close, camera, known, t, duration, rng)
+        if case.batch == "strong":
+            made = _at_strength(World(device), kinds[0], float(wanted[0]), t, duration, rng)
+        else:
+            made = _at_multiples(World(device), kinds, wanted, close, camera, known, t, duration, rng)
         if made is None:
             continue
         world, motion, multiples = made
@@ -139,6 +149,43 @@ def _at_multiples(
         if motion is None:
             return None
     return None
+
+
+def _at_strength(
+    world: World, kind: Kind, wanted: float, t: np.ndarray, duration: float, rng: np.random.Generator
+) -> tuple[World, Run, tuple[float, ...]] | None:
+    """The law as strong as wanted, and a motion that goes on and stays between the wheels."""
+    motion = staying(world, duration, rng)
+    if motion is None:
+        return None
+    law = _unit(kind, motion, t, rng)
+    size = _strength(world, law, motion, t)
+    for _ in range(_ROUNDS_STRONG):
+        law = law.scaled(wanted / size)
+        world = World(world.device, (law,))
+        motion = staying(world, duration, rng)
+        if motion is None or not _lively(motion(t)):
+            return None
+        size = _strength(world, law, motion, t)
+        if _STRONG[0] <= size <= _STRONG[1]:
+            return world, motion, (size,)
+    return None
+
+
+def _lively(states: np.ndarray) -> bool:
+    """Whether the disk turns and its centre moves about."""
+    omega, y, z = states.T[:3]
+    return bool(np.sqrt((omega**2).mean()) > _LIVELY[0] and np.hypot(y.std(), z.std()) > _LIVELY[1])
+
+
+def _strength(world: World, law: Law, motion: Run, t: np.ndarray) -> float:
+    """How strong a law is: r.m.s. of its torque in units of gravity's g Y, of its velocity in units of W."""
+    omega, y, z, beta = motion(t).T
+    d = world.device
+    push = law.kind.formula(Look(d, t, omega, y, z, beta), law.amplitudes, law.shape)
+    torque = np.sqrt(np.mean((push.torque - push.k * omega) ** 2) / np.mean((d.g * y) ** 2))
+    moved = np.sqrt(np.mean(np.broadcast_to(push.u**2 + push.w**2, t.shape))) / d.W
+    return float(max(torque, moved))
 
 
 def _multiple(world: World, law: Law, motion: Run, camera: Camera, known: udd.Disk, t: np.ndarray) -> float:

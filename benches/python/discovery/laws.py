@@ -179,6 +179,14 @@ def _uneven_grip(at: Look, p: Any, s: dict[str, float]) -> Push:
     return Push(w=p[0] * at.device.W * np.exp(np.cos(theta - s["at"]) - 1))
 
 
+def _beta_friction(at: Look, p: Any, s: dict[str, float]) -> Push:
+    return Push(k=p[0] * np.exp(3 * (np.cos(at.beta - s["at"]) - 1)))
+
+
+def _saturating_slip(at: Look, p: Any, s: dict[str, float]) -> Push:
+    return Push(w=-p[0] * np.tanh(at.z / s["over"]))
+
+
 BOTH = ("constraint", "consistent")
 CONSISTENT = ("consistent",)
 
@@ -218,5 +226,16 @@ FOREIGN = {
             "lateral_bump", _lateral_bump, ("dY",), BOTH, shapes={"at": (0.01, 0.03), "over": (4e-3, 0.012)}
         ),
         Kind("uneven_grip", _uneven_grip, ("dZ",), BOTH, shapes={"at": (0.5, 3.0)}),
+    )
+}
+
+#: Effects that no library holds and that were seen to lead the fit of the plain model far astray.
+ASTRAY = {
+    kind.name: kind
+    for kind in (
+        Kind("beta_friction", _beta_friction, ("dOmega",), positive=True, shapes={"at": (0.5, 6.0)}),
+        Kind(
+            "saturating_slip", _saturating_slip, ("dZ",), BOTH, positive=True, shapes={"over": (5e-3, 0.02)}
+        ),
     )
 }

@@ -65,6 +65,7 @@ def describe(found: Discovery) -> str:
 
     numbers = words.headline(found)
     lines = [f"{found.verdict}: {words.verdict(found)}"]
+    lines += [f"  remark: {plain(remark)}" for remark in found.remarks]
     for effect in found.effects:
         unit = {p.name: p.unit for p in effect.effect.spec.parameters}
         is_spline = words.is_spline(effect.effect)

@@ -21,10 +21,14 @@ def absorbed(curve: Curve, fit: Fit) -> Absorbed:
     (known,) = score_splines(responses(fit), [curve.slot], curve.coordinates, curve.splines, known=True)
     k = len(known.information)
     full = known.information + 1e-9 * np.trace(known.information) / k * np.eye(k)
-    share, vectors = eigh(curve.score.information, full)
-    rows = vectors[:, share < _ABSORBED].T @ full
-    across = curve.covariance @ rows.T
-    return Absorbed(rows, np.linalg.solve(rows @ across, across.T).T if len(rows) else across)
+    try:
+        share, vectors = eigh(curve.score.information, full)
+        rows = vectors[:, share < _ABSORBED].T @ full
+        across = curve.covariance @ rows.T
+        return Absorbed(rows, np.linalg.solve(rows @ across, across.T).T if len(rows) else across)
+    except (np.linalg.LinAlgError, ValueError):
+        # Where the record moves the curve's places not at all, nothing can be said of who does what there.
+        return Absorbed(np.zeros((0, k)), np.zeros((k, 0)))
 
 
 def distinct(curve: Curve, fit: Fit) -> Curve:

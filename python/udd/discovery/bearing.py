@@ -92,11 +92,19 @@ def _expected(part: Fit, whole: Pair, names: Sequence[str]) -> float:
 
     def information(fit: Fit) -> Array:
         own = [list(fit.parameters).index(name) for name in names]
-        found: Array = np.asarray(np.linalg.inv(fit.covariance[np.ix_(own, own)]), dtype=np.float64)
-        return found
+        return _inverse(fit.covariance[np.ix_(own, own)])
 
     size = np.array([part.parameters[name] for name in names])
     return float(size @ (information(after) - information(part)) @ size / after.inflation(before))
+
+
+def _inverse(covariance: Array) -> Array:
+    """The inverse; of a covariance without one that of what it does tell."""
+    try:
+        result: Array = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        result = np.asarray(np.linalg.pinv(covariance, hermitian=True), dtype=np.float64)
+    return result
 
 
 def _crosswise(whole: Pair, unit: float) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,20 @@ class Candidate:
     def amplitude_names(self) -> list[str]:
         """The amplitudes' names among a model's parameters."""
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]
+
+
+def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
+    """The effect under a name that the model has not given yet; None where it is the library's.
+
+    A model has an effect of the library but once, and its name is the library's own.
+    """
+    taken = {one.name for one in model.effects}
+    if effect.name not in taken:
+        return effect
+    if effect.made is None:
+        return None
+    name = next(n for n in (f"{effect.name}_{k}" for k in itertools.count(2)) if n not in taken)
+    return replace(effect, name=name, made=replace(effect.made, name=name))
 
 
 def library(model: Model, given: Sequence[Candidate] = ()) -> list[Candidate]:

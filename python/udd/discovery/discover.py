@@ -9,15 +9,16 @@ import numpy as np
 
 from udd import _beside
 from udd._expressions import Expression
+from udd.effects import Effect
 from udd.effects.own import is_spline
 from udd.errors import FitError
-from udd.fitting import Fit, fit_record, record_of, refit
+from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
 from udd.measurement import Measurement
 from udd.models import Model
 from udd.own_models import OwnModel
 
 from .candidates import Candidate
-from .heldout import pace
+from .heldout import misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
 from .terms import given_terms
@@ -28,7 +29,6 @@ TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
 #: one drive.
 SAME = 0.9999
-_UNEXPLAINED = 2.5  # chi2 per degree of freedom above which a model does not explain its data, whatever lacks
 _SHORTEST = 60  # frames
 
 
@@ -55,8 +55,10 @@ def discover(
     the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
     goes on; effects that do not pass alone are tried in twos and threes. Forms that the data cannot tell
     apart are named. Where no effect passes but the model does not explain the data (chi2 per degree of
-    freedom above 2.5), an effect is present that these data do not name; what comes nearest is listed with
-    its held-out error, but not added.
+    freedom above 2.5, or free runs that miss by the size of the motion), an effect is present that these
+    data do not name; what comes nearest is listed with its held-out error, but not added. Nor is what passes
+    all this while free runs over the last 40 % do not get better beyond doubt, where they are not as good as
+    noise allows already: that fits the first part, and is not confirmed.
 
     Parameters
     ----------
@@ -94,7 +96,7 @@ def discover(
     ['quadratic drag']
     """
     tell = progress or (lambda _text: None)
-    free = None if free is None else list(free)
+    free = free if free is None or isinstance(free, str) else list(free)
     record = record_of(measurement, model)
     one = model if isinstance(model, Model) else next(iter(model))
     given = _given(one, candidates)
@@ -102,27 +104,37 @@ def discover(
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
     train = record.first(TRAIN)
-    options: dict[str, Any] = {"camera": camera, "priors": priors, "each": each, "search": True}
+    options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
 
     tell("fitting the known model")
     _beside.importing("scipy.stats", "pyoperon.sklearn")
-    base, baseline = together(
-        lambda frames: fit_record(measurement, frames, model, free, **options), (record.part(train), record)
-    )
-    search = Search(record, ~train, tell, pace(base), given)
+
+    def fits() -> tuple[Fit, ...]:
+        parts = (record.part(train), record)
+        return tuple(
+            together(lambda some: fit_record(measurement, some, model, **options, search=True), parts)
+        )
+
+    base, baseline = checked_units(measurement, model, options, fits)
+    search = Search(record, ~train, tell, pace(base), given, base.problem.free)
     before = search.errors(base)
-    end = search.run(base, baseline, before)
+    known = State(base, baseline, before)
+    begin = _begin(search, known)
+    end = search.run(begin, known)
     tell("fitting the model as found")
     final = refit(end.whole)
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    unexplained = not found and baseline.scatter > _UNEXPLAINED
-    refused: list[Refused] = []
-    if unexplained:
+    lost = not found and misses_the_motion(before, record, ~train)
+    unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
+    refused: list[Refused] = end.unconfirmed
+    if unexplained and not refused:
         tell("trying what comes nearest")
-        refused = search.refused(State(base, baseline, before), end.looks[-1])
-    if unexplained or doubtful or any(is_spline(f.effect) for f in found):
+        refused = search.refused(begin, end.looks[-1])
+    if not found and end.unconfirmed:
+        verdict = "fits the first part, not confirmed"
+    elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     else:
         verdict = "effect identified" if found else "nothing missing"
@@ -144,6 +156,20 @@ def discover(
     )
 
 
+def _begin(search: Search, known: State) -> State:
+    """Where the search begins: the known model's fit, but for one whose drive or camera ran away.
+
+    There a strong effect is missing, and what else could be free bends until it hides what that is.
+    """
+    if not (ran_away(known.part) or ran_away(known.whole)):
+        return known
+    try:
+        part, whole = together(as_stated, (known.part, known.whole))
+        return State(part, whole, search.errors(part))
+    except FitError:
+        return known
+
+
 def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:
     """The user's own candidates."""
     listed = list(candidates)
@@ -156,6 +182,19 @@ def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[C
     return []
 
 
+def _title(candidate: Candidate, fitted: Effect) -> str:
+    """What a reader calls an effect: its candidate's title, with the frequency that was fitted."""
+    if fitted.spec.shaped:
+        return fitted.title
+    title = candidate.title
+    for p in fitted.spec.parameters:
+        if p.role == "frequency":
+            tried, found = candidate.effect.parameters[p.name], fitted.parameters[p.name]
+            for digits in (4, 3):
+                title = title.replace(f" {tried:.{digits}g} ", f" {found:.4g} ")
+    return title
+
+
 def _describe(step: Step, final: Fit) -> list[Found]:
     """The effects of a step, with the numbers of the fit to all data."""
     result = []
@@ -165,8 +204,7 @@ def _describe(step: Step, final: Fit) -> list[Found]:
         result.append(
             Found(
                 effect=effect,
-                # A candidate's title states the shape that it was tried with.
-                title=effect.title if effect.spec.shaped else candidate.title,
+                title=_title(candidate, effect),
                 equation=effect.equation,
                 expression=effect.expression,
                 parameters=dict(effect.parameters),
@@ -176,6 +214,7 @@ def _describe(step: Step, final: Fit) -> list[Found]:
                 ratio=step.ratio,
                 witness=step.witness,
                 curve=step.curve,
+                tried=candidate.title,
             )
         )
     return result

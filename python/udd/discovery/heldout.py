@@ -30,6 +30,8 @@ _AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
 _UNITS = 24  # that the part which is fitted should at least be long
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
+_FLOOR = 1.5  # times the noise floor that an error may be and still be noise
+_LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
 
 
@@ -196,6 +198,40 @@ def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0,
     """
     costs = np.column_stack([after, before])
     return _ratio(stretches(record, _COST_BLOCK * unit), costs, _sum, seed)
+
+
+def confirmed(before: Errors, ratio: Ratio) -> bool:
+    """Whether free runs on held-out data confirm a claim: their errors' ratio is below 1 with 95 %.
+
+    Where the known model's runs are no worse than noise makes them they cannot show a small effect, and must
+    but not contradict it; over a pendulum's whole run it adds up. No interval confirms nothing.
+    """
+    _value, low, high = ratio
+    if not np.isfinite(high) or low > 1.0:
+        return False
+    return high < 1.0 or (before.unit != "rad" and at_the_floor(before, comparison_horizon(before)))
+
+
+def at_the_floor(errors: Errors, horizon: float) -> bool:
+    """Whether errors are no larger than noise makes them, give or take a half."""
+    median, low, _high, floor = errors.at(horizon)
+    return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
+
+
+def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -> bool:
+    """Whether free runs miss by the size of the motion, where noise does not: no such model is complete.
+
+    Of a pendulum over the whole held-out part, else at the horizon of comparison.
+    """
+    if errors.unit == "rad":
+        error, floor = errors.whole, float(errors.floor[-1])
+    else:
+        error, _low, _high, floor = errors.at(comparison_horizon(errors))
+    size = 1.0
+    if errors.unit != "spread":
+        places = record.seen[held & _there(record)][:, : 2 if errors.unit == "m" else 1]
+        size = float(np.sqrt(places.var(axis=0).sum()))
+    return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
 
 
 def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:

@@ -19,7 +19,7 @@ from udd.fitting.problem import Point, Problem
 from udd.models import Disk, Model, Pendulum
 from udd.trajectory import simulate
 
-from .candidates import Candidate
+from .candidates import Candidate, renamed
 from .together import together
 
 if TYPE_CHECKING:
@@ -120,7 +120,9 @@ def hints(found: Discovery) -> list[Hint]:
     """
     if not found.alternatives:
         return []
-    pairs = [_Pair.of(found, other) for other in found.alternatives]
+    pairs = [pair for other in found.alternatives if (pair := _Pair.of(found, other))]
+    if not pairs:
+        return []
     now = [pair.nats(None) for pair in pairs]
 
     def told(film: Film) -> tuple[str, dict[str, float]] | None:
@@ -207,9 +209,17 @@ class _Pair:
     other: Alternative
 
     @classmethod
-    def of(cls, found: Discovery, other: Alternative) -> _Pair:
-        effect = next(e for e in found.trained.model.effects if e.name == other.instead_of)
-        return cls(found.trained, Candidate(effect, effect.title), other)
+    def of(cls, found: Discovery, other: Alternative) -> _Pair | None:
+        """None where the model has the alternative already, beside what was chosen."""
+        model = found.trained.model
+        effect = next((e for e in model.effects if e.name == other.instead_of), None)
+        if effect is None:
+            return None
+        rest = model.with_effects([e for e in model.effects if e.name != effect.name])
+        named = renamed(other.effect, rest)
+        if named is None:
+            return None
+        return cls(found.trained, Candidate(effect, effect.title), replace(other, effect=named))
 
     @cached_property
     def free(self) -> tuple[Free, ...]:

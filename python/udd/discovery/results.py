@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from udd.effects import Effect
 from udd.fitting import Fit
+from udd.fitting.doubts import ran_off
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -20,8 +21,9 @@ from .scan import Scored
 #: What bears an effect out, of data that were not fitted.
 Witness = Literal["held", "fitted", "halves"]
 #: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; the
-#: held-out data do not bear it out; or another form that fits better fails.
-Failing = Literal["chance", "part", "held", "form"]
+#: held-out data do not bear it out; another form that fits better fails; or it passed all tests but free runs
+#: over the held-out data do not get better beyond doubt.
+Failing = Literal["chance", "part", "held", "form", "unconfirmed"]
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
@@ -53,6 +55,8 @@ class Found:
     curve : Curve or None
         Where it was located without a formula: the curve with its band. The effect is that, or a formula
         for it.
+    tried : str
+        What it was called as a candidate, with the shape and the frequency that it was tried with.
     """
 
     effect: Effect
@@ -66,6 +70,7 @@ class Found:
     ratio: Ratio
     witness: Witness
     curve: Curve | None = None
+    tried: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -135,9 +140,10 @@ class Refused:
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
-    why : {"chance", "part", "held", "form"}
+    why : {"chance", "part", "held", "form", "unconfirmed"}
         Why it is not added: chance does as much, in all data or in the part that effects are sought in; the
-        held-out data do not bear it out; or another form that fits clearly better does not pass.
+        held-out data do not bear it out; another form that fits clearly better does not pass; or it passed,
+        but free runs over the held-out data do not get better beyond doubt.
     """
 
     effect: Effect
@@ -170,7 +176,9 @@ class Discovery:
     Attributes
     ----------
     verdict : str
-        ``"nothing missing"``, ``"effect identified"`` or ``"effect present, form not identified"``.
+        ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or
+        ``"fits the first part, not confirmed"`` where free runs over the held-out data do not bear it out:
+        what that is stands in `refused`.
     baseline, fit : Fit
         The model without and with the added effects, each fitted to all data; the same where none was added.
     effects : list of Found
@@ -191,7 +199,8 @@ class Discovery:
     split : float
         Time from which the data were held out, s; of the first measurement.
     refused : list of Refused
-        Where an effect is present but none passes: what comes nearest, the best first.
+        Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
+        was not confirmed.
     """
 
     verdict: str
@@ -224,6 +233,18 @@ class Discovery:
         """The refitted model with the effects."""
         return self.fit.model
 
+    @property
+    def remarks(self) -> list[str]:
+        """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
+        said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
+        if held:
+            said.append(
+                f"Held as stated, because they run away where they are free: {', '.join(held)}. What was "
+                "found may make up for errors in these."
+            )
+        return said
+
     @cached_property
     def hints(self) -> list[Hint]:
         """What could be filmed to part the forms in doubt, the best first; worked out when asked for."""
@@ -238,6 +259,7 @@ class Discovery:
         """What a machine reads."""
         return {
             "verdict": self.verdict,
+            "remarks": self.remarks,
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],
             "refused": [near.to_dict() for near in self.refused],
@@ -246,8 +268,8 @@ class Discovery:
             "held_out_ratio": _named(self.ratio),
             "horizon_s": self.horizon,
             "held_out_from_s": self.split,
-            "baseline": self.baseline.to_dict(),
-            "fit": self.fit.to_dict(),
+            "baseline": self.baseline.numbers(),
+            "fit": self.fit.numbers(),
         }
 
     def report(self, path: str | os.PathLike[str], **details: Any) -> None:

@@ -201,6 +201,8 @@ def _score(
     n = len(gradient)
     nothing = Scored(candidate, 0.0, 1.0, (0.0,) * n, (np.inf,) * n, True, True)
     own = np.diag(information)
+    if not (np.isfinite(information).all() and np.isfinite(gradient).all()):
+        return nothing  # what runs away from where the motion is says nothing there
     if np.any(own <= _ABSORBED * alone) or np.linalg.eigvalsh(_unit(information)).min() < _ABSORBED:
         return nothing
     covariance = np.linalg.inv(information)

@@ -6,13 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd import _chi2
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level
+from udd.fitting import Fit, Record, at_level, ran_away, released
+from udd.fitting.parameters import Free
 
 from .bearing import ALPHA, Pair, borne_out, same_level
 from .candidates import Candidate
@@ -22,6 +24,7 @@ from .heldout import (
     Errors,
     Ratio,
     comparison_horizon,
+    confirmed,
     held_out_errors,
     improvement,
     whole_improvement,
@@ -128,6 +131,7 @@ class Outcome:
     errors: Errors
     accepted: list[Step]
     looks: list[Look]
+    unconfirmed: list[Refused]
 
 
 class Search:
@@ -140,9 +144,10 @@ class Search:
         tell: Callable[[str], None],
         unit: float = 1.0,
         given: Sequence[Candidate] = (),
+        free: Sequence[Free] = (),
     ) -> None:
         self.record, self.held, self.tell = record, held, tell
-        self.unit, self.given = unit, given
+        self.unit, self.given, self.free = unit, given, free
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -157,11 +162,11 @@ class Search:
             return whole_improvement(before, after)
         return improvement(before, after, comparison_horizon(before))
 
-    def run(self, base: Fit, whole: Fit, before: Errors) -> Outcome:
-        """Add effects until none passes."""
+    def run(self, begin: State, known: State | None = None) -> Outcome:
+        """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
         accepted: list[Step] = []
         looks: list[Look] = []
-        states = [State(base, whole, before)]
+        states = [begin]
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             look = look_around(states[-1].part, self.given)
@@ -175,9 +180,53 @@ class Search:
             accepted.append(found[0])
             states.append(found[1])
             self._prune(accepted, states, looks)
+            states[-1] = self._released(states[-1])
         self._simplify(accepted, states, looks)
-        end = states[-1]
-        return Outcome(end.part, end.whole, end.errors, accepted, looks)
+        states[-1] = self._released(states[-1])
+        number = self._confirmed(known or states[0], states)
+        unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
+        end = states[number] if number else known or states[0]
+        return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed)
+
+    def _confirmed(self, known: State, states: list[State]) -> int:
+        """How many of the steps free runs on the held-out data confirm."""
+        for number in range(len(states) - 1, 0, -1):
+            errors = states[number].errors
+            one_more = self.improvement(states[number - 1].errors, errors)
+            if confirmed(known.errors, self.improvement(known.errors, errors)) and not one_more[1] > 1.0:
+                return number
+        return 0
+
+    def _unconfirmed(self, known: State, steps: list[Step], end: State) -> list[Refused]:
+        """What passed all other tests."""
+        ratio = self.improvement(known.errors, end.errors)
+        return [
+            Refused(
+                effect=next(e for e in end.whole.model.effects if e.name == c.effect.name),
+                title=c.title,
+                chi2=step.chi2,
+                p=step.p,
+                errors=end.errors,
+                ratio=ratio,
+                why="unconfirmed",
+            )
+            for step in steps
+            for c in step.candidates
+        ]
+
+    def _released(self, state: State) -> State:
+        """With everything free that the user leaves free, unless that goes astray."""
+        names = set(state.part.parameters)
+        if all(f.name in names for f in self.free):
+            return state
+        try:
+            part, whole = together(partial(released, free=self.free), (state.part, state.whole))
+            if not (part.converged and whole.converged) or ran_away(part) or ran_away(whole):
+                return state
+            errors = self.errors(part)
+        except FitError:
+            return state
+        return state if self._worse(state.errors, errors) else State(part, whole, errors)
 
     def refused(self, base: State, look: Look) -> list[Refused]:
         """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""

@@ -148,7 +148,7 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
         gain = g[use] ** 2 / (f + own)[use] - np.log1p(f[use] / own[use])
         return float(gain.sum() / 2)
 
-    middle = float(np.log(np.median(f[bent] + 1e-300) / np.median(d.roughness[bent])))
+    middle = float(np.log(_typical(f[bent]) / np.median(d.roughness[bent])))
     grid = middle + np.arange(-_STRETCH, _STRETCH + 0.25, 0.5)
     likely = np.array([evidence(v) for v in grid])
     # How smooth the curve is, is not known for sure: the evidence says how much each precision counts.
@@ -165,6 +165,13 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
         df=float(weight @ (f / total).sum(axis=1)),
         evidence=float(np.log(np.mean(np.exp(likely - likely.max()))) + likely.max()),
     )
+
+
+def _typical(information: Array) -> float:
+    """The median information, of those directions that the record moves where most it does not."""
+    middle = float(np.median(information + 1e-300))
+    moved = information[information > _NOTHING * information.max()]
+    return middle if middle > _NOTHING * information.max() or not len(moved) else float(np.median(moved))
 
 
 def chance(score: Score, roughness: Array) -> tuple[float, float, int]:

@@ -86,6 +86,8 @@ class Trial:
             own = [names.index(name) for name in candidate.amplitude_names]
             a = np.array([self.fit.parameters[names[k]] for k in own])
             block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
+            if np.linalg.matrix_rank(block) < len(own):
+                return False  # its amplitudes trade for each other: it says less than it has numbers
             if a @ np.linalg.solve(block, a) < _chi2.isf(ALPHA, len(own)):
                 return False
         return True

@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 from .annealing import at_level, held, loosened
-from .fit import extend, fit, fit_record, refit, widened
+from .fit import (
+    UNEXPLAINED,
+    as_stated,
+    checked_units,
+    extend,
+    fit,
+    fit_record,
+    ran_away,
+    refit,
+    released,
+    widened,
+)
 from .problem import Fit, data_of
 from .record import Record, record_of
 from .solve import filtered, frame_costs, predicted, within
 
 __all__ = [
+    "UNEXPLAINED",
     "Fit",
     "Record",
+    "as_stated",
     "at_level",
+    "checked_units",
     "data_of",
     "extend",
     "filtered",
@@ -21,8 +35,10 @@ __all__ = [
     "held",
     "loosened",
     "predicted",
+    "ran_away",
     "record_of",
     "refit",
+    "released",
     "widened",
     "within",
 ]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from udd.effects import Effect
 from udd.errors import FitError
 from udd.measurement import Measurement
-from udd.models import Model
+from udd.models import Disk, Model, Pendulum
 from udd.own_models import OwnModel
 
 from .annealing import ROUGH, rough, tighten
@@ -19,13 +20,23 @@ from .own import levels_of
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
 from .record import Record, record_of
-from .solve import solve
+from .solve import SolveError, solve
+from .units import ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
 #: In a search a pendulum's angle that states no error is not taken for better than this part of what is
 #: typical: frames may scatter less, but perspective bends the angle by as much.
 _FAITHFUL = {"pendulum": 0.5}
 _FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
+#: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
+UNEXPLAINED = 2.5
+#: What is free where units are compared: what is known least, and where the pivot is.
+_UNKNOWN = {"disk": ("k0", "k1", "k2"), "pendulum": ("k0",)}
+_HARDLY = {"disk": 0, "pendulum": 1}  # how tightly a model is held there, by the place in the schedule
+_PIVOT = {"disk": ("y0", "z0", "tilt"), "pendulum": ("theta0",)}
+_STATED = ("W", "length")
+_OFF = 3.0  # times the drive that was stated: more than what is missing does
+_PACE = 2.0  # times a pendulum's stated ratio of length to inertia
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 
@@ -59,7 +70,8 @@ def fit(
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
-        ``clock``), or which of them.
+        ``clock``), or which of them. Of a pendulum whose measurement says ``sensor = encoder`` (in its
+        `meta`, or a line of its file) only the zero ``theta0`` is.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional
@@ -69,12 +81,15 @@ def fit(
     Returns
     -------
     Fit
+        Its ``summary()`` says first whether something is missing: how large an error of the model the record
+        needed beside what a right one needs, whether the innovations are white, what ran off. Where
+        something is, the standard errors contain that.
 
     Raises
     ------
     FitError
-        The measurement does not suit the model, is too short, or does not determine the parameters; or it can
-        be followed only with a drive, or a clock, that is far from what was stated.
+        The measurement does not suit the model, is too short, or does not determine the parameters; or its
+        numbers are in another unit than they are taken to be in.
 
     Examples
     --------
@@ -89,7 +104,13 @@ def fit(
     True
     """
     record = record_of(measurement, model)
-    return fit_record(measurement, record, model, free, camera=camera, priors=priors, each=each).put_away()
+    free = free if free is None or isinstance(free, str) else list(free)
+
+    options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
+    (found,) = checked_units(
+        measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
+    )
+    return found.put_away().doubted()
 
 
 def fit_record(
@@ -110,6 +131,8 @@ def fit_record(
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
     kind = models[0].kind
+    if camera is True and all(own.meta.get("sensor") == "encoder" for own in measurements):
+        camera = _PIVOT.get(kind, ())[:1] if kind == "pendulum" else camera  # its zero, and no perspective
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], OwnModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
@@ -120,31 +143,104 @@ def fit_record(
         (list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
         for own, film in zip(models, measurements, strict=True)
     )
-    return _as_stated(_anneal(measurements, problem, Point(record.states, sets)))
+    return _anneal(measurements, problem, Point(record.states, sets))
 
 
-def _as_stated(fitted: Fit) -> Fit:
-    """The fit, unless a disk's drive or clock came out far from what was stated: as with a wrong unit.
+def astray(fitted: Fit) -> bool:
+    """Whether a fit explains so little, or is so far from what was stated, that a unit may be wrong.
 
-    An effect that is missing may well move the drive by a half, and the clock by a tenth.
+    An effect that is missing does as much: :func:`udd.fitting.units.other_unit` tells the two apart.
     """
-    if fitted.model.kind != "disk":
-        return fitted
-    for free in fitted.problem.free:
-        value = fitted.parameters[free.name]
-        if abs(value - free.mean) <= _FAR * free.sd:
-            continue
-        if free.role == "clock" and abs(value) > 0.5:
-            raise FitError(
-                f"the disk can be followed only with a clock that is off by {100 * value:.3g} %: check the "
-                "times, and whether the drive W is in m/s"
-            )
-        if free.name.partition("[")[0] == "W" and not abs(free.mean) / 3 < value < 3 * abs(free.mean):
-            raise FitError(
-                f"the disk can be followed only with a drive of W = {value:.3g} m/s, where {free.mean:g} m/s "
-                "was stated: check the drive and its unit"
-            )
-    return fitted
+    pairs = zip(fitted.models, fitted.problem.models, strict=True)
+    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or any(_pace_is_off(*pair) for pair in pairs)
+
+
+def ran_away(fitted: Fit) -> bool:
+    """Whether the drive or the camera of a fit came out where no drive and no camera is.
+
+    A strong effect that is missing does that: the fit then makes up for it with a clock that is off by a
+    third, or with a drive a fifth of the stated.
+    """
+    parts = [f for f in fitted.problem.free if f.role != "model" or f.name.partition("[")[0] in _STATED]
+    return any(abs(fitted.point.value(f) - f.mean) > _FAR * f.sd for f in parts)
+
+
+def _pace_is_off(found: Model, known: Model) -> bool:
+    """Whether a pendulum swings at another pace than stated by far."""
+    if not (isinstance(found, Pendulum) and isinstance(known, Pendulum)):
+        return False
+    ratio = found.length / found.inertia * known.inertia / known.length
+    return not 1 / _PACE < ratio < _PACE
+
+
+def _drive_is_off(measurement: Measurement, model: Model) -> bool:
+    """Whether the frames alone show another drive than stated by far."""
+    if not isinstance(model, Disk) or measurement.kind != "disk" or not model.W:
+        return False
+    return not 1 / _OFF < drive_seen(measurement) / model.W < _OFF
+
+
+def checked_units(
+    measurement: Measurement | Sequence[Measurement],
+    model: Model | Sequence[Model],
+    options: Mapping[str, Any],
+    fits: Callable[[], tuple[Fit, ...]],
+) -> tuple[Fit, ...]:
+    """Fits of a measurement, unless its numbers are in another unit than they are taken to be in.
+
+    Parameters
+    ----------
+    measurement, model
+        As for :func:`fit`.
+    options : mapping
+        Its ``free``, ``camera``, ``priors`` and ``each``.
+    fits : callable
+        Makes the fits.
+
+    Raises
+    ------
+    FitError
+        What is in another unit; or what `fits` raises.
+    """
+    measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
+    models = _models(model, measurements)
+    free = options["free"]
+    free_parameters(models, **options)  # which says what is wrong with them
+    ask(measurements, models)
+    held = [name for name in _UNKNOWN.get(models[0].kind, ()) if free is None or name in free]
+
+    def check() -> None:
+        told = other_unit(measurements, models, lambda some, own: _loosest(some, own, held))
+        if told:
+            raise FitError(told)
+
+    if any(_drive_is_off(*pair) for pair in zip(measurements, models, strict=True)):
+        check()
+    known = models[0].kind in _UNKNOWN
+    try:
+        found = fits()
+    except SolveError:
+        if known:
+            check()
+        raise
+    if known and any(astray(one) for one in found):
+        check()
+    return found
+
+
+def _loosest(measurements: Sequence[Measurement], models: Sequence[Model], free: Sequence[str]) -> float:
+    """The evidence of a model that is hardly held to, its drive and the camera as stated."""
+    record = record_of(measurements, models)
+    parameters = free_parameters(models, free, _PIVOT.get(models[0].kind, ()))
+    schedule = levels(models[0].kind)[_HARDLY[models[0].kind] :][:1]
+    problem = Problem(
+        tuple(models), record, parameters, stated(record), schedule, schedule[0], likeliest=False
+    )
+    sets = tuple(
+        (list(own.parameters.values()), known_camera(own.kind, film.meta), 0.0)
+        for own, film in zip(models, measurements, strict=True)
+    )
+    return _anneal(tuple(measurements), problem, Point(record.states, sets)).evidence
 
 
 def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement]) -> tuple[Model, ...]:
@@ -210,6 +306,26 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
     problem = replace(problem, free=problem.free + more)
     return tighten(fitted.measurements, problem, found.point, problem.schedule[found.level :])
+
+
+def as_stated(fitted: Fit) -> Fit:
+    """Fit anew with the drive and the camera, but for the pivot, held as they were stated; for a search."""
+    models = fitted.problem.models
+    names = [f.name.partition("[")[0] for f in fitted.problem.free if f.role == "model"]
+    kept = [name for name in dict.fromkeys(names) if name not in _STATED]
+    pivot = [f.name.partition("[")[0] for f in fitted.problem.free if f.role == "camera"]
+    camera = [name for name in dict.fromkeys(pivot) if name in _PIVOT.get(models[0].kind, ())]
+    priors = {f.name: (f.mean, f.sd) for f in fitted.problem.free if f.name in kept}
+    record = fitted.record
+    return fit_record(fitted.measurements, record, models, kept, camera=camera, priors=priors, search=True)
+
+
+def released(fitted: Fit, free: Sequence[Free]) -> Fit:
+    """The same with more parameters free, those of effects that were added to the model beside them."""
+    known = {f.name for f in free}
+    added = tuple(f for f in fitted.problem.free if f.name not in known)
+    problem = replace(fitted.problem, free=(*free, *added))
+    return tighten(fitted.measurements, problem, fitted.point, problem.schedule[fitted.level :])
 
 
 def refit(fitted: Fit) -> Fit:

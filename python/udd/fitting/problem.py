@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from udd.models import Model
 from .noise import Noise, colour
 from .parameters import Free
 from .record import Record
+
+if TYPE_CHECKING:
+    from .doubts import Doubts
 
 Array = NDArray[np.float64]
 
@@ -260,8 +264,55 @@ class Fit:
         misfit, signature = self.misfit / sd, (before.misfit - self.misfit) / sd
         return max(self.scatter, 1.0) * colour(misfit, signature)
 
+    @cached_property
+    def doubts(self) -> Doubts:
+        """What the fit shows of its own faults: whether something is missing, and what ran off."""
+        from .doubts import doubts
+
+        return doubts(self)
+
+    def doubted(self) -> Fit:
+        """The same with standard errors that contain what the model may miss, see :class:`Doubts`."""
+        factor = self.doubts.factor
+        if factor == 1.0:
+            return self
+        errors = {name: factor * error for name, error in self.errors.items()}
+        result = replace(self, errors=errors, covariance=factor**2 * self.covariance)
+        result.__dict__["doubts"] = self.doubts
+        return result
+
+    def summary(self) -> str:
+        """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""
+        from .doubts import units
+        from .meanings import meaning
+
+        known = units(self)
+        doubts = self.doubts
+        verdict = "converged" if self.converged else "NOT converged"
+        head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
+        lines = [
+            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {known[name]:<6} "
+            f"{meaning(name, self.model.kind)}".rstrip()
+            for name, value in self.parameters.items()
+        ]
+        return "\n".join([head, *doubts.sentences, *lines])
+
+    def _repr_html_(self) -> str:
+        """As :meth:`summary`, for notebooks."""
+        from html import escape
+
+        head, *rest = self.summary().split("\n")
+        said = len(self.doubts.sentences)
+        items = "".join(f"<li>{escape(line)}</li>" for line in rest[1:said])
+        table = escape("\n".join(rest[said:]))
+        return f"<p>{escape(head)}: <strong>{escape(rest[0])}</strong></p><ul>{items}</ul><pre>{table}</pre>"
+
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads: parameters with errors, noise, goodness."""
+        """What a machine reads: parameters with errors, noise, goodness, and what there is to doubt."""
+        return self.numbers() | {"doubts": self.doubts.to_dict()}
+
+    def numbers(self) -> dict[str, Any]:
+        """Parameters with errors, noise and goodness, as a machine reads them."""
         return {
             "model": repr(self.model),
             "parameters": {n: {"value": v, "se": self.errors[n]} for n, v in self.parameters.items()},
@@ -277,10 +328,4 @@ class Fit:
         }
 
     def __str__(self) -> str:
-        lines = [
-            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:.2g}"
-            for name, value in self.parameters.items()
-        ]
-        verdict = "converged" if self.converged else "NOT converged"
-        head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
-        return "\n".join([head, *lines])
+        return self.summary()

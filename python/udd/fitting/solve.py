@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 DONE = 0.01
 
 
+class SolveError(FitError):
+    """A fit that could not be solved, as against one that was not put right."""
+
+
 def solve(
     measurements: tuple[Measurement, ...],
     problem: Problem,
@@ -36,7 +40,7 @@ def solve(
     try:
         found = _core.solve(*problem.arguments(point), (iterations, decrease))
     except ValueError as error:
-        raise FitError(_said(error, problem)) from error
+        raise SolveError(_said(error, problem)) from error
     record = problem.record
     names = [f.name for f in problem.free]
     end = Point(found["states"], tuple(found["sets"]), found["linear"])
@@ -46,7 +50,7 @@ def solve(
             for model, (values, _camera, _clock) in zip(problem.models, end.sets, strict=True)
         )
     except ModelError as error:  # a shape left its range
-        raise FitError(f"the fit went where the model has no meaning: {error}") from error
+        raise SolveError(f"the fit went where the model has no meaning: {error}") from error
     seen = record.observed
     # Every state but a run's first is tied to the one before: what remains are the frames' misfits.
     runs = 1 + int((~record.linked).sum())

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import re
+import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from itertools import combinations
 from pathlib import Path
@@ -28,6 +30,21 @@ ALIASES = {
     "θ": "theta",
 }
 ALIASES |= {"β": "beta", "Beta": "beta", "X": "x"}
+#: Units that a column's name may state, and what they are in s, m and rad.
+UNITS: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0},
+    "m": {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
+    "rad": {
+        "rad": 1.0,
+        "mrad": 1e-3,
+        **dict.fromkeys(("deg", "degree", "degrees", "°"), math.pi / 180),
+        **dict.fromkeys(("rev", "turn", "turns"), 2 * math.pi),
+    },
+}
+#: In what a disk's and a pendulum's columns are counted.
+COUNTED: dict[str, str] = {"t": "s", "Y": "m", "Z": "m", "x": "m", "y": "m", "beta": "rad", "theta": "rad"}
+#: Names that a unit may follow without brackets; others may be states of a user's own model.
+_ENDING = ("t", "Y", "Z", "beta", "theta")
 NOTHING = {
     "",
     "nan",
@@ -47,6 +64,7 @@ class Table:
     lines: list[int]
     meta: dict[str, Any]
     comma: bool = False  # decimal comma
+    units: dict[str, str] = field(default_factory=dict)  # as the columns' names state them
 
 
 def read_measurement(
@@ -64,7 +82,9 @@ def read_measurement(
         ``t, Y, Z, beta`` for a disk or ``t, theta`` for a pendulum [s, m, rad]; a pendulum bob's
         ``t, x, y`` [m, pivot at the origin, y up] becomes theta = atan2(x, -y). Optional:
         ``sigma_*``, ``rho_*``, ``flag``. Lines ``# key = value`` become `meta`. Other columns, and
-        lines above the header, are passed over. An empty cell or NaN is a frame where it was not seen.
+        lines above the header, are passed over. A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or
+        ``Y [mm]``, is converted to s, m or rad, and a warning tells so; columns of a user's own model stay in
+        the unit that the model counts in. An empty cell or NaN is a frame where it was not seen.
     columns : str or sequence of str, optional
         The columns' names in order, for a file without a (usable) header: ``"t,theta,_"``. An
         underscore is a column to pass over.
@@ -155,7 +175,7 @@ def _text(raw: bytes, given: list[str] | None) -> Table:
 
     head = next((i for i, row in enumerate(cells[:50]) if "t" in _named(row)), None)
     if given is not None:
-        names = given
+        names, units = _named(given), _stated(given)
         start = (
             head + 1
             if head is not None
@@ -165,7 +185,7 @@ def _text(raw: bytes, given: list[str] | None) -> Table:
             )
         )
     elif head is not None:
-        names, start = _named(cells[head]), head + 1
+        names, units, start = _named(cells[head]), _stated(cells[head]), head + 1
     else:
         first = next(
             (i for i, row in enumerate(cells) if all(_numeric(c, comma) for c in row)),
@@ -176,7 +196,7 @@ def _text(raw: bytes, given: list[str] | None) -> Table:
         raise MeasurementError(
             'no header names the columns: say what they are, for example columns="t,theta,_"'
         )
-    return Table(names, cells[start:], [number for number, _ in body[start:]], meta, comma)
+    return Table(names, cells[start:], [number for number, _ in body[start:]], meta, comma, units)
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -193,9 +213,38 @@ def _split(line: str, mark: str) -> list[str]:
 
 
 def _named(cells: list[str]) -> list[str]:
-    """Names without units and TeX: ``t_{1}`` and ``T [s]`` are both t."""
+    """Names without units and TeX: ``t_{1}``, ``T [s]`` and ``t_ms`` are all t."""
+    return [name for name, _unit in _columns_in(cells)]
+
+
+def _stated(cells: list[str]) -> dict[str, str]:
+    """The units that names state, by the names without them."""
+    return {name: unit for name, unit in _columns_in(cells) if unit}
+
+
+def _columns_in(cells: list[str]) -> list[tuple[str, str]]:
+    """Names and the units that they state; empty where they state none that is known."""
     bare = [re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells]
-    return [ALIASES.get(name, name) for name in bare]
+    names = [ALIASES.get(name, name) for name in bare]
+    result = []
+    for cell, plain, name in zip(cells, bare, names, strict=True):
+        stated = re.search(r"[\[(]\s*([^])]+?)\s*[])]", cell)
+        unit = stated.group(1) if stated else ""
+        # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
+        base, mark, ending = (
+            re.split(r"(_|/)(?=[^_/]*$)", plain, maxsplit=1) if re.search("[_/]", plain) else (plain, "", "")
+        )
+        known = ALIASES.get(base, base)
+        if mark and known in _ENDING and known not in names and _size(known, ending):
+            name, unit = known, ending
+        result.append((name, unit if _size(name.removeprefix("sigma_"), unit) else ""))
+    return result
+
+
+def _size(name: str, unit: str) -> float | None:
+    """What one of a unit is in the unit that a column is counted in; None where it is no unit of that."""
+    known = UNITS.get(COUNTED.get(name, ""), {})
+    return known.get(unit, known.get(unit.lower()))
 
 
 def _value(text: str) -> Any:
@@ -238,7 +287,8 @@ def _parquet(path: Path) -> Table:
         ["" if x is None else str(x) for x in table.column(name).to_pylist()] for name in table.column_names
     ]
     rows = [list(row) for row in zip(*columns, strict=True)]
-    return Table(_named(table.column_names), rows, list(range(1, len(rows) + 1)), meta)
+    names = list(table.column_names)
+    return Table(_named(names), rows, list(range(1, len(rows) + 1)), meta, units=_stated(names))
 
 
 def _measurement(
@@ -255,8 +305,15 @@ def _measurement(
     def need(name: str) -> NDArray[np.float64]:
         if name not in have:
             raise MeasurementError(f"no column {name}: found {', '.join(n for n in table.names if n != '_')}")
-        return _column(table, name)
+        unit = "" if states is not None else table.units.get(name, "")
+        size = _size(name.removeprefix("sigma_"), unit) if unit else 1.0
+        if size in (None, 1.0):
+            return _column(table, name)
+        if not name.startswith("sigma_"):
+            converted[name] = unit
+        return _column(table, name) * size
 
+    converted: dict[str, str] = {}
     names: tuple[str, ...] = DISK if have & {"Y", "Z", "beta"} else PENDULUM
     if states is not None:
         names = tuple(states)
@@ -282,6 +339,9 @@ def _measurement(
     pairs = [f"rho_{a}{b}" for a, b in combinations(names, 2)]
     if have & set(pairs):
         rho = np.column_stack([need(name) for name in pairs])
+    if converted:
+        told = ", ".join(f"{name} from {unit} to {COUNTED[name]}" for name, unit in converted.items())
+        warnings.warn(f"{path}: converted {told}, as the names of its columns say", stacklevel=3)
     meta = {"source": path.name} | extra | table.meta | meta
     quality = _quality(table, names) if "px_per_m" in meta else {}
     m = _located(table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality))

@@ -36,7 +36,7 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
         raise UddError(f"the discovery searched {len(discovery.scans)} times; there is no stage {stage}")
     scan = [s for s in discovery.scans[stage] if not s.absorbed][:most]
     ax = new_axes(ax)
-    chosen = {f.title for f in discovery.effects}
+    chosen = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
     seen: set[str] = set()
     for k, scored in enumerate(scan):

@@ -9,9 +9,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from udd.discovery.innovations import innovations
 from udd.errors import UddError
 from udd.files import write_whole
+from udd.fitting.innovations import innovations
 from udd.pages import templates
 
 from . import figures, own, tables, words

@@ -212,7 +212,7 @@ def curves(discovery: Any, stage: int, most: int = 6) -> list[dict[str, str]]:
 def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str]]:
     """What the score said of the best candidates."""
     rows = []
-    found = {f.title for f in discovery.effects}
+    found = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
     for s in discovery.scans[stage][:most]:
         title = s.candidate.title

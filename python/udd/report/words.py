@@ -11,7 +11,9 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from udd.discovery.discover import SAME as IDENTICAL
+from udd.discovery.heldout import at_the_floor as floor_reached
 from udd.effects.own import is_spline as is_spline
+from udd.fitting.meanings import MEANINGS as MEANINGS
 
 _SYMBOLS = (
     (r"\bOmega\b", "Ω"),
@@ -31,34 +33,6 @@ _SYMBOLS = (
     (r" \* ", " "),
     (r"(?<=[\w)])\*(?=[\w(])", " "),
 )
-
-#: Parameters in words.
-MEANINGS = {
-    "W": "speed at which the wheels lift the disk",
-    "R": "radius of the disk",
-    "g": "gravity",
-    "k0": "friction coefficient of fast rotation",
-    "k1": "friction coefficient at rest",
-    "k2": "how fast friction falls with the speed of rotation",
-    "length": "length of the pendulum",
-    "inertia": "moment of inertia per unit mass",
-    "y0": "contact, to the right of where it was taken to be",
-    "z0": "contact, above where it was taken to be",
-    "tilt": "camera turned clockwise",
-    "scale": "picture larger than taken to be",
-    "right": "centre of the marks, right of the disk's own (red mark on top)",
-    "up": "centre of the marks, above the disk's own (red mark on top)",
-    "lag": "orientation seen later than position",
-    "row": "rolling shutter: time per height in the picture",
-    "shutter": "a 24th of the squared time over which the pictures' positions are means",
-    "lens": "how much larger the lens shows what is 0.1 m from the picture's middle",
-    "middle_y": "the picture's middle, right of the contact",
-    "middle_z": "the picture's middle, above the contact",
-    "clock": "recorded time runs fast",
-    "theta0": "zero of the angle",
-    "aside": "pivot to the right of where it was taken to be, in lengths of the pendulum",
-    "above": "pivot above where it was taken to be, in lengths of the pendulum",
-}
 
 
 @dataclass(frozen=True)
@@ -98,7 +72,14 @@ def enters(effect: Any) -> list[str]:
 
 def verdict(discovery: Any) -> str:
     """The whole result in one sentence."""
-    said = "; and ".join("; or ".join(_meanings(f, discovery)) for f in discovery.effects)
+    said = "; and ".join(_counted(["; or ".join(_meanings(f, discovery)) for f in discovery.effects]))
+    if discovery.verdict == "fits the first part, not confirmed":
+        titles = list(dict.fromkeys(near.title for near in discovery.refused if near.why == "unconfirmed"))
+        said = " and ".join(titles)
+        return (
+            f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "
+            "free runs over the part that was held back do not get better by it beyond doubt."
+        )
     if not discovery.effects and discovery.verdict != "nothing missing":
         return "The model lacks something, but no effect of the library explains what."
     if discovery.verdict == "nothing missing" and not at_the_floor(discovery):
@@ -115,6 +96,14 @@ def verdict(discovery: Any) -> str:
     return f"The model lacks something. Most likely {said}; but this record does not settle its form."
 
 
+def _counted(sentences: list[str]) -> list[str]:
+    """Each sentence once; of terms that one equation has more of, how many."""
+    counts = {text: sentences.count(text) for text in sentences}
+    return [
+        text if n == 1 else text.replace(" one more term", f" {n} more terms") for text, n in counts.items()
+    ]
+
+
 def refused(discovery: Any) -> list[str]:
     """What comes nearest where nothing passes, and why it does not."""
     sentences = []
@@ -124,6 +113,7 @@ def refused(discovery: Any) -> list[str]:
             "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
             f"as by chance with a probability of {probability(near.p)}",
             "part": "the part in which effects are sought does not show it beyond chance",
+            "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
             "held": "the frames that were held back do not bear it out",
             "form": "another form fits these data clearly better, and does not pass",
         }[near.why]
@@ -137,9 +127,7 @@ def refused(discovery: Any) -> list[str]:
 def at_the_floor(discovery: Any) -> bool:
     """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
     e = discovery.error_before
-    h = discovery.horizon if discovery.horizon is not None else e.horizons[-1]
-    median, low, _high, floor = e.at(h)
-    return bool((low if math.isfinite(low) else median) <= 1.5 * floor)
+    return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
 
 
 def _meanings(found: Any, discovery: Any) -> list[str]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _chi2, _core
-from udd.fitting import Fit
+
+from .problem import Fit
 
 Array = NDArray[np.float64]
 

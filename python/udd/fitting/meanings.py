@@ -1,0 +1,39 @@
+"""What the parameters of models and cameras are, in words."""
+
+from __future__ import annotations
+
+#: Parameters in words.
+MEANINGS = {
+    "W": "speed at which the wheels lift the disk",
+    "R": "radius of the disk",
+    "g": "gravity",
+    "k0": "friction coefficient of fast rotation",
+    "k1": "friction coefficient at rest",
+    "k2": "how fast friction falls with the speed of rotation",
+    "length": "length of the pendulum",
+    "inertia": "moment of inertia per unit mass",
+    "y0": "contact, to the right of where it was taken to be",
+    "z0": "contact, above where it was taken to be",
+    "tilt": "camera turned clockwise",
+    "scale": "picture larger than taken to be",
+    "right": "centre of the marks, right of the disk's own (red mark on top)",
+    "up": "centre of the marks, above the disk's own (red mark on top)",
+    "lag": "orientation seen later than position",
+    "row": "rolling shutter: time per height in the picture",
+    "shutter": "a 24th of the squared time over which the pictures' positions are means",
+    "lens": "how much larger the lens shows what is 0.1 m from the picture's middle",
+    "middle_y": "the picture's middle, right of the contact",
+    "middle_z": "the picture's middle, above the contact",
+    "clock": "recorded time runs fast",
+    "theta0": "zero of the angle",
+    "aside": "pivot to the right of where it was taken to be, in lengths of the pendulum",
+    "above": "pivot above where it was taken to be, in lengths of the pendulum",
+}
+
+
+def meaning(name: str, kind: str) -> str:
+    """A free parameter of a model of this kind, or of its camera, in words; empty where it is an effect's."""
+    base = name.partition("[")[0]
+    if kind == "own":
+        return ""
+    return "viscous friction" if base == "k0" and kind == "pendulum" else MEANINGS.get(base, "")

@@ -1,0 +1,125 @@
+"""What a fit says of its own faults: which films lack something, and which numbers ran off."""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import simulated
+import udd
+from udd.cli import main
+
+E = udd.effects
+DRIVE = 0.042
+HIDDEN = {
+    "quadratic drag": E.quadratic_drag(c=0.01),
+    "relaxation": E.relaxation(b=6.0),
+    "dry friction": E.coulomb(c=0.01),
+    "tilt": E.tilt(a=0.04),
+    "ripple": E.drive_ripple(a=0.05, b=0.03, f=0.8),
+    "eccentric mass": E.eccentric_mass(a=0.01, b=-0.01),
+    "uneven disk": E.uneven_disk(a=0.02, b=0.01, n=3),
+    "lateral slip": E.lateral_slip(c=0.05),
+    "slip of no library": E.formula("vertical", "-0.004*tanh(Z/0.01)", name="hidden"),
+    "torque of no library": E.formula("torque", "-0.01*Omega*exp(3*(cos(beta - 1.1) - 1))", name="hidden"),
+}
+
+
+@functools.cache
+def fitted(hidden: str | None, seed: int) -> udd.Fit:
+    """A film of a minute, fitted with the plain model."""
+    effects = [] if hidden is None else [HIDDEN[hidden]]
+    measured, _states = simulated.film(udd.Disk(DRIVE, effects=effects), np.random.default_rng(seed), 60.0)
+    return udd.fit(measured, udd.Disk(DRIVE))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_right_model_is_not_doubted(seed):
+    found = fitted(None, seed)
+    assert not found.doubts.missing and found.doubts.tight and found.doubts.factor == 1.0
+    assert found.doubts.ran_off == [] and not found.doubts.coloured
+    assert "nothing shows that something is missing" in str(found)
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_a_model_that_lacks_something_says_so(hidden, tmp_path: Path, capsys):
+    found = fitted(hidden, 1)
+    assert found.doubts.missing and found.doubts.factor > 10
+    text = found.summary()
+    assert text.splitlines()[1] == "something is missing: run udd discover"
+    assert "the model misses angular accelerations of" in text and "rad/s^2" in text
+    assert "+- " in text and "m^2/s" in text and len(text.splitlines()) < 30
+    assert "something is missing: run udd discover" in found._repr_html_()
+    assert found.to_dict()["doubts"]["missing"] is True
+    # The errors contain the doubt, the covariance with them.
+    truth = {"k0": 0.012, "k1": 0.103, "k2": 0.055, "W": DRIVE}
+    for name, value in truth.items():
+        assert abs(found.parameters[name] - value) < 3 * found.errors[name], name
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), list(found.errors.values()))
+
+
+def test_the_command_says_it_too(tmp_path: Path, capsys):
+    fitted("quadratic drag", 1).measurement.to_csv(tmp_path / "film.csv")
+    assert main(["fit", str(tmp_path / "film.csv"), "--W", str(DRIVE), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["doubts"]["sentences"][0] == "something is missing: run udd discover"
+    assert said["doubts"]["model_error"][0]["needed"] > 10 * said["doubts"]["model_error"][0]["right"]
+
+
+def test_parameters_that_run_off_are_told():
+    t = np.arange(0, 40, 0.05)
+    rng = np.random.default_rng(1)
+    theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.6]).state[:, 1]
+    measured = udd.Measurement(t, {"theta": theta + 2e-3 * rng.standard_normal(len(t))})
+    assert udd.fit(measured, udd.Pendulum(1.02, k0=0.1)).doubts.ran_off == []
+    told = udd.fit(measured, udd.Pendulum(1.5, k0=0.1), priors={"inertia": (2.25, 0.02)})
+    (length,) = [one for one in told.doubts.ran_off if one.name == "length"]
+    assert length.stated == 1.5 and abs(length.value - length.stated) > 3 * length.sd
+    assert "warning: length = " in told.summary() and "taken to be good to" in told.summary()
+
+
+def test_friction_that_drives_is_told():
+    t = np.arange(0, 40, 0.05)
+    theta = 0.2 * np.exp(0.01 * t) * np.cos(3.13 * t)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    found = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.02))
+    assert found.parameters["k0"] < 0
+    assert "which should be positive" in found.summary()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("lacking", ["", "- 0.3*abs(v)*v"])
+def test_a_model_of_ones_own_is_doubted_where_it_lacks_something(seed, lacking):
+    t = np.arange(0, 40, 0.05)
+    equations = {"x": "v", "v": "-k*x - c*v"}
+    known = udd.Model(["x", "v"], equations, {"k": 9.0, "c": 0.1})
+    truth = udd.Model(["x", "v"], equations | {"v": equations["v"] + lacking}, {"k": 9.0, "c": 0.1})
+    x = udd.simulate(truth, t, [1.0, 0.0]).state[:, 0]
+    seen = x + 5e-3 * np.random.default_rng(seed).standard_normal(len(t))
+    found = udd.fit(udd.Measurement(t, {"x": seen}), known)
+    assert found.doubts.missing == bool(lacking)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("drag", [0.0, 0.03])
+def test_a_pendulum_is_doubted_where_it_lacks_something(seed, drag):
+    t = np.arange(0, 60, 0.04)
+    effects = [E.quadratic_drag(c=drag)] if drag else []
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.01, effects=effects), t, [0.0, 0.7]).state[:, 1]
+    seen = theta + 2e-3 * np.random.default_rng(seed).standard_normal(len(t))
+    found = udd.fit(udd.Measurement(t, {"theta": seen}), udd.Pendulum(0.8, k0=0.02))
+    assert found.doubts.missing == bool(drag)
+
+
+def test_an_encoder_has_a_zero_but_no_perspective():
+    t = np.arange(0, 20, 0.04)
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]
+    seen = {"theta": theta + 1e-3 * np.random.default_rng(1).standard_normal(len(t))}
+    filmed = udd.fit(udd.Measurement(t, seen), udd.Pendulum(0.8))
+    assert {"theta0", "aside", "above"} <= set(filmed.parameters)
+    coded = udd.fit(udd.Measurement(t, seen, meta={"sensor": "encoder"}), udd.Pendulum(0.8))
+    assert set(filmed.parameters) - set(coded.parameters) == {"aside", "above"}
