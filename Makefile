@@ -22,6 +22,7 @@ PEERS := .venv-peers/$(notdir $(BIN))
 # Says what is done, and then how many seconds it took.
 STEP := @bash .ci/step
 PIP := $(PY) -m pip install --disable-pip-version-check --progress-bar off --no-input
+EDITABLE := $(PIP) --quiet --no-deps --no-build-isolation --editable .
 # Of what pip says, each download with its size; errors go past this.
 BRIEFLY := grep --line-buffered -E '^==>|(Downloading|Using cached) .*\.whl \('
 
@@ -34,12 +35,18 @@ endif
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-discovery bench-tracker bench-page test-browser
+.PHONY: help install edit demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-discovery bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 install: .venv/.ready-user ## make .venv with all that udd can use (no docs, test or lint), and the release build in it
+
+# What needs the release build makes it again.
+edit: .venv/.has-build .venv/.has-user .venv/.has-test ## for who changes the Rust core: after a changed line a module in seconds, at half of the release's speed
+	@rm -f .venv/.module
+	$(STEP) "compiling what changed" env VIRTUAL_ENV=$(CURDIR)/.venv $(BIN)/maturin develop --profile dev --locked --skip-install
+	@[ -e .venv/.udd ] || { MATURIN_PEP517_ARGS="--locked --profile dev" $(EDITABLE) && touch .venv/.udd; }
 
 demo: .venv/.ready-demo ## from the sample film to the report: run the main job and print where its report is
 	$(STEP) "udd demo" $(BIN)/udd demo
@@ -160,7 +167,7 @@ clean: ## remove .venv and everything that was built
 
 # The package in .venv points to python/udd; this is done again only where its description changes.
 .venv/.udd: pyproject.toml Cargo.toml | .venv/.module
-	$(STEP) "udd into .venv" env MATURIN_PEP517_ARGS=--locked $(PIP) --quiet --no-deps --no-build-isolation --editable .
+	$(STEP) "udd into .venv" env MATURIN_PEP517_ARGS=--locked $(EDITABLE)
 	@touch $@
 
 # All lists that the checks need, one after the other.

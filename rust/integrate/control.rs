@@ -60,6 +60,7 @@ impl<R: Real> Controller<R> {
 }
 
 /// A first step size (Hairer's algorithm, II.4), positive; two evaluations of the rates.
+#[inline(always)]
 pub fn initial_step<S: Scalar, const D: usize>(
     system: &impl System<S, D>,
     at: &Point<S, D>,
@@ -78,6 +79,7 @@ pub fn initial_step<S: Scalar, const D: usize>(
 }
 
 /// The size of an explicit Euler step that changes the state little, and the norm of its rate.
+#[inline(always)]
 fn euler_step<R: Real, const D: usize>(x: &[R; D], rate: &[R; D], tolerance: &Tolerance) -> (R, R) {
     let (size, speed) = (tolerance.norm(*x, *x, *x), tolerance.norm(*rate, *x, *x));
     let small = size.less(R::constant(1e-5)).or(speed.less(R::constant(1e-5)));
@@ -85,6 +87,7 @@ fn euler_step<R: Real, const D: usize>(x: &[R; D], rate: &[R; D], tolerance: &To
 }
 
 /// The size of a step of this order whose curvature is known from the change of the rate over the first one.
+#[inline(always)]
 fn curved_step<R: Real, const D: usize>(
     x: &[R; D],
     change: &[R; D],

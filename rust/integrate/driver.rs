@@ -7,7 +7,7 @@ use super::runge_kutta::Dopri5;
 use super::saltation::pass;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
 use crate::model::{MAX_SURFACES, Sides, System, choose, sides_of};
-use crate::scalar::{Mask, Real, Scalar};
+use crate::scalar::{self, Instructions, Isa, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
 /// What the work was, summed over the lanes.
@@ -172,12 +172,22 @@ where
             let h = h.unwrap_or(S::Real::constant(f64::INFINITY));
             self.h = S::Real::select(lanes, h, self.h);
         } else {
-            self.start_on_sides(lanes, t, h);
+            self.find_start(lanes, t, h);
         }
         self.begin(lanes);
     }
 
-    /// Finds the sides of the law and the size of the first step.
+    /// Finds the sides of the law and the size of the first step; packets do so by their own instructions.
+    #[inline(never)]
+    fn find_start(&mut self, lanes: S::Mask, t: S::Real, h: Option<S::Real>) {
+        if const { S::Real::LANES > 1 } {
+            S::Real::work(Isa::Baseline, FirstStep { driver: self, lanes, t, h });
+        } else {
+            self.start_on_sides(lanes, t, h);
+        }
+    }
+
+    #[inline(always)]
     fn start_on_sides(&mut self, lanes: S::Mask, t: S::Real, h: Option<S::Real>) {
         let mut fresh = self.at;
         fresh.sides = sides_of(&self.system, S::lift(fresh.t), &fresh.x);
@@ -537,6 +547,29 @@ where
     }
 }
 
+/// The sides and the first step of runs that start in some lanes.
+struct FirstStep<'a, M, S: Scalar, const D: usize, E, K> {
+    driver: &'a mut Driver<M, S, D, E, K>,
+    lanes: S::Mask,
+    t: S::Real,
+    h: Option<S::Real>,
+}
+
+impl<M, S, const D: usize, E, K> scalar::Work for FirstStep<'_, M, S, D, E, K>
+where
+    S: Scalar,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        self.driver.start_on_sides(self.lanes, self.t, self.h);
+    }
+}
+
 impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
 where
     S: Scalar<Real = f64, Mask = bool>,
@@ -596,6 +629,7 @@ fn tick<R: Real>(lanes: R::Mask, count: R, by: f64) -> R {
 }
 
 /// At a start exactly on a surface the side is the one the flow goes to.
+#[inline(always)]
 fn start_sides<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &mut Point<S, D>, h: S::Real) {
     for j in 0..system.surfaces() {
         let value = system.surface(j, S::lift(at.t), &at.x, &at.sides).real();

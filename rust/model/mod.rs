@@ -121,7 +121,7 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
 }
 
 /// The sides on which a state lies, by the sign of each surface's function.
-#[inline]
+#[inline(always)]
 pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: &[S; D]) -> Sides<S> {
     let mut sides = [S::mask(true); MAX_SURFACES];
     for j in 0..system.surfaces() {

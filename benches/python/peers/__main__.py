@@ -14,13 +14,13 @@ machine.settle()
 
 from peers import harness, table  # noqa: E402  (numba and jax read the environment once)
 
-ROWS = ("trajectory", "spectrum", "sweep", "starts", "section", "bifurcation", "disk")
+ROWS = ("trajectory", "spectrum", "sweep", "starts", "section", "bifurcation", "disk", "own_model")
 
 
 def main() -> int:
     """Measure, print the tables; 1 where an answer is wrong."""
     parser = argparse.ArgumentParser(prog="python -m peers", description="udd beside its peers")
-    parser.add_argument("--rows", default="1,2,3,4,5,6,7", help="numbers of the rows, such as 1,3")
+    parser.add_argument("--rows", default="1,2,3,4,5,6,7,8", help="numbers of the rows, such as 1,3")
     parser.add_argument("--only", default="", help="names of the codes, such as udd,numba")
     parser.add_argument("--quick", action="store_true", help="a smoke run: short, once, the fast codes only")
     parser.add_argument("--repeats", type=int, default=7, help="turns, each code once in each")

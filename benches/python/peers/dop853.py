@@ -21,6 +21,15 @@ def dle(y: Sequence[str], p: Sequence[str]) -> list[str]:
     return [f"{y[1]} - {y[0]}", f"{y[0]} * {y[2]}", f"{p[0]} - {y[0]} * {y[1]}"]
 
 
+def lorenz(y: Sequence[str], p: Sequence[str]) -> list[str]:
+    """Lorenz's equations of 1963."""
+    return [
+        f"{p[0]} * ({y[1]} - {y[0]})",
+        f"{y[0]} * ({p[1]} - {y[2]}) - {y[1]}",
+        f"{y[0]} * {y[1]} - {p[2]} * {y[2]}",
+    ]
+
+
 def dle_tangent(count: int) -> Rates:
     """The same with this many tangent vectors after the state."""
 

@@ -17,6 +17,13 @@ def dle() -> Equations:
     return [(x, y - x), (y, x * z), (z, hy.par[0] - x * y)]
 
 
+def lorenz() -> Equations:
+    """Lorenz's equations of 1963."""
+    x, y, z = hy.make_vars("x", "y", "z")
+    sigma, rho, beta = hy.par[0], hy.par[1], hy.par[2]
+    return [(x, sigma * (y - x)), (y, x * (rho - z) - y), (z, x * y - beta * z)]
+
+
 def dle_tangent() -> Equations:
     """With one tangent vector after the state."""
     x, y, z = hy.make_vars("x", "y", "z")

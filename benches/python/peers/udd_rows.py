@@ -111,3 +111,21 @@ def disk(rtol: float = 3e-9) -> tuple[str, Any]:
         return udd.simulate(model, times, start, rtol=rtol, atol=1e-3 * rtol, method="taylor").state[-1]
 
     return f"Taylor, rtol {rtol:g}", final
+
+
+def own_model(rtol: float = 2e-9) -> tuple[str, Any]:
+    """The setting, and ``final(start, t)``."""
+    import udd
+    from peers.row_own_model import BETA, RHO, SIGMA
+
+    model = udd.Model(
+        ["x", "y", "z"],
+        ["sigma*(y - x)", "x*(rho - z) - y", "x*y - beta*z"],
+        {"sigma": SIGMA, "rho": RHO, "beta": BETA},
+    )
+
+    def final(start: Any, t: float) -> Any:
+        times = np.array([0.0, t])
+        return udd.simulate(model, times, start, rtol=rtol, atol=1e-3 * rtol, method="taylor").state[-1]
+
+    return f"Taylor, rtol {rtol:g}", final
