@@ -169,6 +169,23 @@ def test_a_fit_tells_its_numbers(disk: Path, capsys: pytest.CaptureFixture[str])
     assert "tilt" not in out
 
 
+def test_several_files_are_fitted_together(
+    disk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    later = tmp_path / "later.csv"
+    discovered.nothing().measurement.slice(8, 16).to_csv(later)
+    options = ["--free", "k0,W", "--no-camera"]
+    alone = data(["fit", disk, *options], capsys)
+    both = data(["fit", disk, later, *options], capsys)
+    assert both["file"] == [str(disk), str(later)]
+    assert set(both["parameters"]) == {"k0", "W[0]", "W[1]"}
+    # Twice the data of the same friction.
+    assert both["parameters"]["k0"]["se"] < alone["parameters"]["k0"]["se"]
+    own = data(["fit", disk, later, *options, "--each", "k0,W"], capsys)
+    assert {"k0[0]", "k0[1]"} < set(own["parameters"])
+    assert "absent.csv" in failed(["fit", disk, tmp_path / "absent.csv"], capsys)
+
+
 def test_discover_tells_the_verdict_first(
     swing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,7 +14,7 @@ from udd.errors import UddError
 
 from .answer import Answer, telling
 from .fit import options
-from .inputs import add_input, check_early, measurement_of, model_of
+from .inputs import add_input, check_early, inputs_of
 from .options import new
 
 if TYPE_CHECKING:
@@ -24,9 +24,12 @@ if TYPE_CHECKING:
 def add(commands: Any) -> None:
     """Add the command."""
     parser = new(
-        commands, "discover", run, "Find the effect that the model lacks, from a film or a measurement."
+        commands,
+        "discover",
+        run,
+        "Find the effect that the model lacks, from a film or a measurement, or from several jointly.",
     )
-    add_input(parser)
+    add_input(parser, several=True)
     parser.add_argument("--report", type=Path, metavar="HTML", help="page to write, pictures first")
 
 
@@ -39,19 +42,18 @@ def run(args: argparse.Namespace) -> Answer:
     check_early(args)
     if args.report is not None and not args.report.parent.is_dir():
         raise UddError(f"{args.report}: there is no folder {args.report.parent}")
-    measurement, film = measurement_of(args)
-    model = model_of(args, measurement)
+    given = inputs_of(args)
     if args.report is not None:
         _beside.importing(
             "matplotlib.figure", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_agg"
         )
     with telling() as tell:
-        found = discover(measurement, model, progress=tell, **options(args))
+        found = discover(*given.measured, progress=tell, **options(args))
         if args.report is not None:
             tell("writing the report")
             command = shlex.join(["udd", *sys.argv[1:]])
-            found.report(args.report, film=film, source=args.file, command=command)
-    text, data = describe(found), {"file": args.file, **found.to_dict()}
+            found.report(args.report, film=given.films[0], source=given.files[0], command=command)
+    text, data = describe(found), {**given.told, **found.to_dict()}
     data["hints"] = [hint.to_dict() for hint in found.hints]
     if args.report is not None:
         text += f"\nreport: {args.report}"

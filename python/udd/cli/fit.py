@@ -6,14 +6,14 @@ import argparse
 from typing import Any
 
 from .answer import Answer, telling
-from .inputs import add_input, check_early, measurement_of, model_of
+from .inputs import add_input, check_early, inputs_of
 from .options import new
 
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = new(commands, "fit", run, "Fit the model to a film or a measurement.")
-    add_input(parser)
+    parser = new(commands, "fit", run, "Fit the model to a film or a measurement, or to several jointly.")
+    add_input(parser, several=True)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -21,15 +21,21 @@ def run(args: argparse.Namespace) -> Answer:
     from udd.fitting import fit
 
     check_early(args)
-    measurement, _film = measurement_of(args)
-    model = model_of(args, measurement)
+    given = inputs_of(args)
     with telling() as tell:
         tell("fitting")
-        found = fit(measurement, model, **options(args))
-    return Answer(str(found), {"file": args.file, **found.to_dict()})
+        found = fit(*given.measured, **options(args))
+    return Answer(str(found), {**given.told, **found.to_dict()})
 
 
 def options(args: argparse.Namespace) -> dict[str, Any]:
     """Options of `udd.fit` and `udd.discover`."""
-    free = None if args.free is None else [name.strip() for name in args.free.split(",") if name.strip()]
-    return {"free": free, "camera": not args.no_camera}
+    return {
+        "free": _names(args.free),
+        "camera": not args.no_camera,
+        "each": _names(getattr(args, "each", None)),
+    }
+
+
+def _names(text: str | None) -> list[str] | None:
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .answer import Answer, telling
 from .fit import options
-from .inputs import add_input, check_early, measurement_of, model_of
+from .inputs import add_input, check_early, inputs_of
 from .options import new
 from .saving import add_out, checked, save_figure
 
@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> Answer:
 
     check_early(args)
     checked(args.out, _DATA)
-    measurement, _film = measurement_of(args)
-    model = model_of(args, measurement)
+    given = inputs_of(args)
+    measurement, model = given.measured
     known = measurement if args.start is None else measurement.rows(measurement.t <= args.start)
     with telling() as tell:
         tell("fitting")
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> Answer:
     for path in args.out:
         _write(path, found)
     text = "\n".join([describe(found), *(f"written: {path}" for path in args.out)])
-    return Answer(text, {"file": args.file, **found.to_dict(), "files": args.out})
+    return Answer(text, {**given.told, **found.to_dict(), "files": args.out})
 
 
 def describe(found: Forecast) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +22,12 @@ _FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wm
 _CUT = 0.01  # share of the promised frames that may be missing
 
 
-def add_input(parser: argparse.ArgumentParser) -> None:
-    """A file and what is known of the device."""
+def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """A file, or several of one device, and what is known of it."""
     parser.add_argument(
-        "file",
+        "files",
+        metavar="FILE",
+        nargs="+" if several else 1,
         type=Path,
         help="a film, or a measurement (CSV or Parquet: t,Y,Z,beta or t,theta, or t and your model's states)",
     )
@@ -42,6 +45,12 @@ def add_input(parser: argparse.ArgumentParser) -> None:
         help='names of the columns of a file without a header, such as "t,theta,_" (_: passed over)',
     )
     add_partial(parser)
+    if several:
+        parser.add_argument(
+            "--each",
+            metavar="NAMES",
+            help="of several files, what each has a value of its own of (default: W)",
+        )
     parser.add_argument(
         "--free", help="the model's free parameters, such as k0,W (default: k0,k1,k2,W and effects)"
     )
@@ -58,6 +67,44 @@ def is_film(path: Path) -> bool:
     except OSError:
         return False  # the reader of tables says what is wrong
     return b"\0" in start and not start.startswith(b"PAR1")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the files hold: the measurements, the models with what their headers say, the films among them."""
+
+    files: list[Path]
+    measurements: list[Measurement]
+    models: list[Model]
+    films: list[Path | None]
+
+    @property
+    def measured(self) -> tuple[Any, Any]:
+        """The arguments of `udd.fit`: a measurement and its model, or lists of them."""
+        if len(self.files) == 1:
+            return self.measurements[0], self.models[0]
+        return self.measurements, self.models
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What `--json` says of them."""
+        return {"file": self.files[0] if len(self.files) == 1 else self.files}
+
+
+def inputs_of(args: argparse.Namespace) -> Inputs:
+    """Read the files; films are tracked."""
+    measurements, models, films = [], [], []
+    for one in _each(args):
+        measurement, film = measurement_of(one)
+        measurements.append(measurement)
+        models.append(model_of(one, measurement))
+        films.append(film)
+    return Inputs(args.files, measurements, models, films)
+
+
+def _each(args: argparse.Namespace) -> list[argparse.Namespace]:
+    """The same options for each file alone."""
+    return [argparse.Namespace(**{**vars(args), "file": file}) for file in args.files]
 
 
 def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
@@ -167,6 +214,14 @@ def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> flo
 
 def check_early(args: argparse.Namespace) -> None:
     """Refuse what no film could mend, before minutes of work are spent on it."""
+    from .options import effects
+
+    for one in _each(args):
+        _check_device(one)
+    effects(args.effect)
+
+
+def _check_device(args: argparse.Namespace) -> None:
     from udd.models import Disk, Pendulum
 
     if args.model is not None:
@@ -183,6 +238,3 @@ def check_early(args: argparse.Namespace) -> None:
                 "(--W 0 where the wheels stand still)"
             )
         Disk(args.W, R=0.08 if args.R is None else args.R, g=args.g)
-    from .options import effects
-
-    effects(args.effect)
