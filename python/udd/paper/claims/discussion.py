@@ -157,7 +157,7 @@ def no_detuning(_lab: Lab) -> Verdict:
     worst = {ripple: max(jitter(ripple, ratio) for ratio in ratios) for ripple in (0.01, 0.05)}
     still = jitter(0.0, 1.0)
     evidence = (
-        f"a pendulum without friction under a torque 5 % below its frequency swings by {swings.min():.2f} to "
+        f"without friction a pendulum under a torque 5 % below its frequency swings by {swings.min():.2f} to "
         f"{swings.max():.2f} rad, for ever. The figure-eight at w = 12 repeats to {still:.0e}; where the "
         "drive ripples by "
         "1 % or 5 %, at a tenth to three times its frequency, its period has a jitter of "
@@ -211,7 +211,7 @@ def like_a_swing(_lab: Lab) -> Verdict:
         "back; mean "
         f"distances, out over back: {', '.join(words)}"
     )
-    return judged(all(shorter), evidence, "a likeness of the path; what drives them differs")
+    return judged(all(shorter), evidence, "the likeness is one of the paths; what drives them differs")
 
 
 @claim(

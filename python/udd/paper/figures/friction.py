@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @figure(
-    "friction-law",
+    "friction-computed",
     paper="Figure 9",
     title="The friction law and the swings without a drive, computed",
     caption="(a, b) The disk let go at rest at R = 5.8 cm, 127° from upright, by the paper's law; "
