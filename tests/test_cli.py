@@ -430,3 +430,14 @@ def test_the_demonstration(null: bool, tmp_path: Path, capsys: pytest.CaptureFix
     ratio = found["held_out_ratio"]
     assert isinstance(ratio, dict)
     assert ratio["high"] < 0.5
+
+
+def test_the_drive_may_be_said_by_its_wheel(capsys: pytest.CaptureFixture[str]) -> None:
+    run = ["simulate", "--t", "1", "--dt", ".5", "--state", "0", ".01", ".02", "0"]
+    wanted = data([*run, "--W", "0.039"], capsys)
+    assert data([*run, "--rate", "1.3"], capsys) == wanted
+    assert data([*run, "--rate", "1.95:0.02"], capsys) == wanted
+    for bad in ("fast", "1:2:3", "-1", "nan"):
+        with pytest.raises(SystemExit):
+            main([*run, f"--rate={bad}"])
+        assert "rate" in capsys.readouterr().err.splitlines()[-1]

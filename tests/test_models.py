@@ -211,3 +211,11 @@ def test_importing_udd_is_fast() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert out.stdout.strip() == "[]"
+
+
+def test_a_disk_from_its_wheel_has_the_speed_of_the_rim() -> None:
+    disk = udd.Disk.from_wheel(2.0, wheel=0.025, k0=0.02, edge="ignore")
+    assert disk == udd.Disk(0.05, k0=0.02, edge="ignore")
+    for bad in ({"rate": -1.0}, {"rate": 1.0, "wheel": 0.0}, {"rate": math.nan}):
+        with pytest.raises(ModelError):
+            udd.Disk.from_wheel(**bad)

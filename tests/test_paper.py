@@ -11,9 +11,11 @@ import pytest
 
 import udd
 from udd.cli import main
-from udd.paper import CLAIMS, FIGURES, device, films
+from udd.paper import CLAIMS, FIGURES, device, films, page
+from udd.paper.falls import falls
 from udd.paper.figures.clock import C, D, periods
 from udd.paper.figures.heights import limit
+from udd.paper.figures.overturning import growth
 from udd.paper.lab import Lab
 from udd.paper.smoothing import smoothed
 
@@ -21,10 +23,12 @@ from udd.paper.smoothing import smoothed
 # threshold, the disk is chaotic at 5.5 cm/s, the Hopf bifurcation is subcritical, a damped pendulum locks.
 HOLD = """limits angular-momentum scales zero-drive-swings slow-ascent higher-deeper ejection dle-3.9
 coexistence lorenz-limit waterwheel unforced-pendulum steady-torque diffusive-state unstable-rotation
-unstable-rotation-disk rotation-approximation damping-stabilises driven-by-nothing-periodic"""
+unstable-rotation-disk rotation-approximation damping-stabilises driven-by-nothing-periodic
+slow-and-fast isochrony overturning-height"""
 WITH_A_REMARK = """converted-drives constant-inertia friction-law slow-chaos torque-shape chaos-3.9 order-7.1
-dle-4.5 dle-7.1 bistable clock-period clock-robust successive-heights spin-down"""
-FAIL = "static-friction order-5.5 stable-below not-from-rest forced-pendulum"
+dle-4.5 dle-7.1 bistable clock-period clock-robust successive-heights spin-down
+falls-to-either-side no-detuning like-a-swing falls-filmed drive-range"""
+FAIL = "static-friction order-5.5 stable-below not-from-rest forced-pendulum theta-plateaus"
 VERDICTS = {
     key: verdict
     for verdict, keys in (("holds", HOLD), ("holds with a remark", WITH_A_REMARK), ("does not hold", FAIL))
@@ -38,6 +42,7 @@ def nowhere(_text: str) -> None:
 
 def test_every_claim_has_an_expected_verdict() -> None:
     assert set(VERDICTS) == set(CLAIMS)
+    assert not set(FIGURES) & set(CLAIMS)  # one key, one thing
 
 
 @pytest.mark.parametrize("key", [key for key, one in CLAIMS.items() if not one.filmed])
@@ -123,6 +128,50 @@ def test_the_command_writes_a_page_that_stands_alone(
     assert "does not hold" in page
     assert not any(word in page for word in ("http://", "https://", "<script", 'src="/'))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["eigenvalues.png", "index.html"]
+
+
+def test_what_needs_films_is_listed_where_there_are_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for entries, kept in ((FIGURES, {"geometry", "slow-polar"}), (CLAIMS, {"scales", "falls-filmed"})):
+        for key in [key for key in entries if key not in kept]:
+            monkeypatch.delitem(entries, key)
+    assert main(["paper", "--out", str(tmp_path), "--no-films", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["left_out"] == ["slow-polar", "falls-filmed"]
+    assert [one["key"] for one in told["figures"]] == ["geometry"]
+    text = Path(told["page"]).read_text()
+    assert "Small drive: polar coordinates (Figure 7)" in text
+    assert "data:image/svg+xml;base64," in text
+
+
+def test_drawings_are_the_same_bytes_every_time() -> None:
+    first, again = (page.svg(FIGURES["geometry"].draw(Lab(Path(), nowhere))) for _ in range(2))
+    assert first == again
+
+
+def test_falls_of_a_made_up_motion() -> None:
+    t = np.linspace(0, 40, 40001)
+    # Hanging, up on the right, down on the left; then up on the left and down there: one whole turn back.
+    theta = np.interp(t, [0, 5, 10, 20, 30, 40], np.pi * np.array([1, 1, 0, -1, -0.05, -1.0]))
+    found = falls(t, np.sin(theta), np.cos(theta))
+    assert found.rose.tolist() == [1, -1]
+    assert found.side.tolist() == [-1, -1]
+    assert found.turns.tolist() == [-1, 0]
+    assert found.lengths.tolist() == [2]
+    # Resting to 5 s, then 0.3 rad at each speed about hanging: 0.3/(pi/5) + 2 of 0.3/(0.1 pi), 0.3/(0.095 pi)
+    # beside the turning points.
+    near = 5 + 0.3 / (np.pi / 5) + 0.3 / (np.pi / 10) + 2 * 0.3 / (0.095 * np.pi)
+    assert found.plateau == pytest.approx(near / 40, abs=1e-3)
+    assert found.rising == pytest.approx((5 + 10) / 40, abs=1e-3)
+
+
+def test_the_offsets_growth_is_the_integral_of_its_rate() -> None:
+    from scipy.integrate import quad
+
+    for height in (0.3, 1.4):
+        whole = quad(lambda z: (np.sqrt(1 + 4 * z) - 1) / 2, 0, height)[0]
+        assert growth(np.array(height)) == pytest.approx(whole, rel=1e-12)
 
 
 def test_bad_keys_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

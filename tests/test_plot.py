@@ -210,3 +210,32 @@ def test_the_map_frames_the_cell_that_the_effect_is_in() -> None:
     assert (cell[1], len(names) - 1 - cell[0]) in corners
     with pytest.raises(UddError, match="a fit leaves residuals"):
         udd.plot.residual_map(run())
+
+
+@pytest.mark.parametrize("view", ["front", "side"])
+def test_the_geometry_has_all_that_the_paper_names(view: str) -> None:
+    ax = udd.plot.geometry(view=view)
+    said = {text.get_text() for text in ax.texts}
+    front = {"O", "C", "M", "R", "Y", "Z", "W", r"$\theta$", r"$\phi$", r"$\beta$", r"$\Omega > 0$"}
+    assert (front if view == "front" else {"O", "W", "drive wheel", "support wheel"}) <= said
+
+
+def test_the_geometry_of_a_state_puts_centre_and_mark_where_they_are() -> None:
+    ax = udd.plot.geometry(state=[0.0, 0.02, -0.03, np.pi / 2], R=0.08)
+    places = {text.get_text(): text.xy for text in ax.texts if hasattr(text, "xy")}
+    assert places["C"] == pytest.approx((2.0, -3.0))
+    # The mark sits at 0.8 radii, a quarter turn clockwise from upright: to the right of the centre.
+    assert places["M"] == pytest.approx((2.0 + 6.4, -3.0))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"view": "top"}, "view"),
+        ({"state": [1.0, 2.0]}, "four finite numbers"),
+        ({"R": 0.0}, "R"),
+    ],
+)
+def test_a_geometry_that_cannot_be_drawn_says_why(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(UddError, match=words):
+        udd.plot.geometry(**options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import simpson
 
 import udd
 from udd import relatives
@@ -153,3 +154,50 @@ def test_lengths_must_stay_positive() -> None:
         relatives.pumped_pendulum(1.0, 0.0, 1.0, 2.0)
     with pytest.raises(udd.UddError, match="depth must be between 0 and 1"):
         relatives.pumped_swing(1.0, depth=1.2)
+
+
+@pytest.mark.parametrize("swing", [0.1, 0.8, 1.4])
+def test_between_cycloidal_cheeks_every_swing_takes_as_long(swing: float) -> None:
+    r = 2.3
+    quarter = last(relatives.cycloidal_pendulum(r), np.pi / 2 / np.sqrt(r), [0.0, swing])
+    assert abs(quarter[1]) < 1e-10
+    # Between plain walls it would not: the largest of these swings takes 14 % longer.
+    assert abs(last(relatives.pendulum(r, 0.0), np.pi / 2 / np.sqrt(r), [0.0, swing])[1]) > 1e-5
+
+
+def test_the_droplets_waves_are_an_integral_over_its_past() -> None:
+    R, memory = 3.0, 7.0
+    t = np.linspace(0.0, 6.0, 6001)
+    # Its place is one more state, by which the waves are looked up.
+    model = udd.Model(
+        ["v", "y", "z", "x"],
+        {"v": "y - v", "y": f"v*z - y/{memory}", "z": f"{R} - v*y - z/{memory}", "x": "v"},
+        {},
+    )
+    v, y, z, x = udd.simulate(model, t, [0.4, 0.0, 0.0, 0.0], method="taylor", **TIGHT).state.T
+    own = udd.simulate(
+        relatives.walking_droplet(R, memory), t, [0.4, 0.0, 0.0], method="taylor", **TIGHT
+    ).state
+    np.testing.assert_allclose(own, np.stack([v, y, z], axis=1), atol=1e-9)
+    weight = R * np.exp(-(t[-1] - t) / memory)
+    # Simpson's rule over 6000 steps of 0.001: its error is below 1e-10.
+    assert y[-1] == pytest.approx(simpson(weight * np.sin(x[-1] - x), x=t), abs=1e-8)
+    assert z[-1] == pytest.approx(simpson(weight * np.cos(x[-1] - x), x=t), abs=1e-8)
+
+
+def test_the_droplet_is_lorenz_and_with_infinite_memory_the_dle() -> None:
+    states = np.random.default_rng(1).normal(size=(20, 3))
+    np.testing.assert_array_equal(
+        relatives.walking_droplet(3.9).rates(0.0, states), udd.DLE(3.9).rates(0.0, states)
+    )
+    np.testing.assert_allclose(
+        relatives.walking_droplet(3.9, 20.0).rates(0.0, states),
+        relatives.scaled_lorenz(3.9, 0.05, b=1.0).rates(0.0, states),
+        rtol=1e-14,
+    )
+
+
+@pytest.mark.parametrize("bad", [{"R": 0.0}, {"R": 1.0, "memory": -1.0}, {"R": 1.0, "memory": float("nan")}])
+def test_a_droplet_needs_waves_and_a_memory(bad: dict[str, float]) -> None:
+    with pytest.raises(udd.UddError, match=r"R|memory"):
+        relatives.walking_droplet(**bad)

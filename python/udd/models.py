@@ -402,6 +402,32 @@ class Disk(_BuiltIn):
     effects: tuple[Effect, ...] = field(default=(), kw_only=True)
     edge: str = field(default="stop", kw_only=True)
 
+    @classmethod
+    def from_wheel(cls, rate: float, wheel: float = 0.03, **options: Any) -> Self:
+        """The disk driven by a wheel of this radius that turns at this rate: ``W = rate wheel``.
+
+        Parameters
+        ----------
+        rate : float
+            Angular velocity of the drive wheel [rad/s], not negative; the paper's motor runs at 0.3 to 3.
+        wheel : float
+            Its radius [m], positive; the paper's has 3 cm.
+        **options
+            Of the constructor: ``R``, ``g``, ``k0``, ``k1``, ``k2``, ``effects``, ``edge``.
+
+        Raises
+        ------
+        ModelError
+            A number that is not finite or has the wrong sign.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.Disk.from_wheel(1.3).W
+        0.039
+        """
+        return cls(number("rate", rate, least=0.0) * number("wheel", wheel, above=0.0), **options)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "R", number("R", self.R, above=0.0))
         for name in ("W", "g", "k0", "k1", "k2"):

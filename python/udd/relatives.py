@@ -13,6 +13,8 @@ function                    its relation to the disk
 :func:`shaken_pendulum`     (ii) driven by a suspension point that moves up and down
 :func:`pumped_pendulum`     (iii) driven by a length that changes periodically
 :func:`pumped_swing`        a swing whose rider stands up on the way out and squats on the way in
+:func:`cycloidal_pendulum`  Huygens' pendulum between cheeks, whose period does not depend on its swing
+:func:`walking_droplet`     a droplet carried by its own waves; with infinite memory it is the DLE exactly
 ==========================  ===============================================================================
 
 Pendulums have the paper's dimensionless form, ``theta = 0`` hanging, and the state ``[v, theta]`` with
@@ -26,6 +28,7 @@ from udd.errors import ModelError
 from udd.models import Model
 
 __all__ = [
+    "cycloidal_pendulum",
     "lorenz",
     "pendulum",
     "pumped_pendulum",
@@ -33,6 +36,7 @@ __all__ = [
     "scaled_lorenz",
     "shaken_pendulum",
     "torqued_pendulum",
+    "walking_droplet",
     "waterwheel",
 ]
 
@@ -423,6 +427,101 @@ def pumped_swing(
             "sharpness": number("sharpness", sharpness, above=0.0),
         },
         angles=["theta"],
+    )
+
+
+def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
+    """Huygens' isochronous pendulum between cycloidal cheeks, for the state ``[v, theta]``.
+
+    ::
+
+        v' = -friction v - (r - v^2) tan(theta)        theta' = v
+
+    Parameters
+    ----------
+    r, friction : float
+        As for :func:`pendulum`; `theta` is the angle of the free part of the string, less than pi/2.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    ModelError
+        A parameter that is not finite.
+
+    Notes
+    -----
+    The string winds onto the cheeks as it swings, and the bob runs along a cycloid. The arc from its lowest
+    point is ``s = sin(theta)`` in units of the string's length, and without friction ``s'' = -r s``: the
+    period is ``2 pi/sqrt(r)`` for every swing, where that of :func:`pendulum` grows with it.
+
+    References
+    ----------
+    C. Huygens, Horologium oscillatorium (1673), part 2.
+
+    Examples
+    --------
+    >>> import numpy as np, udd
+    >>> run = udd.simulate(udd.relatives.cycloidal_pendulum(1.0), 2 * np.pi, [0.0, 1.2])
+    >>> bool(abs(run.theta[-1] - 1.2) < 1e-6)
+    True
+    """
+    return _pendulum("-friction*v - (r - v^2)*tan(theta)", r=r, friction=friction)
+
+
+def walking_droplet(R: float, memory: float = float("inf")) -> Model:
+    """A droplet that walks on the waves of its own bounces, for the state ``[v, y, z]``.
+
+    ::
+
+        v' = y - v        y' = v z - y/memory        z' = R - v y - z/memory
+
+    Parameters
+    ----------
+    R : float
+        Strength of the waves' push; positive.
+    memory : float
+        Decay time of the waves, in units of the time in which friction stops the droplet; positive.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    ModelError
+        A parameter that is not positive.
+
+    Notes
+    -----
+    In one dimension and with sinusoidal waves the droplet at x(t) obeys
+
+    ::
+
+        x'' + x' = R int_0^t sin(x(t) - x(s)) exp(-(t - s)/memory) ds
+
+    for waves that begin at t = 0. ``v = x'``, and y and z are R times this integral and the same one with a
+    cosine; they begin at 0. With infinite memory these are the DLE with ``omega = v`` and ``w = R``; with
+    finite memory they are :func:`scaled_lorenz` with ``epsilon = 1/memory`` and b = 1.
+
+    References
+    ----------
+    R. N. Valani, Infinite-memory classical wave-particle entities, attractor-driven active particles, and the
+    diffusionless Lorenz equations, Chaos 34 (2024) 013133, arXiv:2308.03062.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.relatives.walking_droplet(1.0).rates(0.0, [1.0, 2.0, 3.0])
+    array([ 1.,  3., -1.])
+    """
+    decay = 0.0 if memory == float("inf") else 1.0 / number("memory", memory, above=0.0)
+    return Model(
+        ["v", "y", "z"],
+        {"v": "y - v", "y": "v*z - decay*y", "z": "R - v*y - decay*z"},
+        {"R": number("R", R, above=0.0), "decay": decay},
     )
 
 

@@ -26,11 +26,34 @@ def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
     """The disk's parameters."""
     group = parser.add_argument_group("the disk")
     group.add_argument("--W", type=float, metavar="M/S", help=drive)
+    group.add_argument(
+        "--rate",
+        dest="W",
+        type=_rim_speed,
+        metavar="RAD/S[:M]",
+        help="instead: at which rate the drive wheel turns, and its radius (default 0.03)",
+    )
     group.add_argument("--R", type=float, metavar="M", help="radius [m] (default 0.08)")
     group.add_argument("--g", type=float, default=9.81, help="gravity [m/s^2] (default 9.81)")
     for name, unit in (("k0", "m^2/s, fast"), ("k1", "m^2/s, at rest"), ("k2", "m^2, fall with the speed")):
         group.add_argument(f"--{name}", type=float, help=f"friction [{unit}] (default: the paper's)")
     add_effects(parser)
+
+
+def _rim_speed(text: str) -> float:
+    """The speed of a wheel's rim from ``rate`` or ``rate:radius``."""
+    rate, colon, radius = text.partition(":")
+    try:
+        speed = float(rate) * (float(radius) if colon else 0.03)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a rate [rad/s], or rate:radius [rad/s:m]"
+        ) from None
+    if not speed >= 0:
+        raise argparse.ArgumentTypeError(
+            f"the rate and the wheel's radius must not be negative, as in {text!r}"
+        )
+    return speed
 
 
 def add_effects(parser: argparse.ArgumentParser) -> None:

@@ -40,9 +40,12 @@ def run(args: argparse.Namespace) -> Answer:
     with telling() as tell:
         made = reproduce(args.out, only=args.only, films=not args.no_films, progress=tell)
     lines = [f"{one.verdict.verdict:20} {one.claim.says}" for one in made.claims]
+    if made.left_out:
+        lines.append(f"left out, since they need films: {', '.join(one.key for one in made.left_out)}")
     text = "\n".join([*lines, f"page: {made.page}"])
     data = {
         "page": made.page,
+        "left_out": [one.key for one in made.left_out],
         "figures": [
             {"key": one.figure.key, "paper": one.figure.paper, "file": one.path, "seconds": one.seconds}
             for one in made.figures

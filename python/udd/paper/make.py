@@ -26,13 +26,16 @@ class Drawn:
     ----------
     figure : Figure
     path : Path
-        The picture, PNG.
+        The picture, PNG or SVG.
+    width : float
+        Of the picture [inch], so that all can be shown at one scale, their text of one size.
     seconds : float
         What drawing it took, films aside where they were there already.
     """
 
     figure: Figure
     path: Path
+    width: float
     seconds: float
 
 
@@ -63,11 +66,14 @@ class Reproduction:
         The page with all pictures and the table of claims.
     figures : tuple of Drawn
     claims : tuple of Checked
+    left_out : tuple of Figure or Claim
+        What needs films, where there were to be none.
     """
 
     page: Path
     figures: tuple[Drawn, ...]
     claims: tuple[Checked, ...]
+    left_out: tuple[Figure | Claim, ...] = ()
 
 
 def reproduce(
@@ -108,7 +114,7 @@ def reproduce(
     >>> made.claims[0].verdict.verdict
     'holds'
     """
-    chosen_figures, chosen_claims = _chosen(only, films)
+    chosen_figures, chosen_claims, left_out = _chosen(only, films)
     tell = progress or (lambda _text: None)
     folder = made_folder(out)
     lab = Lab(folder / "films", tell)
@@ -116,21 +122,24 @@ def reproduce(
     for one in chosen_figures:
         tell(f"drawing {one.key}")
         start = time.perf_counter()
-        path = folder / f"{one.key}.png"
-        write_whole(path, page.png(one.draw(lab), _DPI))
-        drawn.append(Drawn(one, path, time.perf_counter() - start))
+        path = folder / f"{one.key}.{'svg' if one.vector else 'png'}"
+        picture = one.draw(lab)
+        write_whole(path, page.svg(picture) if one.vector else page.png(picture, _DPI))
+        drawn.append(Drawn(one, path, picture.get_figwidth(), time.perf_counter() - start))
     checked = []
     for own in chosen_claims:
         tell(f"checking {own.key}")
         start = time.perf_counter()
         checked.append(Checked(own, own.check(lab), time.perf_counter() - start))
     target = folder / "index.html"
-    write_whole(target, page.render(drawn, checked).encode())
-    return Reproduction(target, tuple(drawn), tuple(checked))
+    write_whole(target, page.render(drawn, checked, left_out).encode())
+    return Reproduction(target, tuple(drawn), tuple(checked), tuple(left_out))
 
 
-def _chosen(only: Iterable[str] | None, films: bool) -> tuple[list[Figure], list[Claim]]:
-    """The figures and claims that are meant, in the paper's order."""
+def _chosen(
+    only: Iterable[str] | None, films: bool
+) -> tuple[list[Figure], list[Claim], list[Figure | Claim]]:
+    """The figures and claims that are meant, in the paper's order, and those left out for want of films."""
     keys = None if only is None else set([only] if isinstance(only, str) else only)
     for key in sorted(keys or ()):
         entry = FIGURES.get(key) or CLAIMS.get(key)
@@ -143,4 +152,6 @@ def _chosen(only: Iterable[str] | None, films: bool) -> tuple[list[Figure], list
             raise UddError(f"{key} needs a film, and there are to be none")
     figures = [one for one in FIGURES.values() if keys is None or one.key in keys]
     claims = [one for one in CLAIMS.values() if keys is None or one.key in keys]
-    return [f for f in figures if films or not f.filmed], [c for c in claims if films or not c.filmed]
+    chosen: list[Figure | Claim] = [*figures, *claims]
+    left_out = [] if films else [one for one in chosen if one.filmed]
+    return [f for f in figures if f not in left_out], [c for c in claims if c not in left_out], left_out

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .make import Checked, Drawn
+    from .registry import Claim
+    from .registry import Figure as Entry
 
 _CLASSES = {HOLDS: "holds", REMARK: "remark", FAILS: "fails"}
 
@@ -30,13 +32,25 @@ def png(figure: Figure, dpi: int) -> bytes:
     return picture.getvalue()
 
 
+def svg(figure: Figure) -> bytes:
+    """A figure as an SVG file, the same bytes every time; letters are outlines, so that no font is needed."""
+    import matplotlib as mpl
+
+    picture = BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "udd"}):
+        figure.savefig(picture, format="svg", metadata={"Date": None, "Creator": None})
+    return picture.getvalue()
+
+
 def sentence(text: str) -> str:
     """With a capital where it begins with a word, true minus signs, and a full stop."""
     start = text[0].upper() if text[1:2].islower() else text[0]
     return re.sub(r"(?<![\w.])-(?=\d)", "−", f"{start}{text[1:]}.")
 
 
-def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
+def render(
+    figures: Sequence[Drawn], claims: Sequence[Checked], left_out: Sequence[Entry | Claim] = ()
+) -> str:
     """The page as HTML."""
     environment = templates("udd.paper")
     environment.filters["sentence"] = sentence
@@ -46,13 +60,15 @@ def render(figures: Sequence[Drawn], claims: Sequence[Checked]) -> str:
         classes=_CLASSES,
         counts=Counter(one.verdict.verdict for one in claims),
         order=(HOLDS, REMARK, FAILS),
+        left_out=left_out,
         filmed=any(one.figure.filmed for one in figures),
         versions=_versions(),
     )
 
 
 def _embedded(one: Drawn) -> str:
-    return f"data:image/png;base64,{base64.b64encode(one.path.read_bytes()).decode()}"
+    kind = "svg+xml" if one.figure.vector else "png"
+    return f"data:image/{kind};base64,{base64.b64encode(one.path.read_bytes()).decode()}"
 
 
 def _versions() -> str:

@@ -34,6 +34,8 @@ class Figure:
         Whether it needs films to be made and tracked.
     draw : callable
         Makes the picture.
+    vector : bool
+        Whether it is kept as vector graphics (SVG): drawings of few lines.
     """
 
     key: str
@@ -42,6 +44,7 @@ class Figure:
     caption: str
     filmed: bool
     draw: Draw
+    vector: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,11 +94,13 @@ FIGURES: dict[str, Figure] = {}
 CLAIMS: dict[str, Claim] = {}
 
 
-def figure(key: str, *, paper: str, title: str, caption: str, filmed: bool = False) -> Callable[[Draw], Draw]:
+def figure(
+    key: str, *, paper: str, title: str, caption: str, filmed: bool = False, vector: bool = False
+) -> Callable[[Draw], Draw]:
     """Enter a function into the list of figures."""
 
     def enter(draw: Draw) -> Draw:
-        FIGURES[key] = Figure(key, paper, title, caption, filmed, draw)
+        FIGURES[key] = Figure(key, paper, title, caption, filmed, draw, vector)
         return draw
 
     return enter

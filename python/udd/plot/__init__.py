@@ -13,6 +13,7 @@ from .evidence import errors, evidence
 from .fan import forecast
 from .fits import misfit, residuals
 from .friction import friction
+from .geometry import geometry
 from .grid import residual_map
 from .maps import basins, bifurcation
 from .motion import orbit, phase_space, time_series
@@ -29,6 +30,7 @@ __all__ = [
     "evidence",
     "forecast",
     "friction",
+    "geometry",
     "misfit",
     "orbit",
     "overlay",

@@ -98,7 +98,8 @@ def branches(
     if view == "period":
         ax.set_ylabel("period [1]" if model.kind == "dle" else "period [s]")
     else:
-        ax.set_ylabel(axis_of(model, name)[0])
+        words = axis_of(model, name)[0]
+        ax.set_ylabel(f"least and greatest {words}" if view == "extremes" else words)
     tidy(ax, grid=False)
     _legend(ax)
     return ax
@@ -241,4 +242,6 @@ def _legend(ax: Axes) -> None:
     first = {text: handle for handle, text in zip(reversed(handles), reversed(labels), strict=True)}
     if first:
         words = sorted(first, key=labels.index)
-        ax.legend([first[text] for text in words], words, frameon=False, fontsize="small")
+        # Above the picture: inside it would cover a branch, wherever it stands.
+        above: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
+        ax.legend([first[text] for text in words], words, frameon=False, fontsize="small", ncols=3, **above)

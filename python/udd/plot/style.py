@@ -32,7 +32,7 @@ AXES: dict[str, tuple[str, str, float]] = {
     "y": ("y", "1", 1.0),
     "z": ("z", "1", 1.0),
     "tau": ("time t", "1", 1.0),
-    "J": ("J = I Ω − W Y", "cm²/s", 1e4),
+    "J": ("J = I Ω − W Y", "cm²/s = 10⁻⁴ m²/s", 1e4),
     "k": ("friction coefficient k", "m²/s", 1.0),
     "R": ("distance R from the contact", "cm", 100.0),
 }

@@ -76,6 +76,7 @@ export class Panel {
     const about = this.page.about(model.kind);
     if (this.kind !== model.kind) this.make(model, about);
     for (const [name, box] of Object.entries(this.sliders)) box.show(model[name]);
+    if (this.wheel) this.wheelRate(model.W);
     if (this.edge) this.edge.checked = model.edge === "ignore";
     $("effects-box").hidden = model.kind !== "disk";
     if (model.kind === "disk") this.effects(model);
@@ -84,16 +85,30 @@ export class Panel {
     }
   }
 
+  /** At which rate the paper's drive wheel turns. */
+  wheelRate(W) {
+    this.wheel.textContent = t("wheel_rate", { rate: (W / 0.03).toFixed(2) });
+  }
+
   make(model, about) {
     this.kind = model.kind;
     $("model").value = model.kind;
     this.sliders = {};
     const made = about.parameters.map((p) => {
-      const box = slider(p, model[p.name], t(`p_${p.name}`), (v) => this.page.change({ [p.name]: v }));
+      const box = slider(p, model[p.name], t(`p_${p.name}`), (v) => {
+        if (p.name === "W") this.wheelRate(v);
+        this.page.change({ [p.name]: v });
+      });
       this.sliders[p.name] = box;
       return box;
     });
     $("drive").replaceChildren(made[0]);
+    this.wheel = null;
+    if (model.kind === "disk") {
+      this.wheel = document.createElement("p");
+      this.wheel.className = "hint";
+      $("drive").append(this.wheel);
+    }
     $("parameters").replaceChildren(...made.slice(1));
     this.edge = null;
     if (model.kind === "disk") {

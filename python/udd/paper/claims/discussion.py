@@ -9,7 +9,9 @@ from udd.paper import device
 from udd.paper.branches import RELAXATION, hopf, rotation_of_disk
 from udd.paper.figures.clock import EIGHT, C, after_a_push, disk_periods, periods
 from udd.paper.figures.heights import limit, next_heights
+from udd.paper.figures.overturning import OFFSETS, growth, tops
 from udd.paper.figures.rotation import spun_down
+from udd.paper.figures.steady import eight, forced_swings, jitter, lengths, pumped, swing_period
 from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
 from udd.sections import poincare
@@ -141,3 +143,92 @@ def aperiodic(_lab: Lab) -> Verdict:
         f"sum {total:.6f}"
     )
     return judged(found.verdict == "chaos", evidence)
+
+
+@claim(
+    "no-detuning",
+    place="Section 6",
+    says="A steady drive has no frequency: the disk neither resonates nor detunes, nor is it modulated.",
+)
+def no_detuning(_lab: Lab) -> Verdict:
+    """Modulation of a forced pendulum; jitter of the clock under a drive that ripples."""
+    swings = forced_swings(0.0)[10:]
+    ratios = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.1, 1.5, 2.0, 2.5, 3.0)
+    worst = {ripple: max(jitter(ripple, ratio) for ratio in ratios) for ripple in (0.01, 0.05)}
+    still = jitter(0.0, 1.0)
+    evidence = (
+        f"without friction a pendulum under a torque 5 % below its frequency swings by {swings.min():.2f} to "
+        f"{swings.max():.2f} rad, for ever. The figure-eight at w = 12 repeats to {still:.0e}; where the "
+        "drive ripples by "
+        "1 % or 5 %, at a tenth to three times its frequency, its period has a jitter of "
+        f"{worst[0.01]:.2%} or "
+        f"{worst[0.05]:.1%} at most"
+    )
+    remark = (
+        "the clock is as steady as its wheels: about half a ripple's size passes into single periods, "
+        "most at half "
+        "the clock's frequency"
+    )
+    return judged(still < 1e-9 and all(w < 0.65 * a for a, w in worst.items()), evidence, remark)
+
+
+@claim(
+    "isochrony",
+    place="Section 6",
+    says="The period of a plain pendulum depends on its amplitude; Huygens' cheeks make it isochronous.",
+)
+def isochrony(_lab: Lab) -> Verdict:
+    """Periods of both at small and large swings."""
+    amplitude = np.array([0.05, 0.5, 1.0, 1.4])
+    plain = swing_period(relatives.pendulum(1.0, 0.0), amplitude)
+    cheeks = swing_period(relatives.cycloidal_pendulum(1.0), amplitude)
+    evidence = (
+        f"from 0.05 to 1.4 rad the plain pendulum's period grows by {plain[-1] / plain[0] - 1:.1%}, that "
+        "between "
+        f"cheeks by {np.ptp(cheeks):.0e}"
+    )
+    return judged(bool(plain[-1] / plain[0] > 1.1 and np.ptp(cheeks) < 1e-8), evidence)
+
+
+@claim(
+    "like-a-swing",
+    place="Section 6",
+    says="The figure-eight resembles the path of the centre of mass of a person who pumps a swing.",
+)
+def like_a_swing(_lab: Lab) -> Verdict:
+    """Distance from the pivot on the way out and back, of both."""
+    words, shorter = [], []
+    for name, (y, z) in (("the DLE at w = 10", eight()), ("a pumped swing", pumped())):
+        out, back = lengths(y, z)
+        crossings = (
+            int(((y[:-1] < 0) & (y[1:] >= 0)).sum()),
+            int(((z[1:-1] > z[:-2]) & (z[1:-1] >= z[2:])).sum()),
+        )
+        shorter.append(out < back and crossings == (1, 2))
+        words.append(f"{name}: {out / back:.2f}")
+    evidence = (
+        "both go up and down twice while they swing once, and are shorter on the way out than on the way "
+        "back; mean "
+        f"distances, out over back: {', '.join(words)}"
+    )
+    return judged(all(shorter), evidence, "the likeness is one of the paths; what drives them differs")
+
+
+@claim(
+    "overturning-height",
+    place="Section 6",
+    says="How high the centre of mass rises, and when it overturns, depends on its offset as it passes "
+    "the centre.",
+)
+def overturning_height(_lab: Lab) -> Verdict:
+    """The slope of the offset's growth against its logarithm."""
+    slopes = [np.polyfit(np.log(OFFSETS), growth(tops(w, OFFSETS)), 1)[0] / w for w in (0.1, 0.03, 0.01)]
+    high = tops(0.1, OFFSETS[[0, -1]])
+    evidence = (
+        f"at w = 0.1 the centre rises to {high[0]:.2f} with the offset 1e-8 and to {high[1]:.2f} with "
+        "0.03; the growth "
+        "((1 + 4h)^(3/2) − 1)/12 − h/2 falls with ln y at the rate "
+        f"{', '.join(f'{-s:.3f}' for s in slopes)} w at "
+        "w = 0.1, 0.03, 0.01"
+    )
+    return judged(all(abs(s + 1) < 0.02 for s in slopes), evidence)

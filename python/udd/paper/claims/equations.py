@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from udd.models import Disk
 from udd.paper import device
 from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
@@ -65,6 +66,24 @@ def converted_drives(_lab: Lab) -> Verdict:
     words = ", ".join(f"{value:.2f}" for value in converted)
     remark = "the last digit of the second and third is one too high: 7.7 and 12.2" if gap > 0.05 else ""
     return judged(gap < 0.1, f"W = w L/τ gives {words} cm/s", remark)
+
+
+@claim(
+    "drive-range",
+    place="Section 2 A",
+    says="The drive wheel has a radius of 3 cm and turns at 0.3 to 3 rad/s.",
+)
+def drive_range(_lab: Lab) -> Verdict:
+    """W = rate x radius, beside the paper's drives."""
+    low, high = (Disk.from_wheel(rate).W for rate in (0.3, 3.0))
+    used = (device.SLOW, *device.DRIVES, 0.088)
+    evidence = (
+        f"W from {100 * low:.1f} to {100 * high:.1f} cm/s; the paper's drives are "
+        f"{', '.join(f'{100 * W:.1f}' for W in used)} cm/s, the wheel at {min(used) / 0.03:.2f} to "
+        f"{max(used) / 0.03:.2f} rad/s"
+    )
+    remark = "the fastest, of its video 3, is near the end of the motor's range"
+    return judged(all(low <= W <= high for W in used), evidence, remark)
 
 
 @claim(

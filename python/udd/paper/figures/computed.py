@@ -51,9 +51,11 @@ def computed_slow(_lab: Lab) -> Figure:
     "computed-orbits",
     paper="Figure 11",
     title="Intermediate and large drive, computed",
-    caption="The disk after 60 s, for 20 s. At 3.9 and 5.5 cm/s the attractor reaches beyond the disk's edge "
-    '(dashed); the equations are followed there all the same (edge="ignore"), where the real disk would '
-    "leave the wheels. "
+    caption="The disk after 60 s, for 20 s, in which it stays inside the circle (dashed) where it would "
+    "leave the "
+    "wheels; in longer runs at 3.9 and 5.5 cm/s it goes beyond (see the claims), and the equations are "
+    "followed "
+    'there all the same (edge="ignore"). '
     "At 5.5 cm/s these equations are chaotic, not high-periodic.",
 )
 def computed_orbits(_lab: Lab) -> Figure:

@@ -19,6 +19,43 @@ if TYPE_CHECKING:
 
 
 @figure(
+    "friction-computed",
+    paper="Figure 9",
+    title="The friction law and the swings without a drive, computed",
+    caption="(a, b) The disk let go at rest at R = 5.8 cm, 127° from upright, by the paper's law; "
+    "crosses: turning "
+    "points. (c) The coefficient k(Ω) = max(k₁ − k₂ |Ω|, k₀), which falls to its floor at 1.65 rad/s "
+    "(dotted). (d) The "
+    "torque k Ω that it makes: N-shaped, and without a threshold at rest.",
+)
+def friction_law(_lab: Lab) -> Figure:
+    """Y, Z, k and the torque."""
+    made, axes = panels(2, 2, 9.6, 6.6)
+    run = simulate(device.disk(0.0), np.arange(0, 4, 0.002), device.ZERO_START, method="taylor")
+    turns = np.flatnonzero(run.Omega[1:-1] * run.Omega[2:] < 0) + 1
+    for k, name in enumerate(("Y", "Z")):
+        values = scale(name) * run.state[:, 1 + k]
+        axes[k].plot(run.t, values, color=BEFORE, linewidth=1.3)
+        axes[k].plot(run.t[turns], values[turns], "x", color=MEASURED, markersize=5)
+        axes[k].set_xlabel(label("t"))
+        axes[k].set_ylabel(label(name))
+        titled(axes[k], k, "W = 0")
+    speed = np.linspace(0, 6, 601)
+    law = np.maximum(device.K1 - device.K2 * speed, device.K0)
+    for ax, values, words in ((axes[2], law, label("k")), (axes[3], law * speed, "torque k Ω [m²/s²]")):
+        ax.plot(speed, values, color=BEFORE, linewidth=1.3)
+        ax.axvline(device.KINK, color=MEASURED, linewidth=0.8, linestyle=":")
+        ax.set_xlabel("|Ω| [rad/s]")
+        ax.set_ylabel(words)
+        ax.set_ylim(bottom=0)
+    titled(axes[2], 2, "friction coefficient")
+    titled(axes[3], 3, "friction torque")
+    for ax in axes:
+        tidy(ax)
+    return made
+
+
+@figure(
     "friction",
     paper="Figure 9",
     title="The friction law from the swings without a drive",
