@@ -42,7 +42,6 @@ def nowhere(_text: str) -> None:
 
 def test_every_claim_has_an_expected_verdict() -> None:
     assert set(VERDICTS) == set(CLAIMS)
-    assert not set(FIGURES) & set(CLAIMS)  # one key, one thing
 
 
 @pytest.mark.parametrize("key", [key for key, one in CLAIMS.items() if not one.filmed])
