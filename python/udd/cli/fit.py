@@ -14,6 +14,11 @@ def add(commands: Any) -> None:
     """Add the command."""
     parser = new(commands, "fit", run, "Fit the model to a film or a measurement, or to several jointly.")
     add_input(parser, several=True)
+    parser.add_argument(
+        "--budget",
+        action="store_true",
+        help="say from what the uncertainty of each number comes: noise, camera, scale, priors, R, g",
+    )
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -25,7 +30,11 @@ def run(args: argparse.Namespace) -> Answer:
     with telling() as tell:
         tell("fitting")
         found = fit(*given.measured, **options(args))
-    return Answer(str(found), {**given.told, **found.to_dict()})
+    if not args.budget:
+        return Answer(str(found), {**given.told, **found.to_dict()})
+    tables = found.budget()
+    text = f"{found}\n\nexpanded uncertainties, and shares of the variance:\n{tables}"
+    return Answer(text, {**given.told, **found.to_dict(), **tables.to_dict()})
 
 
 def options(args: argparse.Namespace) -> dict[str, Any]:

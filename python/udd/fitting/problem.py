@@ -18,6 +18,9 @@ from .parameters import Free
 from .record import Record
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from .budget import Budget
     from .doubts import Doubts
 
 Array = NDArray[np.float64]
@@ -280,6 +283,12 @@ class Fit:
         result = replace(self, errors=errors, covariance=factor**2 * self.covariance)
         result.__dict__["doubts"] = self.doubts
         return result
+
+    def budget(self, held: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
+        """Uncertainty budget (GUM) of the fitted numbers, see :func:`udd.fitting.budget.budget`."""
+        from .budget import budget
+
+        return budget(self, held, k)
 
     def summary(self) -> str:
         """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""

@@ -1,0 +1,70 @@
+"""The uncertainty budget of a fit: shares that add up, and what they are when only one source is there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+import simulated
+import udd
+from udd.errors import FitError, UddError
+
+
+@pytest.fixture(scope="module")
+def fitted() -> udd.Fit:
+    measured, _ = simulated.film(udd.Disk(0.042), np.random.default_rng(3), 30.0)
+    return udd.fit(measured, udd.Disk(0.042))
+
+
+def test_contributions_add_up_to_the_standard_errors(fitted: udd.Fit) -> None:
+    found = fitted.budget(held={})
+    assert found.sources[0] == "noise" and {"camera", "scale", "W"} <= set(found.sources)
+    for name in ("k0", "k1", "k2", "W"):
+        # C = C N C + C P C is exact.
+        assert found.standard[name] == pytest.approx(fitted.errors[name], rel=1e-9)
+        assert found.expanded[name] == 2 * found.standard[name]
+    np.testing.assert_allclose(found.shares.sum(axis=1), 1.0, rtol=1e-12)
+
+
+def test_a_number_that_the_frames_do_not_tell_is_its_prior(fitted: udd.Fit) -> None:
+    measured = fitted.measurement
+    held = udd.fit(measured, udd.Disk(0.042), free=["k0", "W"], priors={"W": (0.042, 1e-9)})
+    found = held.budget(held={})
+    k = found.sources.index("W")
+    assert found.shares[list(found.values).index("W"), k] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_was_held_contributes_as_a_fit_with_another_value_moves(fitted: udd.Fit) -> None:
+    found = fitted.budget(held={"g": 0.02})
+    other = udd.fit(fitted.measurement, udd.Disk(0.042, g=9.81 + 0.02))
+    k = found.sources.index("g")
+    for i, name in enumerate(found.values):
+        moved = abs(other.parameters[name] - fitted.parameters[name])
+        # The other fit estimates its noise anew: it moves by a few hundredths of a standard error for that.
+        assert found.contributions[i, k] == pytest.approx(moved, abs=0.1 * fitted.errors[name])
+    # Gravity is a scale of length over time squared; most of what is told of friction goes with it.
+    assert found.standard["k0"] > fitted.errors["k0"]
+
+
+def test_the_table_has_a_row_for_each_number_and_a_column_for_each_source(fitted: udd.Fit) -> None:
+    head, *rows = str(fitted.budget()).splitlines()
+    assert [row.split()[0] for row in rows] == ["k0", "k1", "k2", "W"]
+    assert all(source in head for source in ("noise", "camera", "scale", "R", "g"))
+
+
+@pytest.mark.parametrize(
+    ("held", "k", "words"),
+    [
+        ({"W": 1e-3}, 2.0, "W was free"),
+        ({"mass": 1.0}, 2.0, "no parameter 'mass'"),
+        ({"g": -1.0}, 2.0, "g"),
+        ({}, 0.0, "k"),
+    ],
+)
+def test_a_budget_that_cannot_be_made_says_why(
+    fitted: udd.Fit, held: Mapping[str, float], k: float, words: str
+) -> None:
+    with pytest.raises((FitError, UddError), match=words):
+        fitted.budget(held, k)
