@@ -63,6 +63,21 @@ pub fn inner<S: Copy, C: Coefficient<S>, const N: usize>(a: &[S; N], b: &[C; N],
     even.plus(odd)
 }
 
+/// The same where the order is only known when the program runs.
+///
+/// For single numbers there is a program for each order: the way into a loop takes longer than the loop.
+#[inline(always)]
+pub fn inner_at<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
+    if const { size_of::<S>() == size_of::<f64>() } {
+        orders!(n below N => {
+            if k == n {
+                return inner(a, b, n);
+            }
+        });
+    }
+    inner(a, b, k)
+}
+
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.
 #[inline(always)]
 pub fn inner_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
