@@ -5,7 +5,7 @@
 //! reordered or rounded otherwise, so no bit changes.
 
 use super::node::{INVERSE, Node, Step};
-use super::series::{inner_at, inner_square};
+use super::series::{inner_at, inner_square_at};
 use crate::model::Sides;
 use crate::scalar::Scalar;
 
@@ -262,7 +262,7 @@ impl Chain {
                 let b = &work[usize::from(self.b)];
                 inner_at(a, b, k).fused(a[0], b[k]).fused(a[k], b[0])
             }
-            First::Square => inner_square(a, k).fused(a[0] + a[0], a[k]),
+            First::Square => inner_square_at(a, k).fused(a[0] + a[0], a[k]),
         };
         for &then in self.then.iter().take(usize::from(self.count)) {
             c = match then {

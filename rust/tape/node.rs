@@ -3,7 +3,7 @@
 //! Products: Leibniz. The others follow from the differential equation of the function, as
 //! `(exp a)' = exp(a) a'` (À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99).
 
-use super::series::{inner, inner_square};
+use super::series::{inner_at, inner_square_at};
 use super::symbol::Function;
 use crate::model::Sides;
 use crate::scalar::Scalar;
@@ -224,8 +224,8 @@ impl Step {
     ) {
         // One place for all products keeps the code small.
         let sum = match self.factors() {
-            Some((a, b)) if a == b => inner_square(&work[usize::from(a)], k),
-            Some((a, b)) => inner(&work[usize::from(a)], &work[usize::from(b)], k),
+            Some((a, b)) if a == b => inner_square_at(&work[usize::from(a)], k),
+            Some((a, b)) => inner_at(&work[usize::from(a)], &work[usize::from(b)], k),
             None => S::zero(),
         };
         macro_rules! of {

@@ -63,19 +63,35 @@ pub fn inner<S: Copy, C: Coefficient<S>, const N: usize>(a: &[S; N], b: &[C; N],
     even.plus(odd)
 }
 
-/// The same where the order is only known when the program runs.
+/// `$sum` of order `k`, which is only known when the program runs.
 ///
 /// For single numbers there is a program for each order: the way into a loop takes longer than the loop.
+macro_rules! at_order {
+    ($S:ty, $k:ident => $sum:expr) => {{
+        if const { size_of::<$S>() == size_of::<f64>() } {
+            let wanted = $k;
+            orders!($k below N => {
+                if wanted == $k {
+                    return $sum;
+                }
+            });
+            unreachable!("no coefficient of order {wanted}");
+        } else {
+            $sum
+        }
+    }};
+}
+
+/// [`inner`] where the order is only known when the program runs.
 #[inline(always)]
 pub fn inner_at<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
-    if const { size_of::<S>() == size_of::<f64>() } {
-        orders!(n below N => {
-            if k == n {
-                return inner(a, b, n);
-            }
-        });
-    }
-    inner(a, b, k)
+    at_order!(S, k => inner(a, b, k))
+}
+
+/// [`inner_square`] where the order is only known when the program runs.
+#[inline(always)]
+pub fn inner_square_at<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
+    at_order!(S, k => inner_square(a, k))
 }
 
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.
