@@ -7,7 +7,7 @@
 use super::node::{INVERSE, Node, Step};
 use super::series::{inner_at, inner_square_at};
 use crate::model::Sides;
-use crate::scalar::Scalar;
+use crate::scalar::{Instructions, Scalar};
 
 /// A linear operation on the coefficient `c` just found, of order 1 or more; `a` is a series, `h` a held value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,8 +32,6 @@ enum Then {
 
 /// The most linear operations after a step.
 const MOST: usize = 3;
-/// No component of the state.
-const NONE: u16 = u16::MAX;
 
 /// What a chain of linear operations begins with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,10 +52,9 @@ struct Chain {
     a: u16,
     b: u16,
     then: [Then; MOST],
-    /// The slot of the result.
+    /// The slot of the result, or the component of the state whose rate it is.
     to: u16,
-    /// The component of the state whose rate this is.
-    rate: u16,
+    is_rate: bool,
 }
 
 /// Chains, then a step that is none.
@@ -71,7 +68,7 @@ struct Stretch {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Program {
     stretches: Vec<Stretch>,
-    /// Slots of rates that no chain delivers, and the components they belong to.
+    /// Slots of rates that are needed elsewhere, too, and the components they belong to.
     copied: Vec<(u16, u16)>,
 }
 
@@ -115,43 +112,47 @@ impl Program {
             uses[usize::from(slot)] += 1;
             user[usize::from(slot)] = None;
         }
-        let mut fusing = Fusing { rates, waiting: vec![None; slots], stretch: Stretch::default() };
-        let mut stretches = Vec::new();
+        let mut fusing = Fusing { waiting: vec![None; slots], stretch: Stretch::default() };
+        let (mut stretches, mut delivered) = (Vec::new(), vec![false; rates.len()]);
         for &step in steps {
-            let to = usize::from(step.to);
-            match fusing.chain(step) {
-                None => {
-                    fusing.stretch.last = Some(step);
-                    stretches.push(std::mem::take(&mut fusing.stretch));
-                }
-                Some(chain) if fused && uses[to] == 1 && user[to].is_some_and(Node::is_linear) => {
+            let (to, chain) = (usize::from(step.to), fusing.chain(step));
+            let Some(mut chain) = chain else {
+                fusing.stretch.last = Some(step);
+                stretches.push(std::mem::take(&mut fusing.stretch));
+                continue;
+            };
+            if fused && uses[to] == 1 {
+                if user[to].is_some_and(Node::is_linear) {
                     fusing.waiting[to] = Some(chain);
+                    continue;
                 }
-                Some(chain) => fusing.stretch.chains.push(chain),
+                if let Some(n) = rates.iter().position(|&slot| slot == step.to) {
+                    delivered[n] = true;
+                    (chain.to, chain.is_rate) = (u16::try_from(n).expect("few components"), true);
+                }
             }
+            fusing.stretch.chains.push(chain);
         }
         stretches.push(fusing.stretch);
-        let delivered =
-            |n: u16| stretches.iter().flat_map(|stretch| &stretch.chains).any(|chain| chain.rate == n);
-        let copied = (0..).zip(rates).filter(|&(n, _)| !delivered(n)).map(|(n, &slot)| (slot, n)).collect();
+        let copied = (0..).zip(rates).filter(|&(n, _)| !delivered[usize::from(n)]);
+        let copied = copied.map(|(n, &slot)| (slot, n)).collect();
         Self { stretches, copied }
     }
 }
 
 /// Steps on the way to a program.
-struct Fusing<'a> {
-    rates: &'a [u16],
+struct Fusing {
     /// By slot: what is only needed by a step to come.
     waiting: Vec<Option<Chain>>,
     stretch: Stretch,
 }
 
-impl Fusing<'_> {
+impl Fusing {
     /// The step as a chain, or as the end of one that waits.
     fn chain(&mut self, step: Step) -> Option<Chain> {
-        let rate = self.rates.iter().position(|&slot| slot == step.to);
-        let rate = rate.map_or(NONE, |n| u16::try_from(n).expect("few components"));
-        let begun = |first, a, b| Chain { first, count: 0, a, b, then: [Then::Neg; MOST], to: step.to, rate };
+        let to = step.to;
+        let begun =
+            |first, a, b| Chain { first, count: 0, a, b, then: [Then::Neg; MOST], to, is_rate: false };
         let (slot, then) = match step.node {
             Node::Mul(a, b) => return Some(begun(First::Product, a, b)),
             Node::Square(a) => return Some(begun(First::Square, a, a)),
@@ -182,7 +183,7 @@ impl Fusing<'_> {
             chain.then[usize::from(chain.count)] = then;
             chain.count += 1;
         }
-        Some(Chain { to: step.to, rate, ..chain })
+        Some(Chain { to, ..chain })
     }
 
     /// Of two operands the one to go on with, and the other.
@@ -221,7 +222,7 @@ enum Operand {
 impl Program {
     /// The coefficients of order `k >= 1`, and those of the components of order `k + 1`.
     #[inline(always)]
-    pub(super) fn run<S: Scalar, const N: usize>(
+    pub(super) fn run<V: Instructions, S: Scalar, const N: usize>(
         &self,
         work: &mut [[S; N]],
         held: &[S],
@@ -230,10 +231,10 @@ impl Program {
     ) {
         for stretch in &self.stretches {
             for chain in &stretch.chains {
-                chain.next(work, held, k);
+                chain.next::<V, S, N>(work, held, k);
             }
             if let Some(step) = stretch.last {
-                step.next(work, held, sides, k);
+                step.next::<V, S, N>(work, held, sides, k);
             }
         }
         for &(slot, n) in &self.copied {
@@ -244,7 +245,7 @@ impl Program {
 
 impl Chain {
     #[inline(always)]
-    fn next<S: Scalar, const N: usize>(&self, work: &mut [[S; N]], held: &[S], k: usize) {
+    fn next<V: Instructions, S: Scalar, const N: usize>(&self, work: &mut [[S; N]], held: &[S], k: usize) {
         macro_rules! of {
             ($slot:expr) => {
                 work[usize::from($slot)][k]
@@ -260,11 +261,11 @@ impl Chain {
             First::Series => a[k],
             First::Product => {
                 let b = &work[usize::from(self.b)];
-                inner_at(a, b, k).fused(a[0], b[k]).fused(a[k], b[0])
+                inner_at::<V, S, N>(a, b, k).fused(a[0], b[k]).fused(a[k], b[0])
             }
-            First::Square => inner_square_at(a, k).fused(a[0] + a[0], a[k]),
+            First::Square => inner_square_at::<V, S, N>(a, k).fused(a[0] + a[0], a[k]),
         };
-        for &then in self.then.iter().take(usize::from(self.count)) {
+        for &then in &self.then[..usize::from(self.count)] {
             c = match then {
                 Then::Neg => -c,
                 Then::Add(a) => c + of!(a),
@@ -276,9 +277,43 @@ impl Chain {
                 Then::FromScaled(a, i) => of!(a) * h!(i) - c,
             };
         }
-        of!(self.to) = c;
-        if self.rate != NONE {
-            work[usize::from(self.rate)][k + 1] = c.scale(INVERSE[k + 1]);
+        if self.is_rate {
+            work[usize::from(self.to)][k + 1] = c.scale(INVERSE[k + 1]);
+        } else {
+            of!(self.to) = c;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(node: Node, to: u16) -> Step {
+        Step { node, to }
+    }
+
+    /// Lorenz's equations: `s (y - x)`, `x (r - z) - y`, `x y - b z`.
+    #[test]
+    fn what_is_used_once_is_handed_over() {
+        let steps = [
+            step(Node::Sub(1, 0), 3),
+            step(Node::Scale(3, 0), 4),
+            step(Node::From(1, 2), 5),
+            step(Node::Mul(0, 5), 6),
+            step(Node::Sub(6, 1), 7),
+            step(Node::Mul(0, 1), 8),
+            step(Node::Scale(2, 2), 9),
+            step(Node::Sub(8, 9), 10),
+        ];
+        let chains = |rates: [u16; 3], fused| {
+            let program = Program::of(&steps, &rates, 11, fused);
+            (program.stretches[0].chains.len(), program.copied.len())
+        };
+        assert_eq!(chains([4, 7, 10], true), (4, 0));
+        assert_eq!(chains([4, 7, 10], false), (8, 3));
+        // A rate that is needed twice is stored, and a component of the state is the rate of another.
+        assert_eq!(chains([4, 7, 7], true), (4, 2));
+        assert_eq!(chains([1, 7, 10], true), (4, 1));
     }
 }

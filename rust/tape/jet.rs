@@ -141,7 +141,7 @@ impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
             work[n][1] = work[usize::from(slot)][0];
         }
         for k in 1..order.min(N - 1) {
-            program.run(work, held, sides, k);
+            program.run::<V, S, N>(work, held, sides, k);
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::series::{inner_at, inner_square_at};
 use super::symbol::Function;
 use crate::model::Sides;
-use crate::scalar::Scalar;
+use crate::scalar::{Instructions, Scalar};
 
 /// A value that does not change along a solution; operands are earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,6 +150,7 @@ impl Step {
                 held[usize::from($i)]
             };
         }
+        // What is short stays in registers where the long functions are apart.
         to[0][0] = match self.node {
             Node::Time => t,
             Node::Hold(c) => h!(c),
@@ -170,28 +171,33 @@ impl Step {
                 to[1][0] = S::one() / of!(b);
                 h!(c) * to[1][0]
             }
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
             Node::Sqrt(a) => {
-                let root = Function::Sqrt.of(of!(a));
-                to[1][0] = S::constant(0.5) / root;
-                root
+                to[0][0] = Function::Sqrt.of(of!(a));
+                to[1][0] = S::constant(0.5) / to[0][0];
+                return;
             }
-            Node::Exp(a) => Function::Exp.of(of!(a)),
+            Node::Exp(a) => {
+                to[0][0] = Function::Exp.of(of!(a));
+                return;
+            }
             Node::Ln(a) => {
                 to[2][0] = S::one() / of!(a);
-                Function::Ln.of(of!(a))
+                to[0][0] = Function::Ln.of(of!(a));
+                return;
             }
             Node::Sin(a) => {
                 to[1][0] = Function::Cos.of(of!(a));
-                Function::Sin.of(of!(a))
+                to[0][0] = Function::Sin.of(of!(a));
+                return;
             }
             Node::Tanh(a) => {
-                let value = Function::Tanh.of(of!(a));
-                to[1][0] = S::one() - value.square();
-                value
+                to[0][0] = Function::Tanh.of(of!(a));
+                to[1][0] = S::one() - to[0][0].square();
+                return;
             }
             // Done with the sine and the tangent.
             Node::Cos(_) | Node::Slope(_) => return,
-            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
         };
     }
 
@@ -215,7 +221,7 @@ impl Step {
 
     /// Coefficient `k >= 1`, from those of lower order and the operands' coefficients up to `k`.
     #[inline(always)]
-    pub(super) fn next<S: Scalar, const N: usize>(
+    pub(super) fn next<V: Instructions, S: Scalar, const N: usize>(
         self,
         work: &mut [[S; N]],
         held: &[S],
@@ -224,8 +230,8 @@ impl Step {
     ) {
         // One place for all products keeps the code small.
         let sum = match self.factors() {
-            Some((a, b)) if a == b => inner_square_at(&work[usize::from(a)], k),
-            Some((a, b)) => inner_at(&work[usize::from(a)], &work[usize::from(b)], k),
+            Some((a, b)) if a == b => inner_square_at::<V, S, N>(&work[usize::from(a)], k),
+            Some((a, b)) => inner_at::<V, S, N>(&work[usize::from(a)], &work[usize::from(b)], k),
             None => S::zero(),
         };
         macro_rules! of {
