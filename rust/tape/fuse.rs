@@ -9,7 +9,7 @@ use super::series::{inner_at, inner_square_at};
 use crate::model::Sides;
 use crate::scalar::{Instructions, Scalar};
 
-/// A linear operation on the coefficient `c` just found, of order 1 or more; `a` is a series, `h` a held value.
+/// A linear operation on the coefficient `c` just found; `a` is a series, `h` a held value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Then {
     /// `-c`
@@ -20,6 +20,12 @@ enum Then {
     Sub(u16),
     /// `a - c`
     From(u16),
+    /// `c + h`
+    Plus(u16),
+    /// `c - h`
+    Minus(u16),
+    /// `h - c`
+    FromHeld(u16),
     /// `c h`
     Scale(u16),
     /// `c + a h`
@@ -64,7 +70,7 @@ struct Stretch {
     last: Option<Step>,
 }
 
-/// What a tape does for each order above 0.
+/// What a tape does for each order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Program {
     stretches: Vec<Stretch>,
@@ -156,18 +162,20 @@ impl Fusing {
         let (slot, then) = match step.node {
             Node::Mul(a, b) => return Some(begun(First::Product, a, b)),
             Node::Square(a) => return Some(begun(First::Square, a, a)),
-            Node::Neg(a) | Node::From(_, a) => (a, Some(Then::Neg)),
-            Node::Plus(a, _) | Node::Minus(a, _) => (a, None),
-            Node::Scale(a, h) => (a, Some(Then::Scale(h))),
+            Node::Neg(a) => (a, Then::Neg),
+            Node::From(h, a) => (a, Then::FromHeld(h)),
+            Node::Plus(a, h) => (a, Then::Plus(h)),
+            Node::Minus(a, h) => (a, Then::Minus(h)),
+            Node::Scale(a, h) => (a, Then::Scale(h)),
             Node::Add(a, b) => match self.pair(a, b) {
-                (a, Operand::Series(b)) => (a, Some(Then::Add(b))),
-                (a, Operand::Scaled(b, h)) => (a, Some(Then::AddScaled(b, h))),
+                (a, Operand::Series(b)) => (a, Then::Add(b)),
+                (a, Operand::Scaled(b, h)) => (a, Then::AddScaled(b, h)),
             },
             Node::Sub(a, b) => match self.pair(a, b) {
-                (c, Operand::Series(other)) if c == a => (c, Some(Then::Sub(other))),
-                (c, Operand::Scaled(other, h)) if c == a => (c, Some(Then::SubScaled(other, h))),
-                (c, Operand::Series(other)) => (c, Some(Then::From(other))),
-                (c, Operand::Scaled(other, h)) => (c, Some(Then::FromScaled(other, h))),
+                (c, Operand::Series(other)) if c == a => (c, Then::Sub(other)),
+                (c, Operand::Scaled(other, h)) if c == a => (c, Then::SubScaled(other, h)),
+                (c, Operand::Series(other)) => (c, Then::From(other)),
+                (c, Operand::Scaled(other, h)) => (c, Then::FromScaled(other, h)),
             },
             _ => return None,
         };
@@ -179,10 +187,8 @@ impl Fusing {
             Some(waiting) => waiting,
             None => begun(First::Series, slot, slot),
         };
-        if let Some(then) = then {
-            chain.then[usize::from(chain.count)] = then;
-            chain.count += 1;
-        }
+        chain.then[usize::from(chain.count)] = then;
+        chain.count += 1;
         Some(Chain { to, ..chain })
     }
 
@@ -220,9 +226,31 @@ enum Operand {
 }
 
 impl Program {
+    /// The coefficients of order 0, and those of the components of order 1.
+    #[inline(always)]
+    pub(super) fn start<S: Scalar, const N: usize>(
+        &self,
+        work: &mut [[S; N]],
+        held: &[S],
+        t: S,
+        sides: &Sides<S>,
+    ) {
+        for stretch in &self.stretches {
+            for chain in &stretch.chains {
+                chain.start(work, held);
+            }
+            if let Some(step) = stretch.last {
+                step.start(work, held, t, sides);
+            }
+        }
+        for &(slot, n) in &self.copied {
+            work[usize::from(n)][1] = work[usize::from(slot)][0];
+        }
+    }
+
     /// The coefficients of order `k >= 1`, and those of the components of order `k + 1`.
     #[inline(always)]
-    pub(super) fn run<V: Instructions, S: Scalar, const N: usize>(
+    pub(super) fn next<V: Instructions, S: Scalar, const N: usize>(
         &self,
         work: &mut [[S; N]],
         held: &[S],
@@ -234,7 +262,7 @@ impl Program {
                 chain.next::<V, S, N>(work, held, k);
             }
             if let Some(step) = stretch.last {
-                step.next::<V, S, N>(work, held, sides, k);
+                step.next::<V, S, N>(work, sides, k);
             }
         }
         for &(slot, n) in &self.copied {
@@ -245,7 +273,39 @@ impl Program {
 
 impl Chain {
     #[inline(always)]
+    fn start<S: Scalar, const N: usize>(&self, work: &mut [[S; N]], held: &[S]) {
+        let a = work[usize::from(self.a)][0];
+        let c = match self.first {
+            First::Series => a,
+            First::Product => a * work[usize::from(self.b)][0],
+            First::Square => a.square(),
+        };
+        let c = self.rest(c, work, held, 0);
+        work[usize::from(self.to)][usize::from(self.is_rate)] = c;
+    }
+
+    #[inline(always)]
     fn next<V: Instructions, S: Scalar, const N: usize>(&self, work: &mut [[S; N]], held: &[S], k: usize) {
+        let a = &work[usize::from(self.a)];
+        let c = match self.first {
+            First::Series => a[k],
+            First::Product => {
+                let b = &work[usize::from(self.b)];
+                inner_at::<V, S, N>(a, b, k).fused(a[0], b[k]).fused(a[k], b[0])
+            }
+            First::Square => inner_square_at::<V, S, N>(a, k).fused(a[0] + a[0], a[k]),
+        };
+        let c = self.rest(c, work, held, k);
+        if self.is_rate {
+            work[usize::from(self.to)][k + 1] = c.scale(INVERSE[k + 1]);
+        } else {
+            work[usize::from(self.to)][k] = c;
+        }
+    }
+
+    /// The linear operations; what is held has only a coefficient of order 0.
+    #[inline(always)]
+    fn rest<S: Scalar, const N: usize>(&self, mut c: S, work: &[[S; N]], held: &[S], k: usize) -> S {
         macro_rules! of {
             ($slot:expr) => {
                 work[usize::from($slot)][k]
@@ -256,18 +316,13 @@ impl Chain {
                 held[usize::from($i)]
             };
         }
-        let a = &work[usize::from(self.a)];
-        let mut c = match self.first {
-            First::Series => a[k],
-            First::Product => {
-                let b = &work[usize::from(self.b)];
-                inner_at::<V, S, N>(a, b, k).fused(a[0], b[k]).fused(a[k], b[0])
-            }
-            First::Square => inner_square_at::<V, S, N>(a, k).fused(a[0] + a[0], a[k]),
-        };
         for &then in &self.then[..usize::from(self.count)] {
             c = match then {
-                Then::Neg => -c,
+                Then::Plus(i) if k == 0 => c + h!(i),
+                Then::Minus(i) if k == 0 => c - h!(i),
+                Then::FromHeld(i) if k == 0 => h!(i) - c,
+                Then::Plus(_) | Then::Minus(_) => c,
+                Then::Neg | Then::FromHeld(_) => -c,
                 Then::Add(a) => c + of!(a),
                 Then::Sub(a) => c - of!(a),
                 Then::From(a) => of!(a) - c,
@@ -277,11 +332,7 @@ impl Chain {
                 Then::FromScaled(a, i) => of!(a) * h!(i) - c,
             };
         }
-        if self.is_rate {
-            work[usize::from(self.to)][k + 1] = c.scale(INVERSE[k + 1]);
-        } else {
-            of!(self.to) = c;
-        }
+        c
     }
 }
 

@@ -3,7 +3,7 @@
 use super::fuse::Program;
 use super::known::Known;
 use super::node::{INVERSE, hold};
-use super::{Step, Tape, disk, dle};
+use super::{Tape, disk, dle};
 use crate::model::Sides;
 use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
 use crate::unroll::unroll;
@@ -79,8 +79,8 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         }
         unroll!(n in 0..D => { work[n][0] = x[n]; });
         let work = &mut work[..tape.slots];
-        let (steps, rates, program) = (&tape.steps[..], &tape.rates[..], &tape.program);
-        S::Real::work(*isa, Interpretation { steps, rates, program, work, order, held, t, sides });
+        let program = &tape.program;
+        S::Real::work(*isa, Interpretation { program, work, order, held, t, sides });
     }
 
     /// The coefficients of each component, order 0 first; those beyond the [`order`](Jets::order) are idle.
@@ -110,8 +110,6 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
 
 /// The series of any tape: compiled once for each instruction set and kind of number.
 struct Interpretation<'a, S: Scalar, const N: usize> {
-    steps: &'a [Step],
-    rates: &'a [u16],
     program: &'a Program,
     /// The state is in the first ones.
     work: &'a mut [[S; N]],
@@ -128,28 +126,27 @@ impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
 
     #[inline(always)]
     fn run<V: Instructions>(self) {
-        let Self { steps, rates, program, work, order, held, t, sides } = self;
+        let Self { program, work, order, held, t, sides } = self;
         if const { S::Real::LANES > 1 } {
             // Packets are only fast with their own instructions.
-            for step in steps {
-                step.start(work, held, t, sides);
-            }
+            program.start(work, held, t, sides);
         } else {
-            begin(steps, work, held, t, sides);
-        }
-        for (n, &slot) in rates.iter().enumerate() {
-            work[n][1] = work[usize::from(slot)][0];
+            begin(program, work, held, t, sides);
         }
         for k in 1..order.min(N - 1) {
-            program.run::<V, S, N>(work, held, sides, k);
+            program.next::<V, S, N>(work, held, sides, k);
         }
     }
 }
 
 /// Coefficient 0 of every operation. Once per step: over single numbers not worth a copy for each instruction set.
 #[inline(never)]
-fn begin<S: Scalar, const N: usize>(steps: &[Step], work: &mut [[S; N]], held: &[S], t: S, sides: &Sides<S>) {
-    for step in steps {
-        step.start(work, held, t, sides);
-    }
+fn begin<S: Scalar, const N: usize>(
+    program: &Program,
+    work: &mut [[S; N]],
+    held: &[S],
+    t: S,
+    sides: &Sides<S>,
+) {
+    program.start(work, held, t, sides);
 }

@@ -206,8 +206,6 @@ impl Step {
     fn factors(self) -> Option<(u16, u16)> {
         let to = self.to;
         match self.node {
-            Node::Mul(a, b) => Some((a, b)),
-            Node::Square(a) => Some((a, a)),
             Node::Div(_, b) | Node::Over(_, b) => Some((to, b)),
             Node::Sqrt(_) => Some((to, to)),
             Node::Exp(_) => Some((to + 1, to)),
@@ -219,12 +217,12 @@ impl Step {
         }
     }
 
-    /// Coefficient `k >= 1`, from those of lower order and the operands' coefficients up to `k`.
+    /// Coefficient `k >= 1` of a step that is in no [chain](super::fuse), from those of lower order and the operands'
+    /// coefficients up to `k`.
     #[inline(always)]
     pub(super) fn next<V: Instructions, S: Scalar, const N: usize>(
         self,
         work: &mut [[S; N]],
-        held: &[S],
         sides: &Sides<S>,
         k: usize,
     ) {
@@ -239,23 +237,11 @@ impl Step {
                 work[usize::from($slot)][$k]
             };
         }
-        macro_rules! h {
-            ($i:expr) => {
-                held[usize::from($i)]
-            };
-        }
         let to = self.to;
         let (weight, inverse) = (k as f64, INVERSE[k]);
         of!(to, k) = match self.node {
             Node::Time if k == 1 => S::one(),
             Node::Time | Node::Hold(_) => S::zero(),
-            Node::Neg(a) | Node::From(_, a) => -of!(a, k),
-            Node::Add(a, b) => of!(a, k) + of!(b, k),
-            Node::Sub(a, b) => of!(a, k) - of!(b, k),
-            Node::Plus(a, _) | Node::Minus(a, _) => of!(a, k),
-            Node::Scale(a, c) => of!(a, k) * h!(c),
-            Node::Mul(a, b) => sum.fused(of!(a, 0), of!(b, k)).fused(of!(a, k), of!(b, 0)),
-            Node::Square(a) => sum.fused(of!(a, 0) + of!(a, 0), of!(a, k)),
             // The quotient q of a = q b.
             Node::Div(a, b) => (of!(a, k) - sum.fused(of!(to, 0), of!(b, k))) * of!(to + 1, 0),
             Node::Over(_, b) => -(sum.fused(of!(to, 0), of!(b, k)) * of!(to + 1, 0)),
@@ -280,6 +266,7 @@ impl Step {
             Node::Cos(sine) => sum.fused(of!(sine + 2, k), of!(sine, 0)).scale(-inverse),
             Node::Slope(tanh) => -sum.fused(of!(tanh, 0) + of!(tanh, 0), of!(tanh, k)),
             Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a, k), of!(b, k)),
+            _ => unreachable!("products and linear steps are in chains"),
         };
     }
 }
