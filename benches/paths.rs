@@ -172,6 +172,7 @@ fn paths() -> Vec<Path> {
         ensemble("trajectory by dopri5", dle(), Stepper::Dopri5, LOOSE, vec![START], 2_000),
         ensemble("starts", dle(), Stepper::Taylor, LOOSE, starts(400), 100),
         ensemble("starts by dopri5", dle(), Stepper::Dopri5, LOOSE, starts(400), 100),
+        ensemble("trajectory of own model", lorenz(), Stepper::Taylor, TIGHT, vec![START], 500),
         ensemble("starts of own model", lorenz(), Stepper::Taylor, LOOSE, starts(400), 10),
         exponents::<1>("exponents", LOOSE, drives(64), 500),
         exponents::<3>("spectrum", TIGHT, one(), 2_000),

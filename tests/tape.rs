@@ -6,7 +6,8 @@ use proptest::prelude::*;
 use udd::integrate::{ErrorNorm, Tolerance};
 use udd::model::effects::{Kind, Role, Treatment};
 use udd::model::{
-    DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, Parameter, PendulumFamily, Sides, System, sides_of,
+    DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, OwnFamily, Parameter, PendulumFamily, Sides, System,
+    sides_of,
 };
 use udd::scalar::{Dual, Instructions, Isa, LANES, Mask, Packet, Plain, Real, Scalar, Work};
 use udd::tape::{HIGH, Jets, Tape};
@@ -468,6 +469,82 @@ impl Family<1> for Compares {
 fn a_law_with_comparisons_is_refused() {
     let error = Tape::record(&Compares, &[]).unwrap_err();
     assert!(error.to_string().contains("comparisons"));
+}
+
+/// Expressions of the state, the time and two parameters, without poles near the start: products, quotients and
+/// functions, and many linear operations in a row.
+fn expression() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        4 => prop::sample::select(vec!["x", "y", "z"]).prop_map(str::to_owned),
+        2 => prop::sample::select(vec!["t", "k", "c", "2", "(-0.5)", "1.5"]).prop_map(str::to_owned),
+    ];
+    leaf.prop_recursive(5, 24, 2, |inner| {
+        let pair = (inner.clone(), inner.clone());
+        let binary = (prop::sample::select(vec!["+", "-", "+", "-", "*", "*"]), pair);
+        prop_oneof![
+            8 => binary.prop_map(|(op, (a, b))| format!("({a}{op}{b})")),
+            1 => inner.clone().prop_map(|a| format!("(-{a})")),
+            1 => inner.clone().prop_map(|a| format!("({a})^2")),
+            1 => (inner.clone(), inner.clone()).prop_map(|(a, b)| format!("({a}/(3+({b})^2))")),
+            1 => (prop::sample::select(vec!["sin", "cos", "tanh"]), inner).prop_map(|(f, a)| format!("{f}({a})")),
+        ]
+    })
+}
+
+/// The bits of all coefficients; one for all that are no numbers.
+fn coefficients<S: Scalar>(
+    tape: &Tape<3>,
+    isa: Isa,
+    x: impl Fn(usize) -> S,
+    parts: impl Fn(S) -> Vec<f64>,
+) -> Vec<u64> {
+    const N: usize = HIGH + 1;
+    let mut jets = Jets::<S, 3, N>::new(tape, isa);
+    let sides = from_fn(|_| S::mask(true));
+    jets.expand(tape, &[x(3), x(4)], S::constant(0.7), &from_fn(x), &sides);
+    let bits = |value: f64| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() };
+    jets.coefficients().iter().flatten().flat_map(|&c| parts(c)).map(bits).collect()
+}
+
+/// The same of packets, by their own instructions.
+struct PacketBits<'a>(&'a Tape<3>, Isa, &'a [f64; 5]);
+
+impl Work for PacketBits<'_> {
+    type Output = Vec<u64>;
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> Vec<u64> {
+        let Self(tape, isa, x) = self;
+        let lane = |n: usize| Packet::<LANES, V>::from_lanes(|l| x[n] * (1.0 + 0.1 * l as f64));
+        coefficients(tape, isa, lane, |c| (0..LANES).map(|l| c.lane(l)).collect())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Steps that are interpreted as one have the bits of those interpreted one by one, over every kind of number.
+    #[test]
+    fn fused_steps_change_no_bit(
+        texts in [expression(), expression(), expression()],
+        x in prop::array::uniform5(prop_oneof![Just(0.0), -1.5..1.5f64]),
+    ) {
+        let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+        let family = OwnFamily::<3>::parse(&names(&["x", "y", "z"]), &texts, &names(&["k", "c"])).unwrap();
+        let tape = Tape::record(&family, &[]).unwrap();
+        prop_assume!(!tape.is_unrolled());
+        let apart = tape.unfused();
+        for isa in Isa::available() {
+            let alone = |tape| coefficients::<f64>(tape, isa, |n| x[n], |c| vec![c]);
+            prop_assert_eq!(alone(&tape), alone(&apart));
+            let tangents = |tape| {
+                let one = |n: usize| Dual::<f64, 3>::variable(x[n], n % 3);
+                coefficients(tape, isa, one, |c| vec![c.re, c.d[0], c.d[1], c.d[2]])
+            };
+            prop_assert_eq!(tangents(&tape), tangents(&apart));
+            prop_assert_eq!(isa.run(PacketBits(&tape, isa, &x)), isa.run(PacketBits(&apart, isa, &x)));
+        }
+    }
 }
 
 /// Where a coefficient is not finite the radius says so.

@@ -1,8 +1,9 @@
 //! The Taylor coefficients of a solution.
 
+use super::fuse::Program;
 use super::known::Known;
 use super::node::{INVERSE, hold};
-use super::{Step, Tape, disk, dle};
+use super::{Tape, disk, dle};
 use crate::model::Sides;
 use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
 use crate::unroll::unroll;
@@ -65,7 +66,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
     pub fn expand_here<V: Instructions>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
-        let Self { work, held, order, .. } = self;
+        let Self { isa, work, held, order } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
         if const { D == 3 }
@@ -76,7 +77,10 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         if const { D == 4 } && tape.known == Known::Disk {
             return disk::expand::<V, S, D, N>(work, order, held, x, sides);
         }
-        interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], order, held, t, x, sides);
+        unroll!(n in 0..D => { work[n][0] = x[n]; });
+        let work = &mut work[..tape.slots];
+        let program = &tape.program;
+        S::Real::work(*isa, Interpretation { program, work, order, held, t, sides });
     }
 
     /// The coefficients of each component, order 0 first; those beyond the [`order`](Jets::order) are idle.
@@ -104,41 +108,45 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
     }
 }
 
-/// Any tape.
-#[inline(always)]
-#[allow(clippy::too_many_arguments, reason = "one call")]
-fn interpreted<S: Scalar, const D: usize, const N: usize>(
-    steps: &[Step],
-    rates: &[u16; D],
-    work: &mut [[S; N]],
+/// The series of any tape: compiled once for each instruction set and kind of number.
+struct Interpretation<'a, S: Scalar, const N: usize> {
+    program: &'a Program,
+    /// The state is in the first ones.
+    work: &'a mut [[S; N]],
     order: usize,
-    held: &[S],
+    held: &'a [S],
     t: S,
-    x: &[S; D],
-    sides: &Sides<S>,
-) {
-    unroll!(n in 0..D => { work[n][0] = x[n]; });
-    if const { S::Real::LANES > 1 } {
-        // Packets are only fast with their own instructions.
-        for step in steps {
-            step.start(work, held, t, sides);
+    sides: &'a Sides<S>,
+}
+
+impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
+    type Output = ();
+    // Eight derivatives fill a register.
+    const WIDE: bool = size_of::<S>() > 8 * size_of::<f64>();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        let Self { program, work, order, held, t, sides } = self;
+        if const { S::Real::LANES > 1 } {
+            // Packets are only fast with their own instructions.
+            program.start(work, held, t, sides);
+        } else {
+            begin(program, work, held, t, sides);
         }
-    } else {
-        begin(steps, work, held, t, sides);
-    }
-    unroll!(n in 0..D => { work[n][1] = work[usize::from(rates[n])][0]; });
-    for k in 1..order.min(N - 1) {
-        for step in steps {
-            step.next(work, held, sides, k);
+        for k in 1..order.min(N - 1) {
+            program.next::<V, S, N>(work, held, sides, k);
         }
-        unroll!(n in 0..D => { work[n][k + 1] = work[usize::from(rates[n])][k].scale(INVERSE[k + 1]); });
     }
 }
 
 /// Coefficient 0 of every operation. Once per step: over single numbers not worth a copy for each instruction set.
 #[inline(never)]
-fn begin<S: Scalar, const N: usize>(steps: &[Step], work: &mut [[S; N]], held: &[S], t: S, sides: &Sides<S>) {
-    for step in steps {
-        step.start(work, held, t, sides);
-    }
+fn begin<S: Scalar, const N: usize>(
+    program: &Program,
+    work: &mut [[S; N]],
+    held: &[S],
+    t: S,
+    sides: &Sides<S>,
+) {
+    program.start(work, held, t, sides);
 }

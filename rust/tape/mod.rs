@@ -6,6 +6,7 @@
 
 mod disk;
 mod dle;
+mod fuse;
 mod jet;
 mod known;
 mod node;
@@ -42,6 +43,8 @@ pub struct Tape<const D: usize> {
     pub(crate) rates: [u16; D],
     /// How many series there are; the first `D` are the state.
     pub(crate) slots: usize,
+    /// The steps as they are interpreted.
+    program: fuse::Program,
     known: known::Known,
     levels_off: bool,
     switches_held: bool,
@@ -51,6 +54,12 @@ impl<const D: usize> Tape<D> {
     /// What changes along a solution, in the order of evaluation.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// The same, but each step of its series is interpreted by itself: for comparisons, no bit changes.
+    pub fn unfused(&self) -> Self {
+        let program = fuse::Program::of(&self.steps, &self.rates, self.slots, false);
+        Self { program, ..self.clone() }
     }
 
     /// Whether the law can level off so far that the terms of its series are too small to tell how near its

@@ -3,10 +3,10 @@
 //! Products: Leibniz. The others follow from the differential equation of the function, as
 //! `(exp a)' = exp(a) a'` (À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99).
 
-use super::series::{inner, inner_square};
+use super::series::{inner_at, inner_square_at};
 use super::symbol::Function;
 use crate::model::Sides;
-use crate::scalar::Scalar;
+use crate::scalar::{Instructions, Scalar};
 
 /// A value that does not change along a solution; operands are earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,6 +150,7 @@ impl Step {
                 held[usize::from($i)]
             };
         }
+        // What is short stays in registers where the long functions are apart.
         to[0][0] = match self.node {
             Node::Time => t,
             Node::Hold(c) => h!(c),
@@ -170,28 +171,33 @@ impl Step {
                 to[1][0] = S::one() / of!(b);
                 h!(c) * to[1][0]
             }
+            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
             Node::Sqrt(a) => {
-                let root = Function::Sqrt.of(of!(a));
-                to[1][0] = S::constant(0.5) / root;
-                root
+                to[0][0] = Function::Sqrt.of(of!(a));
+                to[1][0] = S::constant(0.5) / to[0][0];
+                return;
             }
-            Node::Exp(a) => Function::Exp.of(of!(a)),
+            Node::Exp(a) => {
+                to[0][0] = Function::Exp.of(of!(a));
+                return;
+            }
             Node::Ln(a) => {
                 to[2][0] = S::one() / of!(a);
-                Function::Ln.of(of!(a))
+                to[0][0] = Function::Ln.of(of!(a));
+                return;
             }
             Node::Sin(a) => {
                 to[1][0] = Function::Cos.of(of!(a));
-                Function::Sin.of(of!(a))
+                to[0][0] = Function::Sin.of(of!(a));
+                return;
             }
             Node::Tanh(a) => {
-                let value = Function::Tanh.of(of!(a));
-                to[1][0] = S::one() - value.square();
-                value
+                to[0][0] = Function::Tanh.of(of!(a));
+                to[1][0] = S::one() - to[0][0].square();
+                return;
             }
             // Done with the sine and the tangent.
             Node::Cos(_) | Node::Slope(_) => return,
-            Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
         };
     }
 
@@ -200,8 +206,6 @@ impl Step {
     fn factors(self) -> Option<(u16, u16)> {
         let to = self.to;
         match self.node {
-            Node::Mul(a, b) => Some((a, b)),
-            Node::Square(a) => Some((a, a)),
             Node::Div(_, b) | Node::Over(_, b) => Some((to, b)),
             Node::Sqrt(_) => Some((to, to)),
             Node::Exp(_) => Some((to + 1, to)),
@@ -213,19 +217,19 @@ impl Step {
         }
     }
 
-    /// Coefficient `k >= 1`, from those of lower order and the operands' coefficients up to `k`.
+    /// Coefficient `k >= 1` of a step that is in no [chain](super::fuse), from those of lower order and the operands'
+    /// coefficients up to `k`.
     #[inline(always)]
-    pub(super) fn next<S: Scalar, const N: usize>(
+    pub(super) fn next<V: Instructions, S: Scalar, const N: usize>(
         self,
         work: &mut [[S; N]],
-        held: &[S],
         sides: &Sides<S>,
         k: usize,
     ) {
         // One place for all products keeps the code small.
         let sum = match self.factors() {
-            Some((a, b)) if a == b => inner_square(&work[usize::from(a)], k),
-            Some((a, b)) => inner(&work[usize::from(a)], &work[usize::from(b)], k),
+            Some((a, b)) if a == b => inner_square_at::<V, S, N>(&work[usize::from(a)], k),
+            Some((a, b)) => inner_at::<V, S, N>(&work[usize::from(a)], &work[usize::from(b)], k),
             None => S::zero(),
         };
         macro_rules! of {
@@ -233,23 +237,11 @@ impl Step {
                 work[usize::from($slot)][$k]
             };
         }
-        macro_rules! h {
-            ($i:expr) => {
-                held[usize::from($i)]
-            };
-        }
         let to = self.to;
         let (weight, inverse) = (k as f64, INVERSE[k]);
         of!(to, k) = match self.node {
             Node::Time if k == 1 => S::one(),
             Node::Time | Node::Hold(_) => S::zero(),
-            Node::Neg(a) | Node::From(_, a) => -of!(a, k),
-            Node::Add(a, b) => of!(a, k) + of!(b, k),
-            Node::Sub(a, b) => of!(a, k) - of!(b, k),
-            Node::Plus(a, _) | Node::Minus(a, _) => of!(a, k),
-            Node::Scale(a, c) => of!(a, k) * h!(c),
-            Node::Mul(a, b) => sum.fused(of!(a, 0), of!(b, k)).fused(of!(a, k), of!(b, 0)),
-            Node::Square(a) => sum.fused(of!(a, 0) + of!(a, 0), of!(a, k)),
             // The quotient q of a = q b.
             Node::Div(a, b) => (of!(a, k) - sum.fused(of!(to, 0), of!(b, k))) * of!(to + 1, 0),
             Node::Over(_, b) => -(sum.fused(of!(to, 0), of!(b, k)) * of!(to + 1, 0)),
@@ -274,6 +266,7 @@ impl Step {
             Node::Cos(sine) => sum.fused(of!(sine + 2, k), of!(sine, 0)).scale(-inverse),
             Node::Slope(tanh) => -sum.fused(of!(tanh, 0) + of!(tanh, 0), of!(tanh, k)),
             Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a, k), of!(b, k)),
+            _ => unreachable!("products and linear steps are in chains"),
         };
     }
 }

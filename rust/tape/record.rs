@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use thiserror::Error;
 
+use super::fuse::Program;
 use super::known::Known;
 use super::symbol::{self, Function, Made, Recording, SideOf, Symbol};
 use super::{Held, Node, Step, Tape};
@@ -91,7 +92,9 @@ impl<'a> Lowering<'a> {
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
         let switches_held = self.held.iter().any(|held| matches!(held, Held::Select(..)));
         let levels_off = self.steps.iter().any(|step| step.node.levels_off());
+        let program = Program::of(&self.steps, &rates, self.slots, true);
         let mut tape = Tape {
+            program,
             held: self.held,
             steps: self.steps,
             rates,

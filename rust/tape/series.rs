@@ -5,7 +5,7 @@
 //! waits for them as shortly as possible. Two sums run side by side, so that they need not wait for each
 //! other.
 
-use crate::scalar::Scalar;
+use crate::scalar::{Instructions, Isa, Scalar};
 
 /// The body for every order `k` below `to`, with its number known when the program is compiled.
 macro_rules! orders {
@@ -61,6 +61,44 @@ pub fn inner<S: Copy, C: Coefficient<S>, const N: usize>(a: &[S; N], b: &[C; N],
         odd = odd.with(ah, bl);
     }
     even.plus(odd)
+}
+
+/// `$sum` of order `k`, which is only known when the program runs.
+///
+/// For numbers without derivatives there is a program for each order: the way into a loop takes longer than the loop.
+macro_rules! at_order {
+    ($V:ty, $S:ty, $k:ident => $sum:expr) => {{
+        if const { unrolled::<$V, $S>() } {
+            let wanted = $k;
+            orders!($k below N => {
+                if wanted == $k {
+                    return $sum;
+                }
+            });
+            unreachable!("no coefficient of order {wanted}");
+        } else {
+            $sum
+        }
+    }};
+}
+
+/// Not where derivatives make every term long, nor on a PC without AVX2: it is rare, and every copy takes its time to
+/// compile.
+const fn unrolled<V: Instructions, S: Scalar>() -> bool {
+    let baseline = cfg!(target_arch = "x86_64") && matches!(V::ISA, Isa::Baseline);
+    size_of::<S>() == size_of::<S::Real>() && !baseline
+}
+
+/// [`inner`] where the order is only known when the program runs.
+#[inline(always)]
+pub fn inner_at<V: Instructions, S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
+    at_order!(V, S, k => inner(a, b, k))
+}
+
+/// [`inner_square`] where the order is only known when the program runs.
+#[inline(always)]
+pub fn inner_square_at<V: Instructions, S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
+    at_order!(V, S, k => inner_square(a, k))
 }
 
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.
