@@ -103,7 +103,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
             ship.load(lane, run, start);
             after(1)
         };
-        for lane in 0..R::LANES {
+        for lane in 0..queue.lanes::<R>() {
             let run = if lane == 0 { Some(first) } else { queue.take() };
             if let Some(run) = run {
                 wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));

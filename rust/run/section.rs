@@ -134,7 +134,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
         let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa);
         // What each lane has found.
         let mut catches: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];
-        for lane in 0..R::LANES {
+        for lane in 0..queue.lanes::<R>() {
             let job = if lane == 0 { Some(first) } else { queue.take() };
             if let Some(job) = job {
                 ship.load(lane, job, start(job));
@@ -147,13 +147,19 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
             let stopped = queue.stopped();
             let mut full = R::mask(false);
             if scan.look(&ship, progress.moved) {
-                full = R::Mask::from_lanes(|lane| {
-                    let found = &mut catches[lane];
-                    for crossed in scan.crossed(lane).iter().take(count - found.t.len()) {
+                let mut any = false;
+                for (lane, crossed) in scan.crossed() {
+                    let found = &mut catches[*lane];
+                    if found.t.len() < count {
                         found.push(crossed);
+                        any |= found.t.len() == count;
                     }
-                    ship.job(lane).is_some() && found.t.len() == count
-                });
+                }
+                if any {
+                    full = R::Mask::from_lanes(|lane| {
+                        ship.job(lane).is_some() && catches[lane].t.len() == count
+                    });
+                }
             }
             let mut far = R::mask(false);
             for n in 0..D {

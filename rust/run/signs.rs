@@ -24,12 +24,17 @@ pub struct Stretch<R: Real> {
 /// Tells the stretches with a crossing from the values at their ends; returns the sides after them.
 #[inline(always)]
 pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Stretch<R>]) -> Side<R> {
-    let (rising, falling) = (R::mask(side.rising), R::mask(side.falling));
-    let Side { mut below, mut above, moved, .. } = side;
+    let Side { mut below, mut above, rising, falling, moved } = side;
     for i in 0..stretches.len() {
         let value = values[i];
         let (low, high) = (value.less(R::zero()), R::zero().less(value));
-        let crossing = below.and(high).and(rising).or(above.and(low).and(falling)).and(moved);
+        let mut crossing = R::mask(false);
+        if rising {
+            crossing = below.and(high).and(moved);
+        }
+        if falling {
+            crossing = crossing.or(above.and(low).and(moved));
+        }
         stretches[i] = Stretch { s: s[i], value, crossing };
         // A zero leaves the side as it was: a surface that is only touched is not crossed. What is not a
         // number has no side.
