@@ -104,7 +104,7 @@ pub struct Scan<'a, R: Real, const D: usize> {
     /// What was found in the last step, with the lane; in the order of time in each of them.
     crossed: Vec<(usize, Crossed<D>)>,
     /// How many crossings each lane still leaves out.
-    skip: Vec<usize>,
+    skip: R,
     /// Whether these need only be counted: a single surface that has no poles.
     counted: bool,
 }
@@ -131,7 +131,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             sides: [R::mask(true); MAX_SURFACES],
             room: Room::new(),
             crossed: Vec::with_capacity(R::LANES * MOST_PROBES * sections.len()),
-            skip: vec![0; R::LANES],
+            skip: R::zero(),
             counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
         }
     }
@@ -144,9 +144,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         K: Method<R, D>,
     {
         self.sides = *ship.driver.sides();
-        for lane in (0..R::LANES).filter(|&lane| lanes.lane(lane)) {
-            self.skip[lane] = skip;
-        }
+        self.skip = R::select(lanes, R::constant(skip as f64), self.skip);
         let law = Law { system: ship.driver.system(), parameters: ship.values(), sides: &self.sides };
         for surface in &mut self.surfaces {
             let value = surface.at(&law, &ship.driver.t(), ship.driver.x());
@@ -179,10 +177,6 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         let step = Step { polynomials, from: driver.from(), size, end, probes: K::PROBES };
         self.crossed.clear();
         for (which, surface) in (0..).zip(&mut self.surfaces) {
-            if surface.stays(&step, moved) {
-                surface.value = surface.at(&law, &step.end.0, step.end.1);
-                continue;
-            }
             let mut stretches =
                 [Stretch { s: R::zero(), value: R::zero(), crossing: R::mask(false) }; MOST_PROBES];
             let stretches = &mut stretches[..K::PROBES.len()];
@@ -215,12 +209,12 @@ fn crosses<R: Real>(stretches: &[Stretch<R>]) -> bool {
 }
 
 /// Puts crossings in the order of time and takes away those that their lane still leaves out.
-fn in_order<const D: usize>(list: &mut Vec<(usize, Crossed<D>)>, skip: &mut [usize]) {
+fn in_order<R: Real, const D: usize>(list: &mut Vec<(usize, Crossed<D>)>, skip: &mut R) {
     list.sort_by(|(_, a), (_, b)| a.t.total_cmp(&b.t));
     list.retain(|&(lane, _)| {
-        let left_out = skip[lane] > 0;
-        skip[lane] -= usize::from(left_out);
-        !left_out
+        let left = skip.lane(lane);
+        skip.set_lane(lane, (left - 1.0).max(0.0));
+        left < 1.0
     });
 }
 
@@ -243,19 +237,6 @@ impl<R: Real> Surface<'_, R> {
         s: R,
     ) -> R {
         self.at(law, &(step.from + s * step.polynomials.unit), &step.polynomials.state(s))
-    }
-
-    /// Whether a single trajectory is certain not to cross: as in most steps, for what the coefficients' sizes tell.
-    /// Of the lanes of a packet some crosses in nearly every step.
-    #[inline(always)]
-    fn stays<const D: usize>(&self, step: &Step<'_, R, D>, moved: R::Mask) -> bool {
-        if const { R::LANES > 1 } || !moved.any() {
-            return false;
-        }
-        match self.form {
-            Form::Component(n, less) => step.polynomials.stays(n, less, step.size, self.side),
-            Form::Any => false,
-        }
     }
 
     /// Looks where the function changes its sign: after which of the method's places before.
@@ -326,10 +307,7 @@ impl<R: Real> Surface<'_, R> {
             let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
             let residual = self.at(law, &t, &x);
             let real = seen.and(residual.abs().less(scale.scale(JUMP)));
-            for lane in 0..R::LANES {
-                if !real.lane(lane) {
-                    continue;
-                }
+            for lane in real.lanes() {
                 let x = vector!(f64, D; n => x[n].lane(lane));
                 let residual = residual.lane(lane);
                 crossed.push((lane, Crossed { t: t.lane(lane), x, which, residual }));

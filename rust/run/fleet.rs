@@ -74,6 +74,8 @@ pub trait Fleet: Sync {
     const PACKETS: bool;
     /// How many derivatives its numbers carry.
     const DERIVATIVES: usize = 0;
+    /// Whether packets of two registers of AVX-512 are worth their time to compile.
+    const DOUBLE: bool = false;
 
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
@@ -120,10 +122,12 @@ impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
         }
         // Of two registers one works while the other waits for a result; where there are derivatives AVX2 has too
         // few registers for that, and AVX-512 for more than one of them.
-        match const { (V::ISA, T::DERIVATIVES) } {
-            (Isa::Avx2, 1..) => self.fleet.sail::<Packet<4, V>>(self.queue, self.yields),
-            (Isa::Avx512, ..=1) => self.fleet.sail::<Packet<{ 2 * LANES }, V>>(self.queue, self.yields),
-            _ => self.fleet.sail::<Packet<LANES, V>>(self.queue, self.yields),
+        if const { T::DERIVATIVES > 0 && matches!(V::ISA, Isa::Avx2) } {
+            self.fleet.sail::<Packet<4, V>>(self.queue, self.yields);
+        } else if const { T::DOUBLE && T::DERIVATIVES <= 1 && matches!(V::ISA, Isa::Avx512) } {
+            self.fleet.sail::<Packet<{ 2 * LANES }, V>>(self.queue, self.yields);
+        } else {
+            self.fleet.sail::<Packet<LANES, V>>(self.queue, self.yields);
         }
     }
 }

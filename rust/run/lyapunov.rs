@@ -94,6 +94,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
     const DERIVATIVES: usize = N;
+    const DOUBLE: bool = T::PACKETS;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Exponents<D, N>>) {
@@ -134,11 +135,8 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             // What vanishes where a contact sticks is seen at once or never.
             let told = full.or(over).or(progress.switched());
             growth.keep(self.isa, &mut ship.driver, (moved, told));
-            if !full.or(over).any() {
-                continue;
-            }
-            for lane in 0..R::LANES {
-                let Some(orbit) = ship.job(lane).filter(|_| full.or(over).lane(lane)) else { continue };
+            for lane in full.or(over).lanes() {
+                let Some(orbit) = ship.job(lane) else { continue };
                 let now = t.lane(lane);
                 let own = &mut blocks[lane];
                 let mut converged = false;

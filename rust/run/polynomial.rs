@@ -52,13 +52,6 @@ impl<'a, R: Real, const D: usize> Polynomials<'a, R, D> {
         R::work(self.isa, Signs { c: self.coefficients[n], scan, stretches })
     }
 
-    /// Whether a single trajectory's component is certain to stay on its side of a value up to `size`: where all that its
-    /// terms could add up to does not reach it.
-    #[inline(always)]
-    pub fn stays(&self, n: usize, less: f64, size: R, side: Side<R>) -> bool {
-        R::work(self.isa, Stays { c: self.coefficients[n], less, size, side })
-    }
-
     /// Where a component has a value, between the two places; `zero` is what counts as that.
     #[inline(always)]
     pub fn root(&self, n: usize, less: f64, low: (R, R), high: (R, R), zero: R, lanes: R::Mask) -> R {
@@ -162,44 +155,6 @@ impl<R: Real> Work for Signs<'_, R> {
         }
         judge(&s, &values, side, self.stretches)
     }
-}
-
-struct Stays<'a, R: Real> {
-    c: &'a [R],
-    less: f64,
-    size: R,
-    side: Side<R>,
-}
-
-impl<R: Real> Work for Stays<'_, R> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<V: Instructions>(self) -> bool {
-        let Self { c, less, size, side } = self;
-        let reach = value_of_sizes(&c[1..], size.abs()) * size.abs();
-        let level = c[0] - R::constant(less);
-        // Beside the sums' own rounding.
-        let room = level.abs() - c[0].abs().scale(1e-14) - R::constant(1e-14 * less.abs());
-        let known = side.below.and(level.less(R::zero())).or(side.above.and(R::zero().less(level)));
-        reach.scale(1.0 + 1e-9).less(room).and(known).any()
-    }
-}
-
-/// The polynomial of the coefficients' absolute values.
-#[inline(always)]
-fn value_of_sizes<R: Real>(c: &[R], s: R) -> R {
-    let square = s * s;
-    let (mut even, mut odd) = (R::zero(), R::zero());
-    let (pairs, rest) = c.as_chunks::<2>();
-    if let [last] = rest {
-        even = last.abs();
-    }
-    for pair in pairs.iter().rev() {
-        even = pair[0].abs().fused(even, square);
-        odd = pair[1].abs().fused(odd, square);
-    }
-    even.fused(odd, s)
 }
 
 struct Root<'a, R: Real> {

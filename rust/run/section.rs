@@ -123,6 +123,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
     type Yield = Crossings<D>;
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
+    const DOUBLE: bool = T::PACKETS;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Crossings<D>>) {
@@ -173,10 +174,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                 continue;
             }
             let mut fresh = false;
-            for lane in 0..R::LANES {
-                if !(stopped || over.lane(lane)) {
-                    continue;
-                }
+            for lane in over.or(R::mask(stopped)).lanes() {
                 let ended = match () {
                     () if full.lane(lane) => Ended::Finished,
                     () if progress.failed.lane(lane) => Ended::Failed(ship.driver.failure_of(lane)),

@@ -45,18 +45,15 @@ pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Str
     Side { below, above, ..side }
 }
 
-/// Takes away the first crossings of lanes that still leave some out.
+/// Takes away the first crossings of lanes that still leave some out, so many as `skip` says.
 #[inline(always)]
-pub fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut [usize]) {
-    if skip.iter().all(|&skip| skip == 0) {
+pub fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut R) {
+    if !R::zero().less(*skip).any() {
         return;
     }
-    for stretch in stretches.iter_mut().filter(|stretch| stretch.crossing.any()) {
-        let crossing = stretch.crossing;
-        stretch.crossing = R::Mask::from_lanes(|lane| {
-            let left_out = crossing.lane(lane) && skip[lane] > 0;
-            skip[lane] -= usize::from(left_out);
-            crossing.lane(lane) && !left_out
-        });
+    for stretch in stretches.iter_mut() {
+        let left_out = stretch.crossing.and(R::zero().less(*skip));
+        *skip -= R::select(left_out, R::one(), R::zero());
+        stretch.crossing = stretch.crossing.and(left_out.not());
     }
 }

@@ -169,6 +169,35 @@ pub trait Mask: Copy + Debug + Send + Sync + PartialEq + 'static {
     fn and(self, other: Self) -> Self;
     fn or(self, other: Self) -> Self;
     fn not(self) -> Self;
+    /// A bit for every lane, the lowest for the first.
+    fn bits(self) -> u64;
     /// Whether any lane is true.
-    fn any(self) -> bool;
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
+    /// The lanes that are true, in their order: where these are few, or the mask is not in memory, faster than asking
+    /// one lane after the other.
+    #[inline(always)]
+    fn lanes(self) -> Lanes {
+        Lanes(self.bits())
+    }
+}
+
+/// Numbers of lanes, as bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes(u64);
+
+impl Iterator for Lanes {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
 }
