@@ -210,7 +210,8 @@ fn crosses<R: Real>(stretches: &[Stretch<R>]) -> bool {
 
 /// Puts crossings in the order of time and takes away those that their lane still leaves out.
 fn in_order<R: Real, const D: usize>(list: &mut Vec<(usize, Crossed<D>)>, skip: &mut R) {
-    list.sort_by(|(_, a), (_, b)| a.t.total_cmp(&b.t));
+    // Allocates nothing, unlike a stable sort.
+    list.sort_unstable_by(|(_, a), (_, b)| a.t.total_cmp(&b.t).then(a.which.cmp(&b.which)));
     list.retain(|&(lane, _)| {
         let left = skip.lane(lane);
         skip.set_lane(lane, (left - 1.0).max(0.0));
