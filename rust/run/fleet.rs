@@ -120,11 +120,11 @@ impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
         if const { !T::PACKETS || matches!(V::ISA, Isa::Baseline) } {
             return;
         }
-        // Of two registers one works while the other waits for a result; where there are derivatives AVX2 has too
-        // few registers for that, and AVX-512 for more than one of them.
+        // Of two registers one works while the other waits for a result; numbers with derivatives do so anyway, and two
+        // registers for each part leave too few.
         if const { T::DERIVATIVES > 0 && matches!(V::ISA, Isa::Avx2) } {
             self.fleet.sail::<Packet<4, V>>(self.queue, self.yields);
-        } else if const { T::DOUBLE && T::DERIVATIVES <= 1 && matches!(V::ISA, Isa::Avx512) } {
+        } else if const { T::DOUBLE && matches!(V::ISA, Isa::Avx512) } {
             self.fleet.sail::<Packet<{ 2 * LANES }, V>>(self.queue, self.yields);
         } else {
             self.fleet.sail::<Packet<LANES, V>>(self.queue, self.yields);
