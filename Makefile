@@ -91,7 +91,7 @@ format: .venv/.has-lint ## format the Rust and the Python code
 dist: .venv/.has-build ## build the wheel and the source distribution into dist/
 	$(BIN)/maturin build --release --locked --strip --sdist --out dist
 
-bench: ## time the core's hot paths (ARGS="section --quick" for some of them, in short)
+bench: ## time the core's hot paths (ARGS="section --quick" for some of them, in short; ARGS=--limit: how far from the machine's limit they are)
 	cargo bench --locked --bench paths -- $(ARGS)
 
 bench-count: .venv/.made ## count their instructions; fails where one takes over 3 % more than committed (ARGS=--update to refresh)

@@ -1,9 +1,15 @@
-//! The core's hot paths: timed by criterion, or run once for `count.py` to count their instructions.
+//! The core's hot paths: timed by criterion, run once for `count.py` to count their instructions, or with `--limit` set
+//! beside what the machine could do at most.
+
+#[path = "paths/limit.rs"]
+mod limit;
 
 use std::hint::black_box;
 use std::sync::atomic::AtomicUsize;
+use std::time::Instant;
 
 use criterion::{Criterion, Throughput};
+use limit::Steps;
 use nalgebra::{SMatrix, SVector};
 use rayon::ThreadPoolBuilder;
 use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, Sensor, Set};
@@ -22,6 +28,20 @@ struct Path {
     /// How much it is, in time units, points or frames.
     units: u64,
     work: Box<dyn Fn(Isa)>,
+    /// Where it is the built-in series, what its steps are counted from.
+    steps: Option<Box<dyn Fn() -> Steps>>,
+}
+
+impl Path {
+    fn new(name: &'static str, units: u64, work: impl Fn(Isa) + 'static) -> Self {
+        Self { name, units, work: Box::new(work), steps: None }
+    }
+
+    /// With what its steps are counted from.
+    fn counted(mut self, steps: impl Fn() -> Steps + 'static) -> Self {
+        self.steps = Some(Box::new(steps));
+        self
+    }
 }
 
 const START: [f64; 3] = [1.0, 1.0, 0.01];
@@ -32,15 +52,20 @@ fn tolerance(rtol: f64) -> Tolerance {
     Tolerance { rtol, atol: 1e-3 * rtol }
 }
 
-fn with_crew<T>(isa: Isa, work: impl FnOnce(Crew<'_>) -> T) {
+fn with_crew<T>(isa: Isa, work: impl FnOnce(Crew<'_>) -> T) -> T {
     let (done, stop) = (AtomicUsize::new(0), Stop::new());
-    black_box(work(Crew { threads: 1, isa, done: &done, stop: &stop }));
+    black_box(work(Crew { threads: 1, isa, done: &done, stop: &stop }))
 }
 
 /// Spread over the cube of side 4 around the origin.
 fn starts(n: u32) -> Vec<[f64; 3]> {
     let spread = |i: u32, by: f64| 4.0 * (f64::from(i) * by).fract() - 2.0;
     (0..n).map(|i| [spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051)]).collect()
+}
+
+/// What the steps of the built-in series are counted from.
+fn series(values: Vec<Vec<f64>>, starts: Vec<[f64; 3]>, rtol: f64, derivatives: usize, time: f64) -> Steps {
+    Steps { values, starts, tolerance: tolerance(rtol), derivatives, time }
 }
 
 fn drives(n: u32) -> Vec<Vec<f64>> {
@@ -65,7 +90,7 @@ fn ensemble<F: Family<3> + 'static>(
             Ensemble { family, values, starts, times: &times, tolerance, stepper }.run(crew)
         });
     };
-    Path { name, units, work: Box::new(work) }
+    Path::new(name, units, work)
 }
 
 /// A model as text, none of those whose series are written out: Lorenz's of 1963.
@@ -80,35 +105,44 @@ fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>
     let units = u64::from(end) * values.len() as u64;
     let time = f64::from(end);
     let options = LyapunovOptions { time, transient: 0.1 * time, goal: 0.0, tolerance: tolerance(rtol) };
+    let wanted = values.clone();
+    let steps = move || series(wanted.clone(), vec![START], rtol, N, units as f64);
     let work = move |isa| {
         let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[START], options };
         with_crew(isa, |crew| orbits.run::<N>(crew));
     };
-    Path { name, units, work: Box::new(work) }
+    Path::new(name, units, work).counted(steps)
 }
 
 fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
     let units = (count * values.len()) as u64;
+    let wanted = values.clone();
+    let steps = move || {
+        let ends = crossed(Isa::best(), &wanted, count);
+        series(wanted.clone(), vec![START], TIGHT, 0, ends.iter().sum())
+    };
+    Path::new(name, units, move |isa| drop(crossed(isa, &values, count))).counted(steps)
+}
+
+/// Collects points of the section z = 0; returns the times of the last ones.
+fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "B"]));
     let function =
         Expression::parse("z", Names { states: &states, parameters: &parameters, rates: true }).unwrap();
-    let surface = [Section { function, rising: true, falling: false }];
-    let work = move |isa| {
-        let wanted = Sections {
-            family: &DleFamily,
-            values: &values,
-            starts: &[START],
-            sections: &surface,
-            skip: 20,
-            count,
-            end: 1e6,
-            bounded: [true; 3],
-            tolerance: tolerance(TIGHT),
-        };
-        with_crew(isa, |crew| wanted.run(crew));
+    let wanted = Sections {
+        family: &DleFamily,
+        values,
+        starts: &[START],
+        sections: &[Section { function, rising: true, falling: false }],
+        skip: 20,
+        count,
+        end: 1e6,
+        bounded: [true; 3],
+        tolerance: tolerance(TIGHT),
     };
-    Path { name, units, work: Box::new(work) }
+    let found = with_crew(isa, |crew| wanted.run(crew));
+    found.iter().flatten().map(|crossings| crossings.end.0).collect()
 }
 
 const DISK: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
@@ -123,7 +157,7 @@ fn disk(name: &'static str, effects: &[(Kind, &[f64])], end: u32) -> Path {
         let (method, output) = (Dopri5::default(), Output::At(&times));
         black_box(trajectory(&system, method, output, x0, &tolerance, false, &Stop::new()).unwrap());
     };
-    Path { name, units: u64::from(end), work: Box::new(work) }
+    Path::new(name, u64::from(end), work)
 }
 
 /// The drive and two constants of friction from a noise-free film, begun 5 % off.
@@ -161,16 +195,18 @@ fn fit(name: &'static str, frames: usize) -> Path {
         let start = Point { states: states.clone(), sets: vec![set] };
         black_box(estimator.solve(start, &Options::default(), &Stop::new()).unwrap());
     };
-    Path { name, units: frames as u64, work: Box::new(work) }
+    Path::new(name, frames as u64, work)
 }
 
 fn paths() -> Vec<Path> {
     let one = || vec![vec![1.0, 0.0]];
     let dle = || (DleFamily, vec![1.0, 0.0]);
     vec![
-        ensemble("trajectory", dle(), Stepper::Taylor, TIGHT, vec![START], 10_000),
+        ensemble("trajectory", dle(), Stepper::Taylor, TIGHT, vec![START], 10_000)
+            .counted(|| series(vec![vec![1.0, 0.0]], vec![START], TIGHT, 0, 1e4)),
         ensemble("trajectory by dopri5", dle(), Stepper::Dopri5, LOOSE, vec![START], 2_000),
-        ensemble("starts", dle(), Stepper::Taylor, LOOSE, starts(400), 100),
+        ensemble("starts", dle(), Stepper::Taylor, LOOSE, starts(400), 100)
+            .counted(|| series(vec![vec![1.0, 0.0]], starts(400), LOOSE, 0, 4e4)),
         ensemble("starts by dopri5", dle(), Stepper::Dopri5, LOOSE, starts(400), 100),
         ensemble("trajectory of own model", lorenz(), Stepper::Taylor, TIGHT, vec![START], 500),
         ensemble("starts of own model", lorenz(), Stepper::Taylor, LOOSE, starts(400), 10),
@@ -191,10 +227,33 @@ fn counted(work: &dyn Fn(Isa)) {
     work(Isa::Avx2);
 }
 
+/// Prints the rates of the built-in series beside those that the machine could reach.
+fn limits() {
+    println!("{:24}{:>12}{:>12}{:>22}", "", "a second", "at most", "of the machine's limit");
+    for isa in Isa::available().into_iter().filter(|&isa| isa > Isa::Baseline) {
+        for Path { name, units, work, steps } in paths() {
+            let Some(steps) = steps else { continue };
+            let least = steps().least(isa);
+            let mut spent = f64::INFINITY;
+            for _ in 0..30 {
+                let begin = Instant::now();
+                work(isa);
+                spent = spent.min(begin.elapsed().as_secs_f64());
+            }
+            let (rate, most) = (units as f64 / spent, units as f64 / least);
+            println!(
+                "{:24}{rate:12.3e}{most:12.3e}{:20.0} %",
+                format!("{name}, {isa:?}"),
+                100.0 * rate / most
+            );
+        }
+    }
+}
+
 fn speed() {
     let mut criterion = Criterion::default().sample_size(20).without_plots().configure_from_args();
     let mut group = criterion.benchmark_group("paths");
-    for Path { name, units, work } in paths() {
+    for Path { name, units, work, .. } in paths() {
         group.throughput(Throughput::Elements(units));
         group.bench_function(name, |bencher| bencher.iter(|| work(Isa::best())));
     }
@@ -212,6 +271,8 @@ fn main() {
             paths().iter().for_each(|path| println!("{}", path.name));
         }
         [mode] if mode == "--count" => {}
+        // Cargo adds the last argument.
+        [mode, ..] if mode == "--limit" => limits(),
         [mode, name] if mode == "--count" => {
             let path = paths().into_iter().find(|path| path.name == name).expect("no such path");
             counted(&path.work);

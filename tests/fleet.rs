@@ -8,8 +8,8 @@ use counting::allocations;
 use udd::integrate::Tolerance;
 use udd::model::effects::Kind;
 use udd::model::{DiskFamily, DleFamily, Effect, Family};
-use udd::run::{Crew, Ensemble, Lyapunov, LyapunovOptions, Stepper, Stop};
-use udd::scalar::Isa;
+use udd::run::{Crew, Ensemble, Fleet, Lyapunov, LyapunovOptions, Queue, Stepper, Stop, Yields, sail};
+use udd::scalar::{Isa, Real};
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1e-9, atol: 1e-12 };
 
@@ -30,6 +30,32 @@ fn on_each<T>(mut work: impl FnMut(Crew<'_>) -> T) -> Vec<(String, T)> {
 fn starts(n: usize) -> Vec<[f64; 3]> {
     let part = |i: usize, by: f64| 4.0 * (i as f64 * by).fract() - 2.0;
     (0..n).map(|i| [part(i, 0.618), part(i, 0.414), part(i, 0.732)]).collect()
+}
+
+/// Says of every job how many lanes its packet began with.
+struct Lanes;
+
+impl Fleet for Lanes {
+    type Yield = usize;
+    const PACKETS: bool = true;
+
+    #[inline(always)]
+    fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, usize>) {
+        while let Some(job) = queue.take() {
+            yields.push(job, queue.lanes::<R>());
+        }
+    }
+}
+
+/// Where jobs are few none of the threads fills a packet with them while others go without.
+#[test]
+fn threads_share_few_jobs() {
+    for (jobs, most) in [(3, [3, 3, 3]), (20, [20, 10, 7])] {
+        for (crew, lanes) in on_each(|crew| (crew.threads, sail(&Lanes, jobs, crew))) {
+            let (threads, lanes) = lanes;
+            assert!(lanes.iter().flatten().all(|&lanes| lanes <= most[threads - 1]), "{crew}: {lanes:?}");
+        }
+    }
 }
 
 #[test]

@@ -101,10 +101,10 @@ pub struct Scan<'a, R: Real, const D: usize> {
     /// The sides that the law was taken on in the last step; the driver's are those of the next.
     sides: Sides<R>,
     room: Room<R, D>,
-    /// What was found in the last step, lane by lane.
-    crossed: Vec<Vec<Crossed<D>>>,
+    /// What was found in the last step, with the lane; in the order of time in each of them.
+    crossed: Vec<(usize, Crossed<D>)>,
     /// How many crossings each lane still leaves out.
-    skip: Vec<usize>,
+    skip: R,
     /// Whether these need only be counted: a single surface that has no poles.
     counted: bool,
 }
@@ -130,8 +130,8 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             surfaces: sections.iter().map(surface).collect(),
             sides: [R::mask(true); MAX_SURFACES],
             room: Room::new(),
-            crossed: (0..R::LANES).map(|_| Vec::with_capacity(MOST_PROBES * sections.len())).collect(),
-            skip: vec![0; R::LANES],
+            crossed: Vec::with_capacity(R::LANES * MOST_PROBES * sections.len()),
+            skip: R::zero(),
             counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
         }
     }
@@ -144,9 +144,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         K: Method<R, D>,
     {
         self.sides = *ship.driver.sides();
-        for lane in (0..R::LANES).filter(|&lane| lanes.lane(lane)) {
-            self.skip[lane] = skip;
-        }
+        self.skip = R::select(lanes, R::constant(skip as f64), self.skip);
         let law = Law { system: ship.driver.system(), parameters: ship.values(), sides: &self.sides };
         for surface in &mut self.surfaces {
             let value = surface.at(&law, &ship.driver.t(), ship.driver.x());
@@ -157,9 +155,9 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         }
     }
 
-    /// What the last step of this lane crossed, in the order of time.
-    pub fn crossed(&self, lane: usize) -> &[Crossed<D>] {
-        &self.crossed[lane]
+    /// What the last step crossed, with the lane; in the order of time in each of them.
+    pub fn crossed(&self) -> &[(usize, Crossed<D>)] {
+        &self.crossed
     }
 
     /// Looks at the last step, in the lanes that moved. Returns whether there is any crossing.
@@ -177,32 +175,26 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         let size = if K::SERIES { driver.size() } else { driver.size() / polynomials.unit };
         let end = (driver.t(), driver.x());
         let step = Step { polynomials, from: driver.from(), size, end, probes: K::PROBES };
-        let mut any = false;
+        self.crossed.clear();
         for (which, surface) in (0..).zip(&mut self.surfaces) {
             let mut stretches =
                 [Stretch { s: R::zero(), value: R::zero(), crossing: R::mask(false) }; MOST_PROBES];
             let stretches = &mut stretches[..K::PROBES.len()];
             surface.signs(&law, &step, moved, stretches);
             let last = stretches[stretches.len() - 1].value;
+            if self.counted && crosses(stretches) {
+                leave_out(stretches, &mut self.skip);
+            }
             if crosses(stretches) {
-                if !any {
-                    any = true;
-                    self.crossed.iter_mut().for_each(Vec::clear);
-                }
-                if self.counted {
-                    leave_out(stretches, &mut self.skip);
-                }
                 surface.find(&law, &step, stretches, which, &mut self.crossed);
             }
             surface.value = R::select(moved, last, surface.value);
         }
         self.sides = *driver.sides();
-        if any && !self.counted {
-            for (list, skip) in self.crossed.iter_mut().zip(&mut self.skip) {
-                in_order(list, skip);
-            }
+        if !self.counted && !self.crossed.is_empty() {
+            in_order(&mut self.crossed, &mut self.skip);
         }
-        any
+        !self.crossed.is_empty()
     }
 }
 
@@ -216,12 +208,15 @@ fn crosses<R: Real>(stretches: &[Stretch<R>]) -> bool {
     any.any()
 }
 
-/// Puts a lane's crossings in the order of time and takes away those that are still to be left out.
-fn in_order<const D: usize>(list: &mut Vec<Crossed<D>>, skip: &mut usize) {
-    list.sort_by(|a, b| a.t.total_cmp(&b.t));
-    let left_out = list.len().min(*skip);
-    list.drain(..left_out);
-    *skip -= left_out;
+/// Puts crossings in the order of time and takes away those that their lane still leaves out.
+fn in_order<R: Real, const D: usize>(list: &mut Vec<(usize, Crossed<D>)>, skip: &mut R) {
+    // Allocates nothing, unlike a stable sort.
+    list.sort_unstable_by(|(_, a), (_, b)| a.t.total_cmp(&b.t).then(a.which.cmp(&b.which)));
+    list.retain(|&(lane, _)| {
+        let left = skip.lane(lane);
+        skip.set_lane(lane, (left - 1.0).max(0.0));
+        left < 1.0
+    });
 }
 
 impl<R: Real> Surface<'_, R> {
@@ -285,26 +280,24 @@ impl<R: Real> Surface<'_, R> {
         step: &Step<'_, R, D>,
         stretches: &mut [Stretch<R>],
         which: u8,
-        crossed: &mut [Vec<Crossed<D>>],
+        crossed: &mut Vec<(usize, Crossed<D>)>,
     ) {
         loop {
             // The first crossing in each lane that has not been dealt with.
-            let mut before = (R::zero(), self.value);
-            let (mut low, mut high) = (before, before);
-            let mut seen = R::mask(false);
-            for stretch in stretches.iter_mut() {
-                let here = (stretch.s, stretch.value);
-                let new = stretch.crossing.and(seen.not());
-                if new.any() {
-                    low = (R::select(new, before.0, low.0), R::select(new, before.1, low.1));
-                    high = (R::select(new, here.0, high.0), R::select(new, here.1, high.1));
-                    stretch.crossing = stretch.crossing.and(new.not());
-                    seen = seen.or(new);
-                }
-                before = here;
+            let start = (R::zero(), self.value);
+            let (mut low, mut high) = (start, start);
+            for i in (0..stretches.len()).rev() {
+                let Stretch { s, value, crossing } = stretches[i];
+                let before = if i == 0 { start } else { (stretches[i - 1].s, stretches[i - 1].value) };
+                low = (R::select(crossing, before.0, low.0), R::select(crossing, before.1, low.1));
+                high = (R::select(crossing, s, high.0), R::select(crossing, value, high.1));
             }
-            if !seen.any() {
-                return;
+            let (mut seen, mut more) = (R::mask(false), R::mask(false));
+            for stretch in stretches.iter_mut() {
+                let crossing = stretch.crossing;
+                stretch.crossing = crossing.and(seen);
+                more = more.or(stretch.crossing);
+                seen = seen.or(crossing);
             }
             let scale = low.1.abs().max(high.1.abs());
             let tiny = scale.scale(ZERO).min(R::constant(SMALL));
@@ -315,16 +308,13 @@ impl<R: Real> Surface<'_, R> {
             let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
             let residual = self.at(law, &t, &x);
             let real = seen.and(residual.abs().less(scale.scale(JUMP)));
-            for lane in 0..R::LANES {
-                if !real.lane(lane) {
-                    continue;
-                }
-                crossed[lane].push(Crossed {
-                    t: t.lane(lane),
-                    x: vector!(f64, D; n => x[n].lane(lane)),
-                    which,
-                    residual: residual.lane(lane),
-                });
+            for lane in real.lanes() {
+                let x = vector!(f64, D; n => x[n].lane(lane));
+                let residual = residual.lane(lane);
+                crossed.push((lane, Crossed { t: t.lane(lane), x, which, residual }));
+            }
+            if !more.any() {
+                return;
             }
         }
     }

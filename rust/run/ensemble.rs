@@ -80,33 +80,44 @@ struct Sampled<'a, F, const D: usize, T> {
     isa: Isa,
 }
 
+impl<F: Family<D>, const D: usize, T: Recipe<D>> Sampled<'_, F, D, T> {
+    /// Starts a run in a lane; returns its states so far. Not a closure, which would be a function of its own.
+    #[inline(always)]
+    fn load<R: Real>(
+        &self,
+        ship: &mut Ship<'_, F, R, D, Tolerance, T::Method<R>>,
+        lane: usize,
+        run: usize,
+    ) -> Vec<[f64; D]> {
+        let start = self.ensemble.start::<R>(run);
+        let mut states = Vec::with_capacity(self.ensemble.times.len());
+        states.push(lane_of(&start.x, lane));
+        ship.load(lane, run, start);
+        states
+    }
+}
+
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
     type Yield = Passage<D>;
 
     const PACKETS: bool = F::PACKETS || (F::STARTS_IN_PACKETS && T::PACKETS);
+    const DOUBLE: bool = T::PACKETS;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
         let Ensemble { family, times, tolerance, .. } = self.ensemble;
         let Some(first) = queue.take() else { return };
-        let start = |run| self.ensemble.start::<R>(run);
-        let mut ship =
-            Ship::new(self.isa, *family, |values| self.recipe.make(values), start(first), tolerance);
+        let like = self.ensemble.start::<R>(first);
+        let mut ship = Ship::new(self.isa, *family, |values| self.recipe.make(values), like, tolerance);
         let mut states: Vec<Vec<[f64; D]>> = vec![Vec::new(); R::LANES];
         // The time of each lane's next sample.
         let mut wanted = R::constant(f64::INFINITY);
         let after = |taken: usize| if taken < times.len() { times[taken] } else { f64::INFINITY };
-        let load = |ship: &mut Ship<'_, F, R, D, _, _>, states: &mut [Vec<[f64; D]>], lane: usize, run| {
-            let start = start(run);
-            states[lane] = Vec::with_capacity(times.len());
-            states[lane].push(lane_of(&start.x, lane));
-            ship.load(lane, run, start);
-            after(1)
-        };
-        for lane in 0..R::LANES {
+        for lane in 0..queue.lanes::<R>() {
             let run = if lane == 0 { Some(first) } else { queue.take() };
             if let Some(run) = run {
-                wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));
+                states[lane] = self.load(&mut ship, lane, run);
+                wanted.set_lane(lane, after(1));
             }
         }
         while !ship.is_empty() && !queue.stopped() {
@@ -124,21 +135,13 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                     }
                     false => *ship.driver.x(),
                 };
-                for lane in 0..R::LANES {
-                    if due.lane(lane) {
-                        states[lane].push(lane_of(&x, lane));
-                        wanted.set_lane(lane, after(states[lane].len()));
-                    }
+                for lane in due.lanes() {
+                    states[lane].push(lane_of(&x, lane));
+                    wanted.set_lane(lane, after(states[lane].len()));
                 }
             }
             let over = ship.arrived().or(progress.walled()).or(progress.failed);
-            if !over.any() {
-                continue;
-            }
-            for lane in 0..R::LANES {
-                if !over.lane(lane) {
-                    continue;
-                }
+            for lane in over.lanes() {
                 let outcome = if progress.failed.lane(lane) {
                     Err(ship.driver.failure_of(lane))
                 } else if progress.walled().lane(lane) {
@@ -152,7 +155,8 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                 let (t, x) = (ship.driver.t().lane(lane), lane_of(ship.driver.x(), lane));
                 yields.push(run, Passage { states: own, t, x, outcome });
                 if let Some(run) = queue.take() {
-                    wanted.set_lane(lane, load(&mut ship, &mut states, lane, run));
+                    states[lane] = self.load(&mut ship, lane, run);
+                    wanted.set_lane(lane, after(1));
                 }
             }
         }

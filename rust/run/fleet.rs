@@ -12,6 +12,8 @@ use crate::scalar::{Instructions, Isa, LANES, Packet, Real, Work};
 pub struct Queue<'a> {
     next: AtomicUsize,
     jobs: usize,
+    /// What each thread may begin with, so that none goes without.
+    share: usize,
     stop: &'a Stop,
 }
 
@@ -20,6 +22,12 @@ impl Queue<'_> {
     pub fn take(&self) -> Option<usize> {
         let job = self.next.fetch_add(1, Ordering::Relaxed);
         (job < self.jobs).then_some(job)
+    }
+
+    /// How many lanes of a packet are to be filled at the start.
+    #[inline(always)]
+    pub fn lanes<R: Real>(&self) -> usize {
+        self.share.min(R::LANES)
     }
 
     /// Whether the work is to end, finished or not.
@@ -64,9 +72,10 @@ pub trait Fleet: Sync {
 
     /// Whether packets are worth it.
     const PACKETS: bool;
-    /// Whether its numbers carry derivatives: packets are then of one register, since those of two leave too few
-    /// registers for them.
-    const DERIVATIVES: bool = false;
+    /// How many derivatives its numbers carry.
+    const DERIVATIVES: usize = 0;
+    /// Whether packets of two registers of AVX-512 are worth their time to compile.
+    const DOUBLE: bool = false;
 
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
@@ -111,8 +120,12 @@ impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
         if const { !T::PACKETS || matches!(V::ISA, Isa::Baseline) } {
             return;
         }
-        if const { T::DERIVATIVES && matches!(V::ISA, Isa::Avx2) } {
+        // Of two registers one works while the other waits for a result; numbers with derivatives do so anyway, and two
+        // registers for each part leave too few.
+        if const { T::DERIVATIVES > 0 && matches!(V::ISA, Isa::Avx2) } {
             self.fleet.sail::<Packet<4, V>>(self.queue, self.yields);
+        } else if const { T::DOUBLE && matches!(V::ISA, Isa::Avx512) } {
+            self.fleet.sail::<Packet<{ 2 * LANES }, V>>(self.queue, self.yields);
         } else {
             self.fleet.sail::<Packet<LANES, V>>(self.queue, self.yields);
         }
@@ -124,7 +137,8 @@ fn spread<Y: Send>(
     crew: Crew<'_>,
     work: &(dyn Fn(&Queue<'_>, &mut Yields<'_, Y>) + Sync),
 ) -> Vec<Option<Y>> {
-    let queue = Queue { next: AtomicUsize::new(0), jobs, stop: crew.stop };
+    let threads = threads(jobs, crew.threads);
+    let queue = Queue { next: AtomicUsize::new(0), jobs, share: jobs.div_ceil(threads), stop: crew.stop };
     let mut all: Vec<Option<Y>> = Vec::new();
     all.resize_with(jobs, || None);
     let all = Mutex::new(all);
@@ -134,7 +148,6 @@ fn spread<Y: Send>(
         work(&queue, &mut yields);
         yields.place();
     };
-    let threads = threads(jobs, crew.threads);
     on_threads(threads, &watch);
     all.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

@@ -93,7 +93,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
     type Yield = Exponents<D, N>;
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
-    const DERIVATIVES: bool = true;
+    const DERIVATIVES: usize = N;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Exponents<D, N>>) {
@@ -112,7 +112,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
         let mut full_at = R::constant(f64::INFINITY);
         let mut moments = Moments::<R, D>::zero();
         let mut waiting = Some(first);
-        for lane in 0..R::LANES {
+        for lane in 0..queue.lanes::<R>() {
             if let Some(orbit) = waiting.take().or_else(|| queue.take()) {
                 ship.load(lane, orbit, start(orbit));
                 full_at.set_lane(lane, if transient > 0.0 { f64::INFINITY } else { span });
@@ -134,11 +134,8 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
             // What vanishes where a contact sticks is seen at once or never.
             let told = full.or(over).or(progress.switched());
             growth.keep(self.isa, &mut ship.driver, (moved, told));
-            if !full.or(over).any() {
-                continue;
-            }
-            for lane in 0..R::LANES {
-                let Some(orbit) = ship.job(lane).filter(|_| full.or(over).lane(lane)) else { continue };
+            for lane in full.or(over).lanes() {
+                let Some(orbit) = ship.job(lane) else { continue };
                 let now = t.lane(lane);
                 let own = &mut blocks[lane];
                 let mut converged = false;

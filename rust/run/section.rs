@@ -123,6 +123,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
     type Yield = Crossings<D>;
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
+    const DOUBLE: bool = T::PACKETS;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Crossings<D>>) {
@@ -134,7 +135,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
         let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa);
         // What each lane has found.
         let mut catches: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];
-        for lane in 0..R::LANES {
+        for lane in 0..queue.lanes::<R>() {
             let job = if lane == 0 { Some(first) } else { queue.take() };
             if let Some(job) = job {
                 ship.load(lane, job, start(job));
@@ -147,13 +148,19 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
             let stopped = queue.stopped();
             let mut full = R::mask(false);
             if scan.look(&ship, progress.moved) {
-                full = R::Mask::from_lanes(|lane| {
-                    let found = &mut catches[lane];
-                    for crossed in scan.crossed(lane).iter().take(count - found.t.len()) {
+                let mut any = false;
+                for (lane, crossed) in scan.crossed() {
+                    let found = &mut catches[*lane];
+                    if found.t.len() < count {
                         found.push(crossed);
+                        any |= found.t.len() == count;
                     }
-                    ship.job(lane).is_some() && found.t.len() == count
-                });
+                }
+                if any {
+                    full = R::Mask::from_lanes(|lane| {
+                        ship.job(lane).is_some() && catches[lane].t.len() == count
+                    });
+                }
             }
             let mut far = R::mask(false);
             for n in 0..D {
@@ -167,10 +174,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
                 continue;
             }
             let mut fresh = false;
-            for lane in 0..R::LANES {
-                if !(stopped || over.lane(lane)) {
-                    continue;
-                }
+            for lane in over.or(R::mask(stopped)).lanes() {
                 let ended = match () {
                     () if full.lane(lane) => Ended::Finished,
                     () if progress.failed.lane(lane) => Ended::Failed(ship.driver.failure_of(lane)),

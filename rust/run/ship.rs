@@ -56,12 +56,17 @@ where
     /// Starts a job in a lane.
     #[inline(always)]
     pub fn load(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
+        let mut changed = false;
         for i in 0..start.values.len() {
             let mut lanes = self.values[i].real();
+            changed |= lanes.lane(lane).to_bits() != start.values[i].to_bits();
             lanes.set_lane(lane, start.values[i]);
             self.values[i] = S::lift(lanes);
         }
-        self.driver.set_system(self.family.build(&self.values), &self.values);
+        // What is evaluated once for all steps stays otherwise.
+        if changed {
+            self.driver.set_system(self.family.build(&self.values), &self.values);
+        }
         let only = S::Mask::from_lanes(|i| i == lane);
         self.driver.start(only, S::Real::constant(start.t), start.x, None);
         self.end.set_lane(lane, start.end);

@@ -24,12 +24,17 @@ pub struct Stretch<R: Real> {
 /// Tells the stretches with a crossing from the values at their ends; returns the sides after them.
 #[inline(always)]
 pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Stretch<R>]) -> Side<R> {
-    let (rising, falling) = (R::mask(side.rising), R::mask(side.falling));
-    let Side { mut below, mut above, moved, .. } = side;
+    let Side { mut below, mut above, rising, falling, moved } = side;
     for i in 0..stretches.len() {
         let value = values[i];
         let (low, high) = (value.less(R::zero()), R::zero().less(value));
-        let crossing = below.and(high).and(rising).or(above.and(low).and(falling)).and(moved);
+        let mut crossing = R::mask(false);
+        if rising {
+            crossing = below.and(high).and(moved);
+        }
+        if falling {
+            crossing = crossing.or(above.and(low).and(moved));
+        }
         stretches[i] = Stretch { s: s[i], value, crossing };
         // A zero leaves the side as it was: a surface that is only touched is not crossed. What is not a
         // number has no side.
@@ -40,18 +45,15 @@ pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Str
     Side { below, above, ..side }
 }
 
-/// Takes away the first crossings of lanes that still leave some out.
+/// Takes away the first crossings of lanes that still leave some out, so many as `skip` says.
 #[inline(always)]
-pub fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut [usize]) {
-    if skip.iter().all(|&skip| skip == 0) {
+pub fn leave_out<R: Real>(stretches: &mut [Stretch<R>], skip: &mut R) {
+    if !R::zero().less(*skip).any() {
         return;
     }
-    for stretch in stretches.iter_mut().filter(|stretch| stretch.crossing.any()) {
-        let crossing = stretch.crossing;
-        stretch.crossing = R::Mask::from_lanes(|lane| {
-            let left_out = crossing.lane(lane) && skip[lane] > 0;
-            skip[lane] -= usize::from(left_out);
-            crossing.lane(lane) && !left_out
-        });
+    for stretch in stretches.iter_mut() {
+        let left_out = stretch.crossing.and(R::zero().less(*skip));
+        *skip -= R::select(left_out, R::one(), R::zero());
+        stretch.crossing = stretch.crossing.and(left_out.not());
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::{Fan, Instructions, Packet, Real, Scalar};
+use super::{Real, Scalar};
 use crate::unroll::vector;
 
 /// `re + Σ_i d[i] ε_i` with `ε_i ε_j = 0`. The inner scalar may itself be a dual (nested
@@ -130,16 +130,15 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         let d = vector!(S, N; i => self.d[i].fused(a.d[i], b.re).fused(b.d[i], a.re));
         Self { re: self.re.fused(a.re, b.re), d }
     }
-    const FANS: bool = 1 < N && N <= 4 && size_of::<S>() == size_of::<f64>();
+    const DERIVATIVES: usize = if size_of::<S>() == size_of::<f64>() && N <= 4 { N } else { 0 };
 
     #[inline(always)]
-    fn fan<V: Instructions>(self) -> Fan<V> {
-        let derivative = |i: usize| if i < N { self.d[i].real().lane(0) } else { 0.0 };
-        Dual { re: Packet::constant(self.re.real().lane(0)), d: [Packet::from_lanes(derivative)] }
+    fn derivative(self, i: usize) -> f64 {
+        if i < N { self.d[i].real().lane(0) } else { 0.0 }
     }
     #[inline(always)]
-    fn from_fan<V: Instructions>(fan: Fan<V>) -> Self {
-        Self { re: S::constant(fan.re.lane(0)), d: vector!(S, N; i => S::constant(fan.d[0].lane(i))) }
+    fn with_derivatives(value: f64, derivative: impl Fn(usize) -> f64) -> Self {
+        Self { re: S::constant(value), d: vector!(S, N; i => S::constant(derivative(i))) }
     }
     #[inline(always)]
     fn fused_times(self, a: Self, b: S::Real) -> Self {

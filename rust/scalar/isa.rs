@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::sync::OnceLock;
 
-/// Lanes in a packet: one AVX-512 register, two of AVX2.
+/// Lanes in a register of AVX-512, or in two of AVX2.
 pub const LANES: usize = 8;
 
 /// A set of vector instructions. Results do not depend on it, only speed does.

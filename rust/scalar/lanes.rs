@@ -79,31 +79,36 @@ lanewise! {
         |a| _mm512_xor_pd(a, _mm512_castsi512_pd(_mm512_set1_epi64(-1)));
 }
 
-/// Whether any bit is set.
+/// A bit for every lane, the lowest for the first: whether its bits are set.
 #[inline(always)]
-pub fn any<const L: usize, V: Instructions>(mask: &[f64; L]) -> bool {
+pub fn bits<const L: usize, V: Instructions>(mask: &[f64; L]) -> u64 {
     #[cfg(target_arch = "x86_64")]
     if const { matches!(V::ISA, Isa::Avx512) && L.is_multiple_of(8) } {
-        let mut any = 0;
+        let mut bits = 0;
         let mut i = 0;
         while i < L {
             // SAFETY: as above.
-            any |=
+            let own =
                 unsafe { _mm512_movepi64_mask(_mm512_castpd_si512(_mm512_loadu_pd(mask.as_ptr().add(i)))) };
+            bits |= u64::from(own) << i;
             i += 8;
         }
-        return any != 0;
+        return bits;
     }
     #[cfg(target_arch = "x86_64")]
     if const { !matches!(V::ISA, Isa::Baseline) && L.is_multiple_of(4) } {
-        let mut any = 0;
+        let mut bits = 0;
         let mut i = 0;
         while i < L {
             // SAFETY: as above.
-            any |= unsafe { _mm256_movemask_pd(_mm256_loadu_pd(mask.as_ptr().add(i))) };
+            bits |= (unsafe { _mm256_movemask_pd(_mm256_loadu_pd(mask.as_ptr().add(i))) } as u64) << i;
             i += 4;
         }
-        return any != 0;
+        return bits;
     }
-    mask.iter().fold(0, |any, lane| any | lane.to_bits()) != 0
+    let mut bits = 0;
+    for i in 0..L {
+        bits |= (mask[i].to_bits() >> 63) << i;
+    }
+    bits
 }

@@ -7,21 +7,23 @@
 
 mod dual;
 pub mod elementary;
+mod fan;
 mod isa;
 mod lanes;
 mod packet;
 mod real;
 
 pub use dual::Dual;
+pub use fan::Fan;
 pub use isa::{Instructions, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// One number with up to four derivatives, each in a lane beside a copy of the number: the operations that the
-/// derivatives have in common are vector instructions, and no bit changes.
-pub type Fan<V> = Dual<Packet<4, V>, 1>;
+/// One number with four derivatives, each in a lane beside a copy of the number: the operations that the derivatives
+/// have in common are vector instructions, and no bit changes. For fewer of them see [`Fan`].
+pub type Spread<V> = Dual<Packet<4, V>, 1>;
 
 /// A number that a model can be evaluated over.
 pub trait Scalar:
@@ -60,17 +62,18 @@ pub trait Scalar:
     /// The same for a factor without derivatives.
     fn fused_times(self, a: Self, b: Self::Real) -> Self;
 
-    /// Whether this is a number with a few derivatives, faster as a [`Fan`].
-    const FANS: bool = false;
-    /// The number as a fan.
+    /// The derivatives of a number that has a few of them: up to three make a [`Fan`], four a [`Spread`] number, which
+    /// are faster.
+    const DERIVATIVES: usize = 0;
+    /// The derivative `i`.
     #[inline(always)]
-    fn fan<V: Instructions>(self) -> Fan<V> {
-        Dual::fixed(Packet::constant(self.real().lane(0)))
+    fn derivative(self, _i: usize) -> f64 {
+        0.0
     }
-    /// The number that a fan stands for.
+    /// A number from its value and its derivatives.
     #[inline(always)]
-    fn from_fan<V: Instructions>(fan: Fan<V>) -> Self {
-        Self::constant(fan.re.lane(0))
+    fn with_derivatives(value: f64, _derivative: impl Fn(usize) -> f64) -> Self {
+        Self::constant(value)
     }
 
     #[inline(always)]
@@ -166,6 +169,35 @@ pub trait Mask: Copy + Debug + Send + Sync + PartialEq + 'static {
     fn and(self, other: Self) -> Self;
     fn or(self, other: Self) -> Self;
     fn not(self) -> Self;
+    /// A bit for every lane, the lowest for the first.
+    fn bits(self) -> u64;
     /// Whether any lane is true.
-    fn any(self) -> bool;
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
+    /// The lanes that are true, in their order: where these are few, or the mask is not in memory, faster than asking
+    /// one lane after the other.
+    #[inline(always)]
+    fn lanes(self) -> Lanes {
+        Lanes(self.bits())
+    }
+}
+
+/// Numbers of lanes, as bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes(u64);
+
+impl Iterator for Lanes {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
 }

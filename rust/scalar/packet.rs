@@ -84,8 +84,8 @@ impl<const L: usize, V: Instructions> Mask for LaneMask<L, V> {
         Self::new(lanes::not::<L, V>(&self.0))
     }
     #[inline(always)]
-    fn any(self) -> bool {
-        lanes::any::<L, V>(&self.0)
+    fn bits(self) -> u64 {
+        lanes::bits::<L, V>(&self.0)
     }
 }
 

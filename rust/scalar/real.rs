@@ -131,7 +131,7 @@ impl Mask for bool {
         !self
     }
     #[inline(always)]
-    fn any(self) -> bool {
-        self
+    fn bits(self) -> u64 {
+        u64::from(self)
     }
 }

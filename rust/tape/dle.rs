@@ -9,9 +9,9 @@
 
 use super::jet::{HIGH, LOW};
 use super::node::INVERSE;
-use super::series::{half_square, inner, orders};
-use crate::scalar::{Fan, Instructions, Isa, Scalar};
-use crate::unroll::{unroll, vector};
+use super::series::{Number, half_square, inner, orders};
+use crate::scalar::{Fan, Instructions, Isa, Packet, Real, Scalar, Spread};
+use crate::unroll::unroll;
 
 /// The coefficients of the solution up to this order, for the tape's held values.
 #[inline(always)]
@@ -27,14 +27,24 @@ pub(super) fn expand<V: Instructions, S: Scalar, const D: usize, const N: usize>
     if damped {
         return rolled(&mut Series::of(work, x, held[0], Some(held[2])), order);
     }
-    if const { S::FANS && N == HIGH + 1 && !matches!(V::ISA, Isa::Baseline) } {
-        let mut room = [[Fan::<V>::zero(); N]; 3];
-        let series = &mut Series::of(&mut room, vector!(Fan<V>, 3; n => x[n].fan()), held[0].fan(), None);
-        let keep = |n: usize, k: usize, c: Fan<V>| work[n][k] = S::from_fan(c);
-        match order {
-            LOW => return unrolled::<_, N, LOW>(series, keep),
-            HIGH => return unrolled::<_, N, HIGH>(series, keep),
-            _ => {}
+    if const { N == HIGH + 1 && !matches!(V::ISA, Isa::Baseline) } {
+        let value = |x: S| x.real().lane(0);
+        if const { 1 < S::DERIVATIVES && S::DERIVATIVES <= 3 } {
+            let fan = |x: S| Fan::<V>::new(value(x), [x.derivative(0), x.derivative(1), x.derivative(2)]);
+            let back = |c: Fan<V>| S::with_derivatives(c.number(), |i| c.derivative(i));
+            if aside(work, order, (held[0], x), fan, back) {
+                return;
+            }
+        }
+        if const { S::DERIVATIVES == 4 } {
+            let spread = |x: S| Spread::<V> {
+                re: Packet::constant(value(x)),
+                d: [Packet::from_lanes(|i| x.derivative(i))],
+            };
+            let back = |c: Spread<V>| S::with_derivatives(c.re.lane(0), |i| c.d[0].lane(i));
+            if aside(work, order, (held[0], x), spread, back) {
+                return;
+            }
         }
     }
     let series = &mut Series::of(work, x, held[0], None);
@@ -49,13 +59,33 @@ pub(super) fn expand<V: Instructions, S: Scalar, const D: usize, const N: usize>
     rolled(series, order);
 }
 
+/// The series over other numbers, made of these and turned back; false for an order that is not unrolled.
+#[inline(always)]
+fn aside<S: Scalar, T: Number, const N: usize>(
+    work: &mut [[S; N]; 3],
+    order: usize,
+    (w, x): (S, [S; 3]),
+    turn: impl Fn(S) -> T,
+    back: impl Fn(T) -> S,
+) -> bool {
+    let mut room = [[T::zero(); N]; 3];
+    let series = &mut Series::of(&mut room, [turn(x[0]), turn(x[1]), turn(x[2])], turn(w), None);
+    let keep = |n: usize, k: usize, c: T| work[n][k] = back(c);
+    match order {
+        LOW => unrolled::<_, N, LOW>(series, keep),
+        HIGH => unrolled::<_, N, HIGH>(series, keep),
+        _ => return false,
+    }
+    true
+}
+
 /// Whether orders are unrolled: not where tangents make every operation long.
 const fn worthwhile<S: Scalar, const N: usize>() -> bool {
     N == HIGH + 1 && size_of::<S>() <= 2 * size_of::<S::Real>()
 }
 
 #[inline(always)]
-fn rolled<S: Scalar, const N: usize>(series: &mut Series<S, N>, order: usize) {
+fn rolled<S: Number, const N: usize>(series: &mut Series<S, N>, order: usize) {
     for k in 0..order.min(N - 1) {
         series.next(k);
     }
@@ -63,7 +93,7 @@ fn rolled<S: Scalar, const N: usize>(series: &mut Series<S, N>, order: usize) {
 
 /// With every order's number known to the compiler, up to the order `TO`; `keep` is given each coefficient.
 #[inline(always)]
-fn unrolled<S: Scalar, const N: usize, const TO: usize>(
+fn unrolled<S: Number, const N: usize, const TO: usize>(
     series: &mut Series<S, N>,
     mut keep: impl FnMut(usize, usize, S),
 ) {
@@ -85,11 +115,11 @@ struct Series<'a, S, const N: usize> {
     half: S,
 }
 
-impl<'a, S: Scalar, const N: usize> Series<'a, S, N> {
+impl<'a, S: Number, const N: usize> Series<'a, S, N> {
     #[inline(always)]
     fn of(x: &'a mut [[S; N]; 3], start: [S; 3], w: S, damping: Option<S>) -> Self {
         unroll!(n in 0..3 => { x[n][0] = start[n]; });
-        let half = start[0].square().scale(0.5);
+        let half = (start[0] * start[0]).scaled(0.5);
         Self { x, w, damping, half }
     }
 
@@ -98,18 +128,16 @@ impl<'a, S: Scalar, const N: usize> Series<'a, S, N> {
     fn next(&mut self, k: usize) {
         let [omega, y, z] = &mut *self.x;
         let part = INVERSE[k + 1];
-        omega[k + 1] = (y[k] - omega[k]).scale(part);
+        omega[k + 1] = (y[k] - omega[k]).scaled(part);
         y[k + 1] = if k == 0 {
             omega[0] * z[0]
         } else {
-            inner(omega, z, k).fused(omega[k], z[0]).fused(omega[0], z[k]).scale(part)
+            inner(omega, z, k).plus_product(omega[k], z[0]).plus_product(omega[0], z[k]).scaled(part)
         };
-        let half = half_square(omega, k + 1).fused(omega[0], omega[k + 1]);
+        let half = half_square(omega, k + 1).plus_product(omega[0], omega[k + 1]);
         z[k + 1] = match self.damping {
-            Some(damping) => {
-                (-half).fused_times((self.half + self.half).fused(damping, z[k]), S::Real::constant(-part))
-            }
-            None => (-half).fused_times(self.half, S::Real::constant(-2.0 * part)),
+            Some(damping) => (-half).plus_scaled((self.half + self.half).plus_product(damping, z[k]), -part),
+            None => (-half).plus_scaled(self.half, -2.0 * part),
         };
         if k == 0 {
             z[1] += self.w;

@@ -5,7 +5,9 @@
 //! waits for them as shortly as possible. Two sums run side by side, so that they need not wait for each
 //! other.
 
-use crate::scalar::{Instructions, Isa, Scalar};
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+use crate::scalar::{Fan, Instructions, Isa, Scalar};
 
 /// The body for every order `k` below `to`, with its number known when the program is compiled.
 macro_rules! orders {
@@ -21,6 +23,56 @@ macro_rules! orders {
 }
 pub(super) use orders;
 
+/// What the coefficients of a series are: any scalar, or a fan.
+pub trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> + AddAssign
+{
+    fn zero() -> Self;
+    fn scaled(self, factor: f64) -> Self;
+    /// `self + a b`, rounded once.
+    fn plus_product(self, a: Self, b: Self) -> Self;
+    /// `self + a factor`, rounded once.
+    fn plus_scaled(self, a: Self, factor: f64) -> Self;
+}
+
+impl<S: Scalar> Number for S {
+    #[inline(always)]
+    fn zero() -> S {
+        S::zero()
+    }
+    #[inline(always)]
+    fn scaled(self, factor: f64) -> S {
+        self.scale(factor)
+    }
+    #[inline(always)]
+    fn plus_product(self, a: S, b: S) -> S {
+        self.fused(a, b)
+    }
+    #[inline(always)]
+    fn plus_scaled(self, a: S, factor: f64) -> S {
+        self.fused_times(a, S::Real::constant(factor))
+    }
+}
+
+impl<V: Instructions> Number for Fan<V> {
+    #[inline(always)]
+    fn zero() -> Self {
+        Fan::zero()
+    }
+    #[inline(always)]
+    fn scaled(self, factor: f64) -> Self {
+        self.scale(factor)
+    }
+    #[inline(always)]
+    fn plus_product(self, a: Self, b: Self) -> Self {
+        self.fused(a, b)
+    }
+    #[inline(always)]
+    fn plus_scaled(self, a: Self, factor: f64) -> Self {
+        self.fused_scaled(a, factor)
+    }
+}
+
 /// A coefficient, or several side by side, that numbers multiply.
 pub trait Coefficient<S>: Copy {
     /// -0 : adding to it changes nothing, not even the sign of a zero.
@@ -30,14 +82,14 @@ pub trait Coefficient<S>: Copy {
     fn plus(self, other: Self) -> Self;
 }
 
-impl<S: Scalar> Coefficient<S> for S {
+impl<S: Number> Coefficient<S> for S {
     #[inline(always)]
     fn nothing() -> S {
         -S::zero()
     }
     #[inline(always)]
     fn with(self, a: S, b: S) -> S {
-        self.fused(a, b)
+        self.plus_product(a, b)
     }
     #[inline(always)]
     fn plus(self, other: S) -> S {
@@ -103,25 +155,25 @@ pub fn inner_square_at<V: Instructions, S: Scalar, const N: usize>(a: &[S; N], k
 
 /// `sum of a[j] a[k-j] for j in 1..k`, at half the cost.
 #[inline(always)]
-pub fn inner_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
+pub fn inner_square<S: Number, const N: usize>(a: &[S; N], k: usize) -> S {
     let half = pairs(a, k, S::nothing());
     let sum = half + half;
-    if k >= 2 && k.is_multiple_of(2) { sum.fused(a[k / 2], a[k / 2]) } else { sum }
+    if k >= 2 && k.is_multiple_of(2) { sum.plus_product(a[k / 2], a[k / 2]) } else { sum }
 }
 
 /// Half of it.
 #[inline(always)]
-pub fn half_square<S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
+pub fn half_square<S: Number, const N: usize>(a: &[S; N], k: usize) -> S {
     let middle = k >= 2 && k.is_multiple_of(2);
-    pairs(a, k, if middle { a[k / 2].square().scale(0.5) } else { S::nothing() })
+    pairs(a, k, if middle { (a[k / 2] * a[k / 2]).scaled(0.5) } else { S::nothing() })
 }
 
 /// `a[j] a[k-j]` for `0 < j < k - j` added to `sum`, from the middle outwards.
 #[inline(always)]
-fn pairs<S: Scalar, const N: usize>(a: &[S; N], k: usize, mut sum: S) -> S {
+fn pairs<S: Number, const N: usize>(a: &[S; N], k: usize, mut sum: S) -> S {
     let pairs = k.saturating_sub(1) / 2;
     for (&low, &high) in a[1..=pairs].iter().rev().zip(&a[k - pairs..k]) {
-        sum = sum.fused(low, high);
+        sum = sum.plus_product(low, high);
     }
     sum
 }

@@ -458,7 +458,7 @@ impl Mask for SideOf {
             SideOf::Beyond(j) => SideOf::Surface(j),
         }
     }
-    fn any(self) -> bool {
-        self.lane(0)
+    fn bits(self) -> u64 {
+        u64::from(self.lane(0))
     }
 }

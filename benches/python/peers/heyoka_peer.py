@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import heyoka as hy
@@ -51,3 +52,18 @@ def batch(equations: Equations, dim: int, parameters: int, width: int, tol: floa
         **OPTIONS,
         **more,
     )
+
+
+def final(
+    equations: Equations, parameters: list[float], tol: float, fast_math: bool = True
+) -> tuple[str, Callable[[Any, float], Any]]:
+    """The setting, and ``final(start, t)``: the state at t of one trajectory of three equations."""
+    ta = single(equations, 3, parameters, tol, fast_math)
+
+    def run(start: Any, t: float) -> Any:
+        ta.time = 0.0
+        ta.state[:] = start
+        ta.propagate_until(t)
+        return ta.state.copy()
+
+    return f"Taylor, tol {tol:g}" + (", fast math" if fast_math else ""), run

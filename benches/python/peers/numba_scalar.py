@@ -167,6 +167,19 @@ def run_of(rates: dop853.Rates, dim: int, parameters: int, controlled: int) -> C
     return compiled
 
 
+def final(
+    rates: dop853.Rates, parameters: tuple[float, ...], rtol: float, atol: float
+) -> tuple[str, Callable[[Any, float], Any]]:
+    """The setting, and ``final(start, t)``: the state at t of one trajectory of three equations."""
+    run = run_of(rates, 3, len(parameters), 3)
+
+    def found(start: Any, t: float) -> Any:
+        return np.array(run(tuple(np.asarray(start).tolist()), parameters, t, 0.01, rtol, atol))
+
+    found((1.0, 1.0, 1.0), 1.0)
+    return f"DOP853, rtol {rtol:g}, atol {atol:g}", found
+
+
 @cache
 def crossings_of(
     rates: dop853.Rates, dim: int, parameters: int, controlled: int, level: int

@@ -7,7 +7,10 @@ component. Where two codes are compared both have met the row's bound.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +32,34 @@ DISK_SCALE = np.array([10.0, 0.01, 0.05, 10.0])
 
 def dle(t: float, y: Array, w: float = 1.0) -> list[float]:
     return [y[1] - y[0], y[0] * y[2], w - y[0] * y[1]]
+
+
+# Lorenz's equations of 1963, which udd is given as text.
+SIGMA, RHO, BETA = 10.0, 28.0, 8.0 / 3.0
+
+
+def lorenz(t: float, y: Array) -> list[Any]:
+    return [SIGMA * (y[1] - y[0]), y[0] * (RHO - y[2]) - y[1], y[0] * y[1] - BETA * y[2]]
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Three equations, and from where and how long their runs are compared."""
+
+    rates: Callable[[float, Array], list[Any]]
+    parameters: tuple[float, ...]
+    start: tuple[float, float, float]
+    first: float
+    """When the run from `start` is first on the attractor, where it is probed every so often from then on."""
+    every: float
+    span: float
+    """The time over which errors are measured."""
+    size: float
+    """No component gets beyond this."""
+
+
+DLE = Flow(dle, (1.0,), START, first=40.0, every=30.0, span=SPAN, size=30.0)
+LORENZ = Flow(lorenz, (SIGMA, RHO, BETA), (1.0, 1.0, 20.0), first=20.0, every=5.0, span=8.0, size=60.0)
 
 
 def dle_tangent(t: float, y: Array, w: float = 1.0) -> list[float]:
@@ -57,29 +88,41 @@ def random_starts(count: int, seed: int = 1) -> Array:
     return np.random.default_rng(seed).uniform(-2.0, 2.0, (count, 3))
 
 
+def by_scipy(flow: Flow, rtol: float, atol: float) -> Callable[[Any, float], Array]:
+    """``final(start, t)``, the state at t, by SciPy's DOP853."""
+
+    def final(start: Any, t: float) -> Array:
+        run = solve_ivp(flow.rates, (0.0, t), start, method="DOP853", rtol=rtol, atol=atol, t_eval=[t])
+        state: Array = run.y[:, -1]
+        return state
+
+    return final
+
+
 @cache
-def probe_starts() -> Array:
-    """States on the attractor at w = 1 from which the accuracy is measured, shape (32, 3)."""
-    times = 40.0 + 30.0 * np.arange(32)
-    run = solve_ivp(dle, (0.0, times[-1]), START, method="DOP853", rtol=1e-9, atol=1e-12, t_eval=times)
+def probe_starts(flow: Flow = DLE) -> Array:
+    """States on the attractor from which the accuracy is measured, shape (32, 3)."""
+    times = flow.first + flow.every * np.arange(32)
+    run = solve_ivp(
+        flow.rates, (0.0, times[-1]), flow.start, method="DOP853", rtol=1e-9, atol=1e-12, t_eval=times
+    )
     return np.ascontiguousarray(run.y.T)
 
 
 @cache
-def reference_states() -> Array:
-    """Where `probe_starts` are at t = SPAN."""
+def reference_states(flow: Flow = DLE) -> Array:
+    """Where `probe_starts` are after the flow's span."""
 
     def together(t: float, y: Array) -> Array:
-        a, b, c = y.reshape(3, -1)
-        return np.concatenate([b - a, a * c, 1.0 - a * b])
+        return np.concatenate(flow.rates(t, y.reshape(3, -1)))
 
-    run = solve_ivp(together, (0.0, SPAN), probe_starts().T.ravel(), method="DOP853", rtol=3e-14, atol=1e-15)
-    return np.ascontiguousarray(run.y[:, -1].reshape(3, -1).T)
+    final = by_scipy(replace(flow, rates=together), 3e-14, 1e-15)
+    return np.ascontiguousarray(final(probe_starts(flow).T.ravel(), flow.span).reshape(3, -1).T)
 
 
-def state_error(found: Array) -> float:
-    """The median over `probe_starts` of the largest error of a component at t = SPAN."""
-    return float(np.median(np.abs(np.asarray(found) - reference_states()).max(axis=-1)))
+def state_error(found: Any, flow: Flow = DLE) -> float:
+    """The median over `probe_starts` of the largest error of a component after the flow's span."""
+    return float(np.median(np.abs(np.asarray(found) - reference_states(flow)).max(axis=-1)))
 
 
 SECTION_POINTS = 5  # reached from `probe_starts` at about t = SPAN

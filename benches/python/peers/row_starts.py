@@ -140,16 +140,11 @@ def diffrax(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
 
 
 def scipy(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
-    from scipy.integrate import solve_ivp
-
-    def finals(starts: Any, t: float) -> Any:
-        def end(start: Any) -> Any:
-            run = solve_ivp(problems.dle, (0, t), start, method="DOP853", rtol=rtol, atol=atol, t_eval=[t])
-            return run.y[:, -1]
-
-        return np.array([end(start) for start in starts])
-
-    return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", finals, "one thread: Python does not run in two")
+    final = problems.by_scipy(problems.DLE, rtol, atol)
+    note = "one thread: Python does not run in two"
+    return entry(
+        f"DOP853, rtol {rtol:g}, atol {atol:g}", lambda s, t: np.array([final(start, t) for start in s]), note
+    )
 
 
 def one_by_one(setting: str, final: Any) -> Entry:

@@ -2,68 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from peers import problems, udd_rows
 from peers.harness import Entry, Row
+from peers.problems import Flow
 
 BOUND = 1.2e-7  # what DOP853 at rtol 1e-9 leaves at t = 30
 
 
-def inspect(answer: Any) -> str:
-    state = np.asarray(answer)
-    return "" if np.isfinite(state).all() and np.abs(state).max() < 30 else f"ends at {state}"
+def bounded(flow: Flow) -> Callable[[Any], str]:
+    """What is wrong with a state at the end."""
+
+    def inspect(answer: Any) -> str:
+        state = np.asarray(answer)
+        good = np.isfinite(state).all() and np.abs(state).max() < flow.size
+        return "" if good else f"ends at {state}"
+
+    return inspect
 
 
-def probe(final: Any) -> float:
-    return problems.state_error(np.array([final(start, problems.SPAN) for start in problems.probe_starts()]))
-
-
-def entry(setting: str, final: Any, note: str = "") -> Entry:
+def entry(setting: str, final: Any, note: str = "", flow: Flow = problems.DLE) -> Entry:
     """From ``final(start, t)``, the state at t."""
 
     def work(n: int) -> tuple[float, Any]:
-        return n, final(np.array(problems.START), float(n))
+        return n, final(np.array(flow.start), float(n))
 
-    return Entry(setting, work, lambda: probe(final), note)
+    def probe() -> float:
+        ends = [final(start, flow.span) for start in problems.probe_starts(flow)]
+        return problems.state_error(ends, flow)
+
+    return Entry(setting, work, probe, note)
 
 
-def scipy() -> Entry:
-    from scipy.integrate import solve_ivp
-
-    def final(start: Any, t: float) -> Any:
-        run = solve_ivp(problems.dle, (0.0, t), start, method="DOP853", rtol=1e-9, atol=1e-12, t_eval=[t])
-        return run.y[:, -1]
-
-    return entry("DOP853, rtol 1e-9, atol 1e-12", final)
+def scipy(flow: Flow = problems.DLE) -> Entry:
+    return entry("DOP853, rtol 1e-9, atol 1e-12", problems.by_scipy(flow, 1e-9, 1e-12), flow=flow)
 
 
 def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
     from peers import dop853, numba_scalar
 
-    run = numba_scalar.run_of(dop853.dle, 3, 1, 3)
-
-    def final(start: Any, t: float) -> Any:
-        return np.array(run(tuple(start.tolist()), (1.0,), t, 0.01, rtol, atol))
-
-    final(np.array(problems.START), 1.0)
-    return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", final)
+    return entry(*numba_scalar.final(dop853.dle, problems.DLE.parameters, rtol, atol))
 
 
 def heyoka(tol: float = 1e-7, fast_math: bool = True) -> Entry:
     from peers import heyoka_peer
 
-    ta = heyoka_peer.single(heyoka_peer.dle(), 3, [1.0], tol, fast_math)
-
-    def final(start: Any, t: float) -> Any:
-        ta.time = 0.0
-        ta.state[:] = start
-        ta.propagate_until(t)
-        return ta.state.copy()
-
-    return entry(f"Taylor, tol {tol:g}" + (", fast math" if fast_math else ""), final)
+    return entry(*heyoka_peer.final(heyoka_peer.dle(), [1.0], tol, fast_math))
 
 
 def jitcode(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
@@ -109,5 +97,5 @@ ROW = Row(
         "pynamicalsys": pynamicalsys,
         "SciPy": scipy,
     },
-    inspect=inspect,
+    inspect=bounded(problems.DLE),
 )

@@ -7,17 +7,22 @@ from typing import Any
 import numpy as np
 
 
-def trajectory(rtol: float = 1.4e-9) -> tuple[str, Any]:
-    """The setting, and ``final(start, t)``."""
+def final_of(model: Any, rtol: float) -> tuple[str, Any]:
+    """The setting, and ``final(start, t)``: the state at t of one trajectory."""
     import udd
-
-    model = udd.DLE(1.0)
 
     def final(start: Any, t: float) -> Any:
         times = np.array([0.0, t])
         return udd.simulate(model, times, start, rtol=rtol, atol=1e-3 * rtol, method="taylor").state[-1]
 
     return f"Taylor, rtol {rtol:g}", final
+
+
+def trajectory(rtol: float = 1.4e-9) -> tuple[str, Any]:
+    """The setting, and ``final(start, t)``."""
+    import udd
+
+    return final_of(udd.DLE(1.0), rtol)
 
 
 def starts(rtol: float = 7.3e-6) -> tuple[str, Any]:
@@ -104,28 +109,17 @@ def disk(rtol: float = 3e-9) -> tuple[str, Any]:
     import udd
     from peers import problems
 
-    model = udd.Disk(problems.W, edge="ignore")
-
-    def final(start: Any, t: float) -> Any:
-        times = np.array([0.0, t])
-        return udd.simulate(model, times, start, rtol=rtol, atol=1e-3 * rtol, method="taylor").state[-1]
-
-    return f"Taylor, rtol {rtol:g}", final
+    return final_of(udd.Disk(problems.W, edge="ignore"), rtol)
 
 
 def own_model(rtol: float = 2e-9) -> tuple[str, Any]:
     """The setting, and ``final(start, t)``."""
     import udd
-    from peers.row_own_model import BETA, RHO, SIGMA
+    from peers.problems import BETA, RHO, SIGMA
 
     model = udd.Model(
         ["x", "y", "z"],
         ["sigma*(y - x)", "x*(rho - z) - y", "x*y - beta*z"],
         {"sigma": SIGMA, "rho": RHO, "beta": BETA},
     )
-
-    def final(start: Any, t: float) -> Any:
-        times = np.array([0.0, t])
-        return udd.simulate(model, times, start, rtol=rtol, atol=1e-3 * rtol, method="taylor").state[-1]
-
-    return f"Taylor, rtol {rtol:g}", final
+    return final_of(model, rtol)
