@@ -10,11 +10,17 @@ use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, S
 use udd::formula::{Expression, Names};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
-use udd::model::{DiskFamily, DleFamily, Family, OwnFamily};
+use udd::model::{DiskFamily, DleFamily, Either, Family, OwnFamily};
 use udd::run::{
     Crew, Ensemble, Lyapunov, LyapunovOptions, Output, Section, Sections, Stepper, Stop, trajectory,
 };
 use udd::scalar::Isa;
+
+/// Models as the module has them.
+type Three = Either<DleFamily, OwnFamily<3>>;
+type Four = Either<DiskFamily, OwnFamily<4>>;
+
+const DLE: Three = Either::First(DleFamily);
 
 /// One piece of work, always the same, on one thread.
 struct Path {
@@ -47,9 +53,9 @@ fn drives(n: u32) -> Vec<Vec<f64>> {
     (0..n).map(|i| vec![0.05 + 9.95 * f64::from(i) / f64::from(n), 0.0]).collect()
 }
 
-fn ensemble<F: Family<3> + 'static>(
+fn ensemble(
     name: &'static str,
-    (family, values): (F, Vec<f64>),
+    (family, values): (Three, Vec<f64>),
     stepper: Stepper,
     rtol: f64,
     starts: Vec<[f64; 3]>,
@@ -69,11 +75,11 @@ fn ensemble<F: Family<3> + 'static>(
 }
 
 /// A model as text, none of those whose series are written out: Lorenz's of 1963.
-fn lorenz() -> (OwnFamily<3>, Vec<f64>) {
+fn lorenz() -> (Three, Vec<f64>) {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let equations = ["sigma*(y-x)", "x*(rho-z)-y", "x*y-beta*z"];
     let family = OwnFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]));
-    (family.unwrap(), vec![10.0, 28.0, 8.0 / 3.0])
+    (Either::Second(family.unwrap()), vec![10.0, 28.0, 8.0 / 3.0])
 }
 
 fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>>, end: u32) -> Path {
@@ -81,7 +87,7 @@ fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>
     let time = f64::from(end);
     let options = LyapunovOptions { time, transient: 0.1 * time, goal: 0.0, tolerance: tolerance(rtol) };
     let work = move |isa| {
-        let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[START], options };
+        let orbits = Lyapunov { family: &DLE, values: &values, starts: &[START], options };
         with_crew(isa, |crew| orbits.run::<N>(crew));
     };
     Path { name, units, work: Box::new(work) }
@@ -96,7 +102,7 @@ fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
     let surface = [Section { function, rising: true, falling: false }];
     let work = move |isa| {
         let wanted = Sections {
-            family: &DleFamily,
+            family: &DLE,
             values: &values,
             starts: &[START],
             sections: &surface,
@@ -116,7 +122,7 @@ const DISK: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 fn disk(name: &'static str, effects: &[(Kind, &[f64])], end: u32) -> Path {
     let values: Vec<f64> = DISK.iter().chain(effects.iter().flat_map(|(_, own)| *own)).copied().collect();
     let effects = effects.iter().map(|&(kind, _)| Effect::new(kind)).collect();
-    let system = DiskFamily { effects, edge: true }.build::<f64>(&values);
+    let system = Four::First(DiskFamily { effects, edge: true }).build::<f64>(&values);
     let work = move |_| {
         let times: Vec<f64> = (0..=25 * end).map(|i| 0.04 * f64::from(i)).collect();
         let (x0, tolerance) = ([1.0, 0.01, -0.02, 0.3], tolerance(TIGHT));
@@ -166,7 +172,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
 
 fn paths() -> Vec<Path> {
     let one = || vec![vec![1.0, 0.0]];
-    let dle = || (DleFamily, vec![1.0, 0.0]);
+    let dle = || (DLE, vec![1.0, 0.0]);
     vec![
         ensemble("trajectory", dle(), Stepper::Taylor, TIGHT, vec![START], 10_000),
         ensemble("trajectory by dopri5", dle(), Stepper::Dopri5, LOOSE, vec![START], 2_000),

@@ -9,6 +9,7 @@ mod bristle;
 mod disk;
 mod dle;
 pub mod effects;
+mod either;
 mod own;
 mod pendulum;
 pub mod stick;
@@ -17,6 +18,7 @@ pub use bristle::Bristled;
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
 pub use effects::{Effect, Momentum, Treatment};
+pub use either::Either;
 pub use own::{Own, OwnFamily};
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick::Sticking;
@@ -158,6 +160,12 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     const PACKETS: bool = false;
     /// The same for ensembles by the Taylor method alone, where many runs are most wanted.
     const STARTS_IN_PACKETS: bool = Self::PACKETS;
+
+    /// Whether this one of the family is taken in packets, where they are compiled; `starts` asks it of ensembles by
+    /// the Taylor method.
+    fn in_packets(&self, starts: bool) -> bool {
+        if starts { Self::STARTS_IN_PACKETS } else { Self::PACKETS }
+    }
 
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;

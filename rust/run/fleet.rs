@@ -22,6 +22,11 @@ impl Queue<'_> {
         (job < self.jobs).then_some(job)
     }
 
+    /// What asks the work to end.
+    pub fn stop(&self) -> &Stop {
+        self.stop
+    }
+
     /// Whether the work is to end, finished or not.
     pub fn stopped(&self) -> bool {
         self.stop.check().is_err()
@@ -62,11 +67,19 @@ pub trait Fleet: Sync {
     /// What a job yields.
     type Yield: Send;
 
-    /// Whether packets are worth it.
+    /// Whether packets are compiled.
     const PACKETS: bool;
     /// Whether its numbers carry derivatives: packets are then of one register, since those of two leave too few
     /// registers for them.
     const DERIVATIVES: bool = false;
+
+    /// Whether they are worth it.
+    fn in_packets(&self) -> bool;
+
+    /// Takes jobs one by one until none is left.
+    fn walk(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Self::Yield>) {
+        self.sail::<f64>(queue, yields);
+    }
 
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
@@ -89,10 +102,10 @@ pub struct Crew<'a> {
 /// stopped.
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
     spread(jobs, crew, &|queue, yields| {
-        if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
+        if T::PACKETS && fleet.in_packets() && jobs > 1 && crew.isa != Isa::Baseline {
             return crew.isa.run(InPackets { fleet, queue, yields });
         }
-        fleet.sail::<f64>(queue, yields);
+        fleet.walk(queue, yields);
     })
 }
 
