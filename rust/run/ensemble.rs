@@ -85,7 +85,7 @@ struct Sampled<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
     type Yield = Passage<D>;
 
-    const PACKETS: bool = F::PACKETS || (F::STARTS_IN_PACKETS && T::PACKETS);
+    const PACKETS: bool = F::PACKETS && T::STARTS_IN_PACKETS || F::STARTS_IN_PACKETS && T::PACKETS;
 
     fn in_packets(&self) -> bool {
         self.ensemble.family.in_packets(T::PACKETS)
