@@ -155,6 +155,10 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
         let weights = norm.weights(&at.x);
         let jets = &mut method.jets;
         jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);
+        // A PC without AVX2 is rare, and every copy takes its time to compile.
+        if const { cfg!(target_arch = "x86_64") && matches!(V::ISA, Isa::Baseline) } {
+            return followed(jets, jets.order(), h, norm, &weights);
+        }
         // The usual orders known to the compiler.
         match jets.order() {
             LOW => followed(jets, LOW, h, norm, &weights),

@@ -115,9 +115,9 @@ impl Isa {
     }
 }
 
-/// Does work over packets that are made of the instructions `V` with just these.
+/// Does work with the instructions `V`, as a function of its own.
 #[inline(always)]
-pub(super) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
+pub(crate) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if const { matches!(V::ISA, Isa::Avx512) } {

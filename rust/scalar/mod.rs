@@ -13,6 +13,7 @@ mod packet;
 mod real;
 
 pub use dual::Dual;
+pub(crate) use isa::run_with;
 pub use isa::{Instructions, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
 

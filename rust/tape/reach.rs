@@ -46,7 +46,16 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
     #[inline(always)]
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
-        vector!(S, D; n => value(&self.coefficients()[n], order, dt, |c| c))
+        let series = self.coefficients();
+        if const { size_of::<S>() == size_of::<S::Real>() } {
+            return vector!(S, D; n => value(&series[n], order, dt, |c| c));
+        }
+        // Derivatives fill the registers: one component after the other.
+        let mut x = [S::zero(); D];
+        for n in 0..D {
+            x[n] = value(&series[n], order, dt, |c| c);
+        }
+        x
     }
 
     #[inline(always)]
