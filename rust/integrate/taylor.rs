@@ -155,8 +155,7 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
         let weights = norm.weights(&at.x);
         let jets = &mut method.jets;
         jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);
-        // A PC without AVX2 is rare, and every copy takes its time to compile.
-        if const { cfg!(target_arch = "x86_64") && matches!(V::ISA, Isa::Baseline) } {
+        if const { V::ISA.is_rare() } {
             return followed(jets, jets.order(), h, norm, &weights);
         }
         // The usual orders known to the compiler.

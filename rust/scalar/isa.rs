@@ -57,6 +57,12 @@ pub trait Work {
 }
 
 impl Isa {
+    /// Whether machines that have no more than this are rare, as PCs without AVX2 are: not worth the long programs
+    /// that are faster, each of which takes its time to compile.
+    pub(crate) const fn is_rare(self) -> bool {
+        cfg!(target_arch = "x86_64") && matches!(self, Isa::Baseline)
+    }
+
     /// All that this machine has, the fastest last.
     pub fn available() -> Vec<Isa> {
         let mut list = vec![Isa::Baseline];
