@@ -4,6 +4,7 @@ mod allocation;
 mod averages;
 mod counting;
 mod duals;
+mod either;
 mod effects;
 mod elementary;
 mod estimate;
