@@ -16,7 +16,7 @@ use udd::run::{
 };
 use udd::scalar::Isa;
 
-/// Models as the module has them.
+/// Models as the module has them, but for runs and ensembles of three equations.
 type Three = Either<DleFamily, OwnFamily<3>>;
 type Four = Either<DiskFamily, OwnFamily<4>>;
 
@@ -53,9 +53,9 @@ fn drives(n: u32) -> Vec<Vec<f64>> {
     (0..n).map(|i| vec![0.05 + 9.95 * f64::from(i) / f64::from(n), 0.0]).collect()
 }
 
-fn ensemble(
+fn ensemble<F: Family<3> + 'static>(
     name: &'static str,
-    (family, values): (Three, Vec<f64>),
+    (family, values): (F, Vec<f64>),
     stepper: Stepper,
     rtol: f64,
     starts: Vec<[f64; 3]>,
@@ -75,11 +75,11 @@ fn ensemble(
 }
 
 /// A model as text, none of those whose series are written out: Lorenz's of 1963.
-fn lorenz() -> (Three, Vec<f64>) {
+fn lorenz() -> (OwnFamily<3>, Vec<f64>) {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let equations = ["sigma*(y-x)", "x*(rho-z)-y", "x*y-beta*z"];
     let family = OwnFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]));
-    (Either::Second(family.unwrap()), vec![10.0, 28.0, 8.0 / 3.0])
+    (family.unwrap(), vec![10.0, 28.0, 8.0 / 3.0])
 }
 
 fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>>, end: u32) -> Path {
@@ -172,7 +172,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
 
 fn paths() -> Vec<Path> {
     let one = || vec![vec![1.0, 0.0]];
-    let dle = || (DLE, vec![1.0, 0.0]);
+    let dle = || (DleFamily, vec![1.0, 0.0]);
     vec![
         ensemble("trajectory", dle(), Stepper::Taylor, TIGHT, vec![START], 10_000),
         ensemble("trajectory by dopri5", dle(), Stepper::Dopri5, LOOSE, vec![START], 2_000),
