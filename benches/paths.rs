@@ -16,11 +16,8 @@ use udd::run::{
 };
 use udd::scalar::Isa;
 
-/// Models as the module has them, but for runs and ensembles of three equations.
-type Three = Either<DleFamily, OwnFamily<3>>;
+/// The disk as the module has it.
 type Four = Either<DiskFamily, OwnFamily<4>>;
-
-const DLE: Three = Either::First(DleFamily);
 
 /// One piece of work, always the same, on one thread.
 struct Path {
@@ -87,7 +84,7 @@ fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>
     let time = f64::from(end);
     let options = LyapunovOptions { time, transient: 0.1 * time, goal: 0.0, tolerance: tolerance(rtol) };
     let work = move |isa| {
-        let orbits = Lyapunov { family: &DLE, values: &values, starts: &[START], options };
+        let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[START], options };
         with_crew(isa, |crew| orbits.run::<N>(crew));
     };
     Path { name, units, work: Box::new(work) }
@@ -102,7 +99,7 @@ fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
     let surface = [Section { function, rising: true, falling: false }];
     let work = move |isa| {
         let wanted = Sections {
-            family: &DLE,
+            family: &DleFamily,
             values: &values,
             starts: &[START],
             sections: &surface,

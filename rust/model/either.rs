@@ -70,12 +70,9 @@ where
 impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
     type Built<S: Scalar> = Either<A::Built<S>, B::Built<S>>;
 
-    const PACKETS: bool = A::PACKETS || B::PACKETS;
-    const STARTS_IN_PACKETS: bool = A::STARTS_IN_PACKETS || B::STARTS_IN_PACKETS;
-
-    fn in_packets(&self, starts: bool) -> bool {
-        ask!(self, family => family.in_packets(starts))
-    }
+    // What one is worth in packets is not worth compiling the other for them.
+    const PACKETS: bool = A::PACKETS && B::PACKETS;
+    const STARTS_IN_PACKETS: bool = A::STARTS_IN_PACKETS && B::STARTS_IN_PACKETS;
 
     fn parameters(&self) -> Vec<Parameter> {
         ask!(self, family => family.parameters())

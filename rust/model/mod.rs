@@ -161,12 +161,6 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The same for ensembles by the Taylor method alone, where many runs are most wanted.
     const STARTS_IN_PACKETS: bool = Self::PACKETS;
 
-    /// Whether this one of the family is taken in packets, where they are compiled; `starts` asks it of ensembles by
-    /// the Taylor method.
-    fn in_packets(&self, starts: bool) -> bool {
-        if starts { Self::STARTS_IN_PACKETS } else { Self::PACKETS }
-    }
-
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;
 

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::jobs::{self, Jobs, outcome_code};
-use super::model::{AnyModel, with_quick_model};
+use super::model::{AnyModel, with_wide_model};
 use super::simulate::stepper;
 use crate::integrate::Tolerance;
 use crate::model::Family;
@@ -87,7 +87,7 @@ fn ensemble<'py>(
     }
     let values = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
-    let (table, dimension, signal) = with_quick_model!(&model, |family, _values| {
+    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, _values| {
         let starts = jobs::starts(&starts)?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();

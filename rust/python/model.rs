@@ -51,31 +51,32 @@ pub(crate) use with_model;
 
 /// The same for work on packets and tangents, which takes long to compile: not for friction by bristles and
 /// numbers of states that are rarely wanted there.
+///
+/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
+/// own. `starts`, of which own models are taken in packets, too, are compiled for each kind of model.
 macro_rules! with_wide_model {
-    ($model:expr, |$family:ident, $values:ident| $body:expr) => {
+    (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family) Three($family) Four($family))
+    };
+    (packets: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family)
+            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
+            Four($family))
+    };
+    (starts: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body,
+            Two($crate::model::Either::First($family)) Two($crate::model::Either::Second($family))
+            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
+            Four($crate::model::Either::First($family)) Four($crate::model::Either::Second($family)))
+    };
+    (@ $model:expr, $values:ident, $body:expr, $($Kind:ident($held:pat))+) => {
         match $model {
-            $crate::python::model::AnyModel::Two($family, $values) => $body,
-            $crate::python::model::AnyModel::Three($family, $values) => $body,
-            $crate::python::model::AnyModel::Four($family, $values) => $body,
+            $($crate::python::model::AnyModel::$Kind($held, $values) => $body,)+
             other => return Err(other.too_much()),
         }
     };
 }
 pub(crate) use with_wide_model;
-
-/// As [`with_wide_model`], with the DLE told apart before as by [`with_model`].
-macro_rules! with_quick_model {
-    ($model:expr, |$family:ident, $values:ident| $body:expr) => {
-        match $model {
-            $crate::python::model::AnyModel::Two($family, $values) => $body,
-            $crate::python::model::AnyModel::Three($crate::model::Either::First($family), $values) => $body,
-            $crate::python::model::AnyModel::Three($crate::model::Either::Second($family), $values) => $body,
-            $crate::python::model::AnyModel::Four($family, $values) => $body,
-            other => return Err(other.too_much()),
-        }
-    };
-}
-pub(crate) use with_quick_model;
 
 /// The slot of a user's own effect, its formula, its parameters' names, and those of the amplitudes.
 type FormulaSpec = (String, String, Vec<String>, Vec<String>);

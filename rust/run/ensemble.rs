@@ -87,10 +87,6 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
 
     const PACKETS: bool = F::PACKETS && T::STARTS_IN_PACKETS || F::STARTS_IN_PACKETS && T::PACKETS;
 
-    fn in_packets(&self) -> bool {
-        self.ensemble.family.in_packets(T::PACKETS)
-    }
-
     /// As a [trajectory](super::trajectory), so that both share what is compiled.
     fn walk(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
         let Ensemble { family, times, tolerance, .. } = self.ensemble;

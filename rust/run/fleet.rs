@@ -67,14 +67,11 @@ pub trait Fleet: Sync {
     /// What a job yields.
     type Yield: Send;
 
-    /// Whether packets are compiled.
+    /// Whether packets are worth it.
     const PACKETS: bool;
     /// Whether its numbers carry derivatives: packets are then of one register, since those of two leave too few
     /// registers for them.
     const DERIVATIVES: bool = false;
-
-    /// Whether they are worth it.
-    fn in_packets(&self) -> bool;
 
     /// Takes jobs one by one until none is left.
     fn walk(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Self::Yield>) {
@@ -102,7 +99,7 @@ pub struct Crew<'a> {
 /// stopped.
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
     spread(jobs, crew, &|queue, yields| {
-        if T::PACKETS && fleet.in_packets() && jobs > 1 && crew.isa != Isa::Baseline {
+        if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
             return crew.isa.run(InPackets { fleet, queue, yields });
         }
         fleet.walk(queue, yields);

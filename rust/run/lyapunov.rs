@@ -95,10 +95,6 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
     const PACKETS: bool = F::PACKETS && T::PACKETS;
     const DERIVATIVES: bool = true;
 
-    fn in_packets(&self) -> bool {
-        self.orbits.family.in_packets(false)
-    }
-
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Exponents<D, N>>) {
         let LyapunovOptions { time, transient, goal, tolerance } = self.orbits.options;

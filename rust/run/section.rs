@@ -124,10 +124,6 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Collect<'_, F, D, T> 
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
 
-    fn in_packets(&self) -> bool {
-        self.sections.family.in_packets(false)
-    }
-
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Crossings<D>>) {
         let Sections { family, sections, skip, count, bounded, tolerance, .. } = *self.sections;

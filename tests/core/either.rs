@@ -1,7 +1,7 @@
 //! Two models behind one type are what they are by themselves.
 
 use udd::model::effects::{Effect, Kind, Treatment};
-use udd::model::{DiskFamily, DleFamily, Either, Family, OwnFamily, System, sides_of};
+use udd::model::{DiskFamily, Either, Family, OwnFamily, System, sides_of};
 use udd::scalar::{Dual, Scalar, constants};
 
 type Four = Either<DiskFamily, OwnFamily<4>>;
@@ -49,15 +49,4 @@ fn either_is_the_one_that_it_holds() {
     let wide: Vec<Dual<f64, 1>> = constants(&VALUES);
     same(&disk.build(&wide), &first.build(&wide));
     same(&own().build(&wide), &second.build(&wide));
-}
-
-/// Each is taken in packets where it is by itself.
-#[test]
-fn packets_are_for_those_that_want_them() {
-    type Three = Either<DleFamily, OwnFamily<3>>;
-    let names = ["x", "y", "z"].map(str::to_owned);
-    let lorenz = OwnFamily::<3>::parse(&names, &["10*(y-x)", "x*(28-z)-y", "x*y-8/3*z"], &[]).unwrap();
-    let told = |family: &Three| [false, true].map(|starts| family.in_packets(starts));
-    assert_eq!(told(&Three::First(DleFamily)), [true, true]);
-    assert_eq!(told(&Three::Second(lorenz)), [false, true]);
 }
