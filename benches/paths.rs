@@ -16,11 +16,14 @@ use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, S
 use udd::formula::{Expression, Names};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
-use udd::model::{DiskFamily, DleFamily, Family, OwnFamily};
+use udd::model::{DiskFamily, DleFamily, Either, Family, OwnFamily};
 use udd::run::{
     Crew, Ensemble, Lyapunov, LyapunovOptions, Output, Section, Sections, Stepper, Stop, trajectory,
 };
 use udd::scalar::Isa;
+
+/// The disk as the module has it.
+type Four = Either<DiskFamily, OwnFamily<4>>;
 
 /// One piece of work, always the same, on one thread.
 struct Path {
@@ -150,7 +153,7 @@ const DISK: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 fn disk(name: &'static str, effects: &[(Kind, &[f64])], end: u32) -> Path {
     let values: Vec<f64> = DISK.iter().chain(effects.iter().flat_map(|(_, own)| *own)).copied().collect();
     let effects = effects.iter().map(|&(kind, _)| Effect::new(kind)).collect();
-    let system = DiskFamily { effects, edge: true }.build::<f64>(&values);
+    let system = Four::First(DiskFamily { effects, edge: true }).build::<f64>(&values);
     let work = move |_| {
         let times: Vec<f64> = (0..=25 * end).map(|i| 0.04 * f64::from(i)).collect();
         let (x0, tolerance) = ([1.0, 0.01, -0.02, 0.3], tolerance(TIGHT));

@@ -4,7 +4,7 @@ use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 
 use super::rows::{Rows, Squares, add, combine, dot, padded};
 use super::{Columns, EstimateError, Linear, Record};
-use crate::scalar::{Instructions, Isa, Work};
+use crate::scalar::{Instructions, Isa, Real, Work};
 use crate::unroll::vector;
 
 /// The normal equations of the least squares. The right-hand side is the last column of the borders, and of
@@ -48,7 +48,7 @@ impl<const D: usize> Bordered<D> {
         record: &Record<M>,
         precision: &[SVector<f64, D>],
     ) -> Self {
-        Isa::best().run(Assembly { linear, columns, record, precision, room: self })
+        f64::work(Isa::best(), Assembly { linear, columns, record, precision, room: self })
     }
 
     /// The number of parameters.
@@ -66,7 +66,7 @@ impl<const D: usize> Bordered<D> {
 
     /// Eliminates the states.
     pub fn eliminate(self, t: &[f64]) -> Result<Eliminated<D>, EstimateError> {
-        Isa::best().run(Elimination { system: self, t })
+        f64::work(Isa::best(), Elimination { system: self, t })
     }
 }
 
@@ -80,6 +80,7 @@ struct Assembly<'a, const D: usize, const M: usize> {
 
 impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
     type Output = Bordered<D>;
+    const WIDE: bool = D == 4;
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Bordered<D> {
@@ -123,7 +124,7 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                         h_back[k][m] = before.h[m][k] * back;
                     }
                 }
-                squares.push(row, &mut system.corner);
+                squares.push::<V>(row, &mut system.corner);
             }
             let rows = &rows.numbers()[..M * width];
             add_products(&mut system.diagonal[i], &h, &h);
@@ -159,14 +160,14 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                     system.below[i][(k, j)] += w * a[j][k];
                 }
                 add(system.border.row_mut(D * (i + 1) + k), w, row);
-                squares.push(row, &mut system.corner);
+                squares.push::<V>(row, &mut system.corner);
             }
             add_products(&mut system.diagonal[i], &a, &a);
             for j in 0..D {
                 combine(system.border.row_mut(D * i + j), &a[j], &rows.numbers()[..D * width]);
             }
         }
-        squares.flush(&mut system.corner);
+        squares.flush::<V>(&mut system.corner);
         system
     }
 }
@@ -262,6 +263,7 @@ struct Elimination<'a, const D: usize> {
 
 impl<const D: usize> Work for Elimination<'_, D> {
     type Output = Result<Eliminated<D>, EstimateError>;
+    const WIDE: bool = D == 4;
 
     #[inline(always)]
     fn run<V: Instructions>(self) -> Self::Output {
@@ -306,14 +308,14 @@ impl<const D: usize> Work for Elimination<'_, D> {
                 let factors = vector!(f64, D; j => inverse[(k, j)]);
                 row.fill(0.0);
                 combine(row, &factors[..=k], &rest);
-                squares.push(row, &mut corner);
+                squares.push::<V>(row, &mut corner);
             }
             if i + 1 < n {
                 links[i] = times_transposed(&links[i], &inverse);
             }
             pivots[i] = pivot;
         }
-        squares.flush(&mut corner);
+        squares.flush::<V>(&mut corner);
         let explained = all - corner.at(p, p);
         let schur = DMatrix::from_fn(p, p, |i, j| corner.at(i.min(j), i.max(j)));
         let gradient = DVector::from_fn(p, |j, _| corner.at(j, p));
@@ -403,7 +405,7 @@ impl<const D: usize> Eliminated<D> {
                 }
             }
         }
-        Isa::best().run(StateCovariance { of: self, root })
+        Isa::best().run_narrow(StateCovariance { of: self, root })
     }
 }
 
@@ -421,12 +423,12 @@ pub struct Uncertain<const D: usize> {
 impl<const D: usize> Uncertain<D> {
     /// The covariance of each frame's state, the parameters' uncertainty included.
     pub fn covariance(&self) -> Vec<SMatrix<f64, D, D>> {
-        Isa::best().run(FullCovariance(self))
+        Isa::best().run_narrow(FullCovariance(self))
     }
 
     /// The variance of what is seen, given how it changes with each frame's state and with the parameters.
     pub fn seen<const M: usize>(&self, linear: &Linear<D, M>) -> Vec<SVector<f64, M>> {
-        Isa::best().run(SeenVariance { of: self, linear })
+        Isa::best().run_narrow(SeenVariance { of: self, linear })
     }
 }
 

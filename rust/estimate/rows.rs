@@ -3,6 +3,8 @@
 //! Loops run along a row, over numbers that do not depend on each other: they give the same bits with any
 //! instructions.
 
+use crate::scalar::{Instructions, Work, run_with};
+
 /// Rows of the same length, one after the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
@@ -115,19 +117,35 @@ impl Squares {
 
     /// Room for a row, whose square belongs to `sum`.
     #[inline(always)]
-    pub fn push(&mut self, row: &[f64], sum: &mut Rows) {
+    pub fn push<V: Instructions>(&mut self, row: &[f64], sum: &mut Rows) {
         self.rows.row_mut(self.collected).copy_from_slice(row);
         self.collected += 1;
         if self.collected == COLLECTED {
-            self.flush(sum);
+            self.flush::<V>(sum);
         }
     }
 
-    /// Adds what was collected. What lies left of the diagonal is only partly filled.
+    /// Adds what was collected, with these instructions. What lies left of the diagonal is only partly filled.
     #[inline(always)]
-    pub fn flush(&mut self, sum: &mut Rows) {
+    pub fn flush<V: Instructions>(&mut self, sum: &mut Rows) {
+        run_with::<V, _>(Flush { squares: self, sum });
+    }
+}
+
+/// Long, and the same whatever the rows are of: a function for each instruction set.
+struct Flush<'a> {
+    squares: &'a mut Squares,
+    sum: &'a mut Rows,
+}
+
+impl Work for Flush<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        let Self { squares: Squares { rows, collected, sign }, sum } = self;
         let (width, count) = (sum.width(), sum.count());
-        let rows = &self.rows.numbers[..self.collected * width];
+        let rows = &rows.numbers[..*collected * width];
         for first in 0..count.div_ceil(TOGETHER) {
             let first = first * TOGETHER;
             let many = TOGETHER.min(count - first);
@@ -135,7 +153,7 @@ impl Squares {
                 let start = start * CHUNK;
                 if many == TOGETHER && start + CHUNK <= width {
                     let mut sums = [[0.0; CHUNK]; TOGETHER];
-                    for i in 0..self.collected {
+                    for i in 0..*collected {
                         let row = &rows[i * width..(i + 1) * width];
                         let factors: &[f64; TOGETHER] = row[first..].first_chunk().expect("rows of the sum");
                         let chunk: &[f64; CHUNK] = row[start..].first_chunk().expect("a whole chunk");
@@ -146,21 +164,21 @@ impl Squares {
                         }
                     }
                     for j in 0..TOGETHER {
-                        add(&mut sum.row_mut(first + j)[start..start + CHUNK], self.sign, &sums[j]);
+                        add(&mut sum.row_mut(first + j)[start..start + CHUNK], *sign, &sums[j]);
                     }
                     continue;
                 }
                 for j in first..first + many {
                     let end = width.min(start + CHUNK);
                     let to = &mut sum.numbers[j * width..][start..end];
-                    for i in 0..self.collected {
+                    for i in 0..*collected {
                         let row = &rows[i * width..(i + 1) * width];
-                        add(to, self.sign * row[j], &row[start..end]);
+                        add(to, *sign * row[j], &row[start..end]);
                     }
                 }
             }
         }
-        self.collected = 0;
+        *collected = 0;
     }
 }
 

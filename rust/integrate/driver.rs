@@ -380,6 +380,12 @@ where
         progress
     }
 
+    /// The same as a function of its own: over single numbers one copy serves all.
+    #[inline(never)]
+    pub fn trial_apart(&mut self, end: S::Real) -> Progress<S::Mask> {
+        self.trial(end)
+    }
+
     /// Commits the trial where it crosses no target, and deals with the lanes where it does.
     fn on_surfaces(
         &mut self,
@@ -580,7 +586,7 @@ where
     /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
     pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
         loop {
-            let progress = self.trial(end);
+            let progress = self.trial_apart(end);
             if progress.failed {
                 return Err(self.failure());
             }

@@ -10,6 +10,22 @@ use crate::model::{Sides, System};
 use crate::scalar::Scalar;
 use crate::unroll::{unroll, vector};
 
+/// The state whose components are these. Many of them, or those with derivatives, are taken in a loop: unrolled, the
+/// twelve stages of six are the longest functions of all.
+macro_rules! components {
+    ($n:ident => $component:expr) => {
+        if const { D <= 4 && size_of::<S>() == size_of::<S::Real>() } {
+            vector!(S, D; $n => $component)
+        } else {
+            let mut all = [S::zero(); D];
+            for $n in 0..D {
+                all[$n] = $component;
+            }
+            all
+        }
+    };
+}
+
 /// The rates at all stages and the new state of a step of size `h` from time `t` and state `x`, whose
 /// rate is `first`. The last of the stages that make a step is the rate at the new state.
 ///
@@ -41,7 +57,7 @@ fn stage<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P: us
     stages: &[[S; D]; N],
     h: S::Real,
 ) -> [S; D] {
-    vector!(S, D; n => x[n] + combine(&T::TABLEAU.a[i], stages, i, n).times(h))
+    components!(n => x[n] + combine(&T::TABLEAU.a[i], stages, i, n).times(h))
 }
 
 /// `Σ_(j < count) weights_j k_j` for component `n`, the zero weights left out.
@@ -138,11 +154,11 @@ where
     ) -> Trial<S, D> {
         let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
         let count = T::TABLEAU.stages;
-        let error = vector!(S, D; n => combine(&T::TABLEAU.e, &stages, count, n).times(h));
+        let error = components!(n => combine(&T::TABLEAU.e, &stages, count, n).times(h));
         let mut error = norm.of_step(&error, &at.x, &x);
         if let Some(low) = &T::TABLEAU.e_low {
             // Hairer's combination, which behaves as h^8.
-            let low = vector!(S, D; n => combine(low, &stages, count, n).times(h));
+            let low = components!(n => combine(low, &stages, count, n).times(h));
             let (square, low) = (error * error, norm.of_step(&low, &at.x, &x));
             let both = square + (low * low).scale(0.01);
             error = S::Real::select(S::Real::zero().less(both), square / both.sqrt(), error);
@@ -168,7 +184,7 @@ where
     #[inline(always)]
     fn at(&self, dt: S::Real) -> [S; D] {
         let theta = self.theta(dt);
-        vector!(S, D; n => {
+        components!(n => {
             let mut sum = S::zero();
             for j in (0..P).rev() {
                 sum = sum.times(theta) + self.power(j, n, |s| s);
@@ -200,7 +216,7 @@ where
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
         coefficients.push(self.x);
         for j in 0..P {
-            coefficients.push(vector!(S, D; n => self.power(j, n, |s| s).times(self.h)));
+            coefficients.push(components!(n => self.power(j, n, |s| s).times(self.h)));
         }
         self.h
     }

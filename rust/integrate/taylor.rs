@@ -155,6 +155,9 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
         let weights = norm.weights(&at.x);
         let jets = &mut method.jets;
         jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);
+        if const { V::ISA.is_rare() } {
+            return followed(jets, jets.order(), h, norm, &weights);
+        }
         // The usual orders known to the compiler.
         match jets.order() {
             LOW => followed(jets, LOW, h, norm, &weights),

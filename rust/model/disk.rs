@@ -96,7 +96,7 @@ impl<S: Scalar> Disk<S> {
         let mut slots = Slots::default();
         for term in &self.effects {
             if term.momentum == Some(wanted) {
-                term.enter(&lift, at, &mut slots);
+                term.slip(&lift, at, &mut slots);
             }
         }
         slots

@@ -1,6 +1,6 @@
 //! What happened when.
 
-use crate::integrate::{Driver, Ending, Method, Tolerance};
+use crate::integrate::{Ending, Steps};
 use crate::model::System;
 
 /// What an event is.
@@ -21,18 +21,14 @@ pub struct Event<const D: usize> {
 }
 
 impl<const D: usize> Event<D> {
-    /// The event at the end of the driver's last step, if there is one.
-    pub fn seen<M, K>(ending: Ending, driver: &Driver<M, f64, D, Tolerance, K>) -> Option<Self>
-    where
-        M: System<f64, D>,
-        K: Method<f64, D>,
-    {
+    /// The event at the end of the run's last step, if there is one.
+    pub fn seen(ending: Ending, run: &dyn Steps<D>) -> Option<Self> {
         let kind = match ending {
             Ending::Free => return None,
-            Ending::Surface(j) => EventKind::Surface(j, driver.sides()[j]),
+            Ending::Surface(j) => EventKind::Surface(j, run.sides()[j]),
             Ending::Wall => EventKind::Wall,
         };
-        Some(Self { kind, t: driver.t(), x: *driver.x() })
+        Some(Self { kind, t: run.t(), x: *run.x() })
     }
 
     /// Its name, as the model gives it.

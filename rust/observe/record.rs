@@ -1,7 +1,6 @@
 //! A whole run as a piecewise polynomial.
 
-use crate::integrate::{Driver, Method, Tolerance};
-use crate::model::System;
+use crate::integrate::Steps;
 
 /// The polynomials of all steps.
 #[derive(Clone, Debug)]
@@ -21,15 +20,11 @@ impl<const D: usize> Record<D> {
         Self { times: vec![t], pieces: Vec::new(), coefficients: Vec::new(), start: x }
     }
 
-    /// Adds the driver's last step.
-    pub fn push<M, K>(&mut self, driver: &Driver<M, f64, D, Tolerance, K>)
-    where
-        M: System<f64, D>,
-        K: Method<f64, D>,
-    {
-        if driver.size() != 0.0 {
-            self.times.push(driver.t());
-            let unit = driver.method().polynomial(&mut self.coefficients);
+    /// Adds the run's last step.
+    pub fn push(&mut self, run: &dyn Steps<D>) {
+        if run.size() != 0.0 {
+            self.times.push(run.t());
+            let unit = run.polynomial(&mut self.coefficients);
             self.pieces.push((unit, self.coefficients.len()));
         }
     }

@@ -1,7 +1,6 @@
 //! The state at given times, read off the polynomials of the steps.
 
-use crate::integrate::{Driver, Method, Tolerance};
-use crate::model::System;
+use crate::integrate::Steps;
 
 /// Samples at increasing times.
 #[derive(Clone, Debug)]
@@ -21,13 +20,9 @@ impl<'a, const D: usize> Samples<'a, D> {
         Self { times, x: states }
     }
 
-    /// Takes the samples that lie in the driver's last step.
-    pub fn take<M, K>(&mut self, driver: &Driver<M, f64, D, Tolerance, K>)
-    where
-        M: System<f64, D>,
-        K: Method<f64, D>,
-    {
-        let end = driver.t();
+    /// Takes the samples that lie in the run's last step.
+    pub fn take(&mut self, run: &dyn Steps<D>) {
+        let end = run.t();
         if self.times.get(self.x.len()).is_none_or(|&t| t > end) {
             return;
         }
@@ -35,7 +30,7 @@ impl<'a, const D: usize> Samples<'a, D> {
             if t > end {
                 break;
             }
-            let x = if t == end { *driver.x() } else { driver.dense(t - driver.from()) };
+            let x = if t == end { *run.x() } else { run.dense(t - run.from()) };
             self.x.push(x);
         }
     }

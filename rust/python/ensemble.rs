@@ -87,7 +87,7 @@ fn ensemble<'py>(
     }
     let values = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
-    let (table, dimension, signal) = with_wide_model!(&model, |family, _values| {
+    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, _values| {
         let starts = jobs::starts(&starts)?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();

@@ -14,8 +14,8 @@ use crate::estimate::{
     AngleSensor, BASIS, Candidate, DiskCamera, EstimateError, Free, Options, PLACES_PER_LINK, Probe, Role,
     Rows, Score, Sensor, Set,
 };
-use crate::model::Effect;
 use crate::model::effects::Kind;
+use crate::model::{Effect, Either};
 
 /// As [`Data`].
 type DataTuple<'py> = (
@@ -182,7 +182,7 @@ fn score_ripples<'py>(
     diffusion: Vec<f64>,
     frequencies: Vec<f64>,
 ) -> PyResult<Three<'py>> {
-    let AnyModel::Disk(family, values) = AnyModel::to_fit(model)? else {
+    let AnyModel::Four(Either::First(family), values) = AnyModel::to_fit(model)? else {
         return Err(PyValueError::new_err("only a disk has a drive"));
     };
     let highest = frequencies.iter().copied().fold(0.0, f64::max);

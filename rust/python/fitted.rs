@@ -14,7 +14,7 @@ use crate::estimate::{
     Options, Point, Record, Role, Rows, Score, Sensor, Set,
 };
 use crate::integrate::Tolerance;
-use crate::model::{Family, OwnFamily};
+use crate::model::{Either, Family, OwnFamily};
 use crate::run::Stop;
 
 /// A frame's flow is followed much more closely than the model's smallest assumed error.
@@ -158,25 +158,29 @@ pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
 /// The problem that is asked of a model.
 pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
     macro_rules! of {
-        ($Kind:ident, $model:expr) => {{
-            let own = |model| match model {
-                AnyModel::$Kind(family, values) => Some((family, values)),
-                _ => None,
-            };
-            Box::new(problem($model, own, asked)?)
-        }};
+        ($($kind:pat => $told:expr, $problem:expr;)+) => {
+            match model {
+                $($kind => {
+                    let own = |model| match model {
+                        $kind => Some($told),
+                        _ => None,
+                    };
+                    Box::new(problem($problem, own, asked)?) as Box<dyn Fitted>
+                })+
+                AnyModel::Five(Either::Second(_), _) | AnyModel::Six(..) => {
+                    return Err(PyValueError::new_err("a model that is fitted has at most 4 states"));
+                }
+                _ => return Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
+            }
+        };
     }
-    Ok(match model {
-        AnyModel::Disk(family, values) => of!(Disk, (family, &values, DiskCamera)),
-        AnyModel::Pendulum(family, values) => of!(Pendulum, (family, &values, AngleSensor)),
-        AnyModel::Own1(family, values) => of!(Own1, seen_as_it_is(family, &values)),
-        AnyModel::Own2(family, values) => of!(Own2, seen_as_it_is(family, &values)),
-        AnyModel::Own3(family, values) => of!(Own3, seen_as_it_is(family, &values)),
-        AnyModel::Own4(family, values) => of!(Own4, seen_as_it_is(family, &values)),
-        AnyModel::Own5(..) | AnyModel::Own6(..) => {
-            return Err(PyValueError::new_err("a model that is fitted has at most 4 states"));
-        }
-        _ => return Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
+    Ok(of! {
+        AnyModel::Four(Either::First(family), values) => (family, values), (family, &values, DiskCamera);
+        AnyModel::Two(Either::First(family), values) => (family, values), (family, &values, AngleSensor);
+        AnyModel::One(family, values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::Two(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::Three(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::Four(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
     })
 }
 

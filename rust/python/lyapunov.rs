@@ -103,7 +103,7 @@ fn lyapunov<'py>(
     let options = LyapunovOptions { time, transient, goal, tolerance: Tolerance { rtol, atol } };
     let rows = jobs::values(&model, &values)?;
     let jobs = Jobs::new(threads, &progress);
-    let (table, width, dimension, signal) = with_wide_model!(&model, |family, _values| {
+    let (table, width, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
         let starts = jobs::starts(&starts)?;
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
@@ -138,7 +138,7 @@ fn frames<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
     let tolerance = Tolerance { rtol, atol };
-    let (states, growth, covariant, dimension) = with_wide_model!(&model, |family, values| {
+    let (states, growth, covariant, dimension) = with_wide_model!(tangents: &model, |family, values| {
         let x0 = state(&state0)?;
         let found = interrupt::run(py, |stop| follow(family, values, x0, (dt, count), &tolerance, stop))?;
         let flat = found.covariant.as_flattened().as_flattened().to_vec();

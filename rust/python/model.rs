@@ -10,43 +10,40 @@ use super::errors::ModelError;
 use crate::formula::is_reserved;
 use crate::model::effects::{Body, Formula, Kind, Slot, Source, Treatment};
 use crate::model::{
-    Bristled, DiskFamily, DleFamily, Effect, Family, Momentum, OwnFamily, PendulumFamily, System, sides_of,
+    Bristled, DiskFamily, DleFamily, Effect, Either, Family, Momentum, OwnFamily, PendulumFamily, System,
+    sides_of,
 };
 use crate::run::rows::tape;
 
 /// Any model with its parameter values, in the order of its family's parameters.
+///
+/// Models of as many states share what is compiled for that number.
 #[derive(Clone, Debug)]
 pub enum AnyModel {
-    Dle(DleFamily, Vec<f64>),
-    Disk(DiskFamily, Vec<f64>),
-    Pendulum(PendulumFamily, Vec<f64>),
+    One(OwnFamily<1>, Vec<f64>),
+    Two(Either<PendulumFamily, OwnFamily<2>>, Vec<f64>),
+    Three(Either<DleFamily, OwnFamily<3>>, Vec<f64>),
+    Four(Either<DiskFamily, OwnFamily<4>>, Vec<f64>),
     /// With LuGre friction, whose bristles are one more state.
-    BristledDisk(Bristled<DiskFamily>, Vec<f64>),
+    Five(Either<Bristled<DiskFamily>, OwnFamily<5>>, Vec<f64>),
+    Six(OwnFamily<6>, Vec<f64>),
+    /// Apart from the others of three states, whose laws are smooth.
     BristledPendulum(Bristled<PendulumFamily>, Vec<f64>),
-    /// The user's own, by the number of states.
-    Own1(OwnFamily<1>, Vec<f64>),
-    Own2(OwnFamily<2>, Vec<f64>),
-    Own3(OwnFamily<3>, Vec<f64>),
-    Own4(OwnFamily<4>, Vec<f64>),
-    Own5(OwnFamily<5>, Vec<f64>),
-    Own6(OwnFamily<6>, Vec<f64>),
 }
 
-/// Runs the expression with the model's family and values, whatever its dimension.
+/// Runs the expression with the model's family and values, whatever its dimension. The DLE is told apart before: its law
+/// is so short that to ask at every stage of a step which law it is costs a fifth.
 macro_rules! with_model {
     ($model:expr, |$family:ident, $values:ident| $body:expr) => {
         match $model {
-            $crate::python::model::AnyModel::Dle($family, $values) => $body,
-            $crate::python::model::AnyModel::Disk($family, $values) => $body,
-            $crate::python::model::AnyModel::Pendulum($family, $values) => $body,
-            $crate::python::model::AnyModel::BristledDisk($family, $values) => $body,
+            $crate::python::model::AnyModel::One($family, $values) => $body,
+            $crate::python::model::AnyModel::Two($family, $values) => $body,
+            $crate::python::model::AnyModel::Three($crate::model::Either::First($family), $values) => $body,
+            $crate::python::model::AnyModel::Three($crate::model::Either::Second($family), $values) => $body,
+            $crate::python::model::AnyModel::Four($family, $values) => $body,
+            $crate::python::model::AnyModel::Five($family, $values) => $body,
+            $crate::python::model::AnyModel::Six($family, $values) => $body,
             $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
-            $crate::python::model::AnyModel::Own1($family, $values) => $body,
-            $crate::python::model::AnyModel::Own2($family, $values) => $body,
-            $crate::python::model::AnyModel::Own3($family, $values) => $body,
-            $crate::python::model::AnyModel::Own4($family, $values) => $body,
-            $crate::python::model::AnyModel::Own5($family, $values) => $body,
-            $crate::python::model::AnyModel::Own6($family, $values) => $body,
         }
     };
 }
@@ -54,15 +51,27 @@ pub(crate) use with_model;
 
 /// The same for work on packets and tangents, which takes long to compile: not for friction by bristles and
 /// numbers of states that are rarely wanted there.
+///
+/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
+/// own. `starts`, of which own models are taken in packets, too, are compiled for each kind of model.
 macro_rules! with_wide_model {
-    ($model:expr, |$family:ident, $values:ident| $body:expr) => {
+    (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family) Three($family) Four($family))
+    };
+    (packets: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family)
+            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
+            Four($family))
+    };
+    (starts: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body,
+            Two($crate::model::Either::First($family)) Two($crate::model::Either::Second($family))
+            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
+            Four($crate::model::Either::First($family)) Four($crate::model::Either::Second($family)))
+    };
+    (@ $model:expr, $values:ident, $body:expr, $($Kind:ident($held:pat))+) => {
         match $model {
-            $crate::python::model::AnyModel::Dle($family, $values) => $body,
-            $crate::python::model::AnyModel::Disk($family, $values) => $body,
-            $crate::python::model::AnyModel::Pendulum($family, $values) => $body,
-            $crate::python::model::AnyModel::Own2($family, $values) => $body,
-            $crate::python::model::AnyModel::Own3($family, $values) => $body,
-            $crate::python::model::AnyModel::Own4($family, $values) => $body,
+            $($crate::python::model::AnyModel::$Kind($held, $values) => $body,)+
             other => return Err(other.too_much()),
         }
     };
@@ -101,15 +110,17 @@ impl AnyModel {
             able(&effects, Body::Disk)?;
         }
         let model = match kind.as_str() {
-            "dle" => AnyModel::Dle(DleFamily, values),
-            "disk" if bristles => AnyModel::BristledDisk(Bristled(DiskFamily { effects, edge }), values),
-            "disk" => AnyModel::Disk(DiskFamily { effects, edge }, values),
+            "dle" => AnyModel::Three(Either::First(DleFamily), values),
+            "disk" if bristles => {
+                AnyModel::Five(Either::First(Bristled(DiskFamily { effects, edge })), values)
+            }
+            "disk" => AnyModel::Four(Either::First(DiskFamily { effects, edge }), values),
             "pendulum" => {
                 able(&effects, Body::Pendulum)?;
                 let family = PendulumFamily { effects };
                 match bristles {
                     true => AnyModel::BristledPendulum(Bristled(family), values),
-                    false => AnyModel::Pendulum(family, values),
+                    false => AnyModel::Two(Either::First(family), values),
                 }
             }
             "own" => own(&model.getattr("_own")?.extract()?, values)?,
@@ -127,8 +138,10 @@ impl AnyModel {
     pub fn to_fit(model: &Bound<'_, PyAny>) -> PyResult<Self> {
         let model = Self::from_python(model)?;
         let effects: &[Effect] = match &model {
-            AnyModel::Disk(family, _) | AnyModel::BristledDisk(Bristled(family), _) => &family.effects,
-            AnyModel::Pendulum(family, _) | AnyModel::BristledPendulum(Bristled(family), _) => {
+            AnyModel::Four(Either::First(family), _) | AnyModel::Five(Either::First(Bristled(family)), _) => {
+                &family.effects
+            }
+            AnyModel::Two(Either::First(family), _) | AnyModel::BristledPendulum(Bristled(family), _) => {
                 &family.effects
             }
             _ => &[],
@@ -145,17 +158,17 @@ impl AnyModel {
     /// The names of the state's components, and which of them are angles, which may grow without end.
     pub fn states(&self) -> Vec<(String, bool)> {
         let names: &[&str] = match self {
-            AnyModel::Dle(..) => &["omega", "y", "z"],
-            AnyModel::Disk(..) => &["Omega", "Y", "Z", "beta"],
-            AnyModel::Pendulum(..) => &["Omega", "theta"],
-            AnyModel::BristledDisk(..) => &["Omega", "Y", "Z", "beta", "bristle"],
+            AnyModel::Three(Either::First(_), _) => &["omega", "y", "z"],
+            AnyModel::Four(Either::First(_), _) => &["Omega", "Y", "Z", "beta"],
+            AnyModel::Two(Either::First(_), _) => &["Omega", "theta"],
+            AnyModel::Five(Either::First(_), _) => &["Omega", "Y", "Z", "beta", "bristle"],
             AnyModel::BristledPendulum(..) => &["Omega", "theta", "bristle"],
-            AnyModel::Own1(family, _) => return family.states(),
-            AnyModel::Own2(family, _) => return family.states(),
-            AnyModel::Own3(family, _) => return family.states(),
-            AnyModel::Own4(family, _) => return family.states(),
-            AnyModel::Own5(family, _) => return family.states(),
-            AnyModel::Own6(family, _) => return family.states(),
+            AnyModel::One(family, _) => return family.states(),
+            AnyModel::Two(Either::Second(family), _) => return family.states(),
+            AnyModel::Three(Either::Second(family), _) => return family.states(),
+            AnyModel::Four(Either::Second(family), _) => return family.states(),
+            AnyModel::Five(Either::Second(family), _) => return family.states(),
+            AnyModel::Six(family, _) => return family.states(),
         };
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
     }
@@ -163,7 +176,7 @@ impl AnyModel {
     /// Why it is for `udd.simulate` only.
     pub fn too_much(&self) -> PyErr {
         ModelError::new_err(match self {
-            AnyModel::BristledDisk(..) | AnyModel::BristledPendulum(..) => {
+            AnyModel::Five(Either::First(_), _) | AnyModel::BristledPendulum(..) => {
                 "friction with the treatment lugre is for udd.simulate; here take set-valued"
             }
             _ => "a model of your own with 1, 5 or 6 states is for udd.simulate; here it needs 2 to 4",
@@ -198,16 +211,25 @@ fn own((states, equations, parameters, angles): &OwnSpec, values: Vec<f64>) -> P
     }
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     macro_rules! parsed {
-        ($($d:literal $Own:ident),+) => {
+        ($($d:literal $Kind:ident |$family:ident| $held:expr),+) => {
             match states.len() {
-                $($d => OwnFamily::<$d>::parse(states, &texts, parameters)
-                    .map(|family| AnyModel::$Own(family.with_angles(angles), values)),)+
+                $($d => OwnFamily::<$d>::parse(states, &texts, parameters).map(|family| {
+                    let $family = family.with_angles(angles);
+                    AnyModel::$Kind($held, values)
+                }),)+
                 n => return Err(ModelError::new_err(format!("a model has 1 to 6 states, not {n}"))),
             }
         };
     }
-    parsed!(1 Own1, 2 Own2, 3 Own3, 4 Own4, 5 Own5, 6 Own6)
-        .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
+    parsed!(
+        1 One |own| own,
+        2 Two |own| Either::Second(own),
+        3 Three |own| Either::Second(own),
+        4 Four |own| Either::Second(own),
+        5 Five |own| Either::Second(own),
+        6 Six |own| own
+    )
+    .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
 }
 
 /// Refuses effects that this body cannot have.

@@ -146,7 +146,7 @@ fn sections<'py>(
     let (names, angles): (Vec<String>, Vec<bool>) = model.states().into_iter().unzip();
     let rows = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
-    let (table, signal) = with_wide_model!(&model, |family, _values| {
+    let (table, signal) = with_wide_model!(packets: &model, |family, _values| {
         let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
         let pairs = section.iter().zip(&direction);
         let surfaces = pairs.map(|(text, &direction)| parse(text, direction, &names, &parameters));

@@ -38,7 +38,7 @@ fn shoot<'py>(
             "at most {MOST_PARAMETERS} of the parameters can be wanted"
         )));
     }
-    let (flown, dimension) = with_wide_model!(&model, |family, _values| {
+    let (flown, dimension) = with_wide_model!(tangents: &model, |family, _values| {
         let starts = jobs::starts(&starts)?;
         if [rows.len(), t.len(), spans.len()] != [starts.len(); 3] {
             return Err(ModelError::new_err("pieces need as many parameters, times and spans as starts"));
@@ -101,7 +101,7 @@ fn expansion<'py>(
     all: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    let (d, rate, by_state, by_parameter, surfaces, more) = with_wide_model!(&model, |family, values| {
+    let (d, rate, by_state, by_parameter, surfaces, more) = with_wide_model!(tangents: &model, |family, values| {
         let x = state(&x)?;
         let found = linear(family, values, t, &x);
         let more = if all { higher(family, values, t, &x) } else { Default::default() };

@@ -1,12 +1,14 @@
 //! The same model from many states, or with many values of its parameters.
 
+use super::Stop;
 use super::fleet::{Crew, Fleet, Queue, Yields, sail};
 use super::recipe::{ByDop853, ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
-use super::trajectory::Outcome;
-use crate::integrate::{Failure, Tolerance, order};
+use super::trajectory::{Outcome, follow};
+use crate::integrate::{Driver, Failure, Steps, Tolerance, order};
 use crate::model::Family;
+use crate::observe::Samples;
 use crate::scalar::{Isa, Mask, Real, Scalar};
 use crate::unroll::vector;
 
@@ -100,8 +102,22 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Sampled<'_, F, D, T> {
 impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
     type Yield = Passage<D>;
 
-    const PACKETS: bool = F::PACKETS || (F::STARTS_IN_PACKETS && T::PACKETS);
+    const PACKETS: bool = F::PACKETS && T::STARTS_IN_PACKETS || F::STARTS_IN_PACKETS && T::PACKETS;
     const DOUBLE: bool = T::PACKETS;
+
+    /// As a [trajectory](super::trajectory), so that both share what is compiled.
+    fn walk(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
+        let Ensemble { family, times, tolerance, .. } = self.ensemble;
+        while let Some(job) = queue.take() {
+            let Start { values, t, x, end } = self.ensemble.start::<f64>(job);
+            let (system, method) = (family.build(values), self.recipe.make(values.to_vec()));
+            let mut run = Driver::by(method, system, t, x, None, tolerance).with_wall();
+            match passage(&mut run, times, end, queue.stop()) {
+                Some(passage) => yields.push(job, passage),
+                None => return,
+            }
+        }
+    }
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
@@ -161,6 +177,22 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
             }
         }
     }
+}
+
+/// One run, from where it stands; none where it was stopped.
+fn passage<const D: usize>(
+    run: &mut dyn Steps<D>,
+    times: &[f64],
+    end: f64,
+    stop: &Stop,
+) -> Option<Passage<D>> {
+    let mut samples = Samples::new(times, *run.x());
+    let outcome = match follow(run, end, stop, &mut |run, _| samples.take(run)) {
+        Err(Failure::Interrupted) => return None,
+        Ok(Outcome::Chattering) => Err(Failure::Chattering { t: run.t() }),
+        outcome => outcome,
+    };
+    Some(Passage { states: samples.x, t: run.t(), x: *run.x(), outcome })
 }
 
 // Not by an adapter, which would be a function of its own.

@@ -30,6 +30,11 @@ impl Queue<'_> {
         self.share.min(R::LANES)
     }
 
+    /// What asks the work to end.
+    pub fn stop(&self) -> &Stop {
+        self.stop
+    }
+
     /// Whether the work is to end, finished or not.
     pub fn stopped(&self) -> bool {
         self.stop.check().is_err()
@@ -77,6 +82,11 @@ pub trait Fleet: Sync {
     /// Whether packets of two registers of AVX-512 are worth their time to compile.
     const DOUBLE: bool = false;
 
+    /// Takes jobs one by one until none is left.
+    fn walk(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Self::Yield>) {
+        self.sail::<f64>(queue, yields);
+    }
+
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
     /// To be `#[inline(always)]`.
@@ -101,7 +111,7 @@ pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Y
         if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
             return crew.isa.run(InPackets { fleet, queue, yields });
         }
-        fleet.sail::<f64>(queue, yields);
+        fleet.walk(queue, yields);
     })
 }
 

@@ -10,6 +10,8 @@ pub trait Recipe<const D: usize>: Sync {
 
     /// Whether analyses run it in packets: those that fall back to it need not.
     const PACKETS: bool;
+    /// The same for ensembles of families that are taken in packets.
+    const STARTS_IN_PACKETS: bool;
 
     /// The method for systems whose parameters have these values.
     fn make<S: Scalar>(&self, values: Vec<S>) -> Self::Method<S>;
@@ -23,6 +25,7 @@ impl<const D: usize> Recipe<D> for ByDopri5 {
     type Method<S: Scalar> = Dopri5<S, D>;
 
     const PACKETS: bool = false;
+    const STARTS_IN_PACKETS: bool = true;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
         Dopri5::default()
@@ -37,6 +40,8 @@ impl<const D: usize> Recipe<D> for ByDop853 {
     type Method<S: Scalar> = Dop853<S, D>;
 
     const PACKETS: bool = false;
+    // Who wants many runs fast takes another: its twelve stages in packets are not worth their compilation.
+    const STARTS_IN_PACKETS: bool = false;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dop853<S, D> {
         Dop853::default()
@@ -56,6 +61,7 @@ impl<'a, const D: usize> Recipe<D> for ByTaylor<'a, D> {
     type Method<S: Scalar> = Taylor<'a, S, D>;
 
     const PACKETS: bool = true;
+    const STARTS_IN_PACKETS: bool = true;
 
     fn make<S: Scalar>(&self, values: Vec<S>) -> Taylor<'a, S, D> {
         Taylor::new(self.tape, values, self.order, self.isa)

@@ -1,6 +1,6 @@
 //! One run, sampled.
 
-use crate::integrate::{Counts, Driver, Ending, Failure, Method, Tolerance};
+use crate::integrate::{Counts, Driver, Ending, Failure, Method, Steps, Tolerance};
 use crate::model::System;
 use crate::observe::{Event, Record, Samples};
 use crate::run::Stop;
@@ -60,59 +60,76 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     keep: bool,
     stop: &Stop,
 ) -> Result<Run<D>, Failure> {
-    let (times, start, end) = match output {
-        Output::At(times) => match times {
-            [] => (times, 0.0, 0.0),
-            [first, .., last] => (times, *first, *last),
-            [only] => (times, *only, *only),
-        },
-        Output::Steps(start, end) => (&[][..], start, end),
+    let start = match output {
+        Output::At(times) => times.first().copied().unwrap_or(0.0),
+        Output::Steps(start, _) => start,
+    };
+    let mut run = Driver::by(method, system, start, x0, None, tolerance).with_wall();
+    sampled(&mut run, output, keep, stop)
+}
+
+/// Samples a run, from where it stands.
+fn sampled<const D: usize>(
+    run: &mut dyn Steps<D>,
+    output: Output<'_>,
+    keep: bool,
+    stop: &Stop,
+) -> Result<Run<D>, Failure> {
+    let (start, x0) = (run.t(), *run.x());
+    let (times, end) = match output {
+        Output::At(times) => (times, times.last().copied().unwrap_or(start)),
+        Output::Steps(_, end) => (&[][..], end),
     };
     let mut samples = Samples::new(times, x0);
     let mut steps = (vec![start], vec![x0]);
     let mut events = Vec::new();
     let mut record = keep.then(|| Record::new(start, x0));
-    let mut outcome = Outcome::Finished;
-
-    let mut driver = Driver::by(method, system, start, x0, None, tolerance).with_wall();
-    while driver.t() < end {
-        stop.check()?;
-        let ending = match driver.advance(end) {
-            Err(Failure::Chattering { .. }) => {
-                outcome = Outcome::Chattering;
-                Ending::Free
-            }
-            ending => ending?,
-        };
+    let outcome = follow(run, end, stop, &mut |run, ending| {
         if times.is_empty() {
             // Two events can share a time.
-            if driver.t() > steps.0[steps.0.len() - 1] {
-                steps.0.push(driver.t());
-                steps.1.push(*driver.x());
+            if run.t() > steps.0[steps.0.len() - 1] {
+                steps.0.push(run.t());
+                steps.1.push(*run.x());
             }
         } else {
-            samples.take(&driver);
+            samples.take(run);
         }
         if let Some(record) = &mut record {
-            record.push(&driver);
+            record.push(run);
         }
-        events.extend(Event::seen(ending, &driver));
-        if ending == Ending::Wall {
-            outcome = Outcome::Ejected;
-        }
-        if outcome != Outcome::Finished {
-            break;
-        }
-    }
+        events.extend(Event::seen(ending, run));
+    })?;
 
     let (mut t, mut x) = steps;
     if !times.is_empty() {
         t = times[..samples.x.len()].to_vec();
         x = samples.x;
-        if outcome != Outcome::Finished && t.last().is_none_or(|&last| last < driver.t()) {
-            t.push(driver.t());
-            x.push(*driver.x());
+        if outcome != Outcome::Finished && t.last().is_none_or(|&last| last < run.t()) {
+            t.push(run.t());
+            x.push(*run.x());
         }
     }
-    Ok(Run { t, x, events, outcome, counts: driver.counts(), record })
+    Ok(Run { t, x, events, outcome, counts: run.counts(), record })
+}
+
+/// Follows a run to `end`, showing every step.
+pub(super) fn follow<const D: usize>(
+    run: &mut dyn Steps<D>,
+    end: f64,
+    stop: &Stop,
+    see: &mut dyn FnMut(&dyn Steps<D>, Ending),
+) -> Result<Outcome, Failure> {
+    while run.t() < end {
+        stop.check()?;
+        let (ending, outcome) = match run.advance(end) {
+            Err(Failure::Chattering { .. }) => (Ending::Free, Some(Outcome::Chattering)),
+            Ok(Ending::Wall) => (Ending::Wall, Some(Outcome::Ejected)),
+            ending => (ending?, None),
+        };
+        see(run, ending);
+        if let Some(outcome) = outcome {
+            return Ok(outcome);
+        }
+    }
+    Ok(Outcome::Finished)
 }

@@ -57,6 +57,12 @@ pub trait Work {
 }
 
 impl Isa {
+    /// Whether machines that have no more than this are rare, as PCs without AVX2 are: not worth the long programs
+    /// that are faster, each of which takes its time to compile.
+    pub(crate) const fn is_rare(self) -> bool {
+        cfg!(target_arch = "x86_64") && matches!(self, Isa::Baseline)
+    }
+
     /// All that this machine has, the fastest last.
     pub fn available() -> Vec<Isa> {
         let mut list = vec![Isa::Baseline];
@@ -115,9 +121,9 @@ impl Isa {
     }
 }
 
-/// Does work over packets that are made of the instructions `V` with just these.
+/// Does work with the instructions `V`, as a function of its own.
 #[inline(always)]
-pub(super) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
+pub(crate) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if const { matches!(V::ISA, Isa::Avx512) } {

@@ -15,6 +15,7 @@ mod real;
 
 pub use dual::Dual;
 pub use fan::Fan;
+pub(crate) use isa::run_with;
 pub use isa::{Instructions, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
 

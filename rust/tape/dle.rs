@@ -48,8 +48,7 @@ pub(super) fn expand<V: Instructions, S: Scalar, const D: usize, const N: usize>
         }
     }
     let series = &mut Series::of(work, x, held[0], None);
-    // A PC without AVX2 is rare, and every copy takes its time to compile.
-    if const { worthwhile::<S, N>() && !(cfg!(target_arch = "x86_64") && matches!(V::ISA, Isa::Baseline)) } {
+    if const { worthwhile::<S, N>() && !V::ISA.is_rare() } {
         match order {
             LOW => return unrolled::<_, N, LOW>(series, |_, _, _| {}),
             HIGH => return unrolled::<_, N, HIGH>(series, |_, _, _| {}),

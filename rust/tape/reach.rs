@@ -46,7 +46,16 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
     #[inline(always)]
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
-        vector!(S, D; n => value(&self.coefficients()[n], order, dt, |c| c))
+        let series = self.coefficients();
+        if const { size_of::<S>() == size_of::<S::Real>() } {
+            return vector!(S, D; n => value(&series[n], order, dt, |c| c));
+        }
+        // Derivatives fill the registers: one component after the other.
+        let mut x = [S::zero(); D];
+        for n in 0..D {
+            x[n] = value(&series[n], order, dt, |c| c);
+        }
+        x
     }
 
     #[inline(always)]
@@ -156,7 +165,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
     fn run<V: Instructions>(self) -> [[S::Real; D]; P] {
         let Self(jets, dt, parts, of) = self;
         let mut states = [[S::Real::zero(); D]; P];
-        if const { S::Real::LANES == 1 } {
+        if const { S::Real::LANES == 1 && !V::ISA.is_rare() } {
             // One trajectory: the places side by side, as vector instructions want it.
             let part = |i: usize| parts.get(i).copied().unwrap_or_default();
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));

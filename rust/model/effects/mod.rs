@@ -248,6 +248,17 @@ macro_rules! library {
             fn enter<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
                 match self { $(Kind::$Name => enter::<$Name, S>(p, at, slots)),+ }
             }
+
+            /// The same for what moves the contact alone; the others are not compiled.
+            fn slip<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+                match self {
+                    $(Kind::$Name => {
+                        if const { !$Name::SPEC.momenta.is_empty() } {
+                            enter::<$Name, S>(p, at, slots);
+                        }
+                    }),+
+                }
+            }
         }
     };
 }

@@ -133,6 +133,17 @@ impl<S: Scalar> Term<S> {
         }
     }
 
+    /// The same of an effect that moves the contact.
+    #[inline]
+    pub fn slip<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
+        match &self.law {
+            Law::Library(kind, values) => {
+                kind.slip(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
+            }
+            Law::Formula(formula, values) => formula.enter(values, lift, at, slots),
+        }
+    }
+
     /// Whether it holds a body at rest.
     pub fn sticks(&self) -> bool {
         matches!(self.treatment, Treatment::SetValued | Treatment::Karnopp)

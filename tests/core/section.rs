@@ -1,10 +1,8 @@
 //! Sections: crossings of surfaces along trajectories, and the formulas that surfaces are given by.
 
-mod counting;
-
 use std::sync::atomic::AtomicUsize;
 
-use counting::allocations;
+use crate::counting::allocations;
 use udd::formula::{Expression, Names, Place};
 use udd::integrate::{Dopri5, Driver, Taylor, Tolerance};
 use udd::model::{DiskFamily, DleFamily, Family};

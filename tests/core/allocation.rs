@@ -1,8 +1,6 @@
 //! Nothing is allocated inside the step loop. For whole runs see `fleet.rs`.
 
-mod counting;
-
-use counting::allocations;
+use crate::counting::allocations;
 use udd::integrate::{Dopri5, Driver, Ending, Method, Taylor, Tolerance};
 use udd::model::effects::{Effect, Kind, Treatment};
 use udd::model::{DiskFamily, DleFamily, Family, System};

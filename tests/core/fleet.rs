@@ -1,10 +1,8 @@
 //! Many runs: the same bits however they are spread, the right numbers, and no allocation as they go on.
 
-mod counting;
-
 use std::sync::atomic::AtomicUsize;
 
-use counting::allocations;
+use crate::counting::allocations;
 use udd::integrate::Tolerance;
 use udd::model::effects::Kind;
 use udd::model::{DiskFamily, DleFamily, Effect, Family};

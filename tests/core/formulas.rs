@@ -1,11 +1,9 @@
 //! Effects and models that are given as text: they compute what the compiled ones do.
 
-mod counting;
-
 use std::array::from_fn;
 use std::sync::Arc;
 
-use counting::allocations;
+use crate::counting::allocations;
 use proptest::prelude::*;
 use udd::formula::Mistake;
 use udd::model::effects::{Formula, Kind, Slot};

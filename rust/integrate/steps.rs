@@ -1,0 +1,56 @@
+//! A single run, whatever its model and its method.
+
+use super::driver::{Counts, Driver, Ending};
+use super::method::Method;
+use super::tolerance::{ErrorNorm, Failure};
+use crate::model::{Sides, System};
+
+/// A [`Driver`] over plain numbers, its model and its method forgotten: what looks at every step of a run is then
+/// compiled once for each number of states. See the driver's methods of the same names.
+pub trait Steps<const D: usize> {
+    fn advance(&mut self, end: f64) -> Result<Ending, Failure>;
+    fn t(&self) -> f64;
+    fn x(&self) -> &[f64; D];
+    fn sides(&self) -> &Sides<f64>;
+    fn from(&self) -> f64;
+    fn size(&self) -> f64;
+    fn dense(&self, dt: f64) -> [f64; D];
+    fn counts(&self) -> Counts;
+    /// The last trial's polynomial, as [`Method::polynomial`].
+    fn polynomial(&self, coefficients: &mut Vec<[f64; D]>) -> f64;
+}
+
+impl<M, E, K, const D: usize> Steps<D> for Driver<M, f64, D, E, K>
+where
+    M: System<f64, D>,
+    E: ErrorNorm<f64, D> + Copy,
+    K: Method<f64, D>,
+{
+    fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
+        self.advance(end)
+    }
+    fn t(&self) -> f64 {
+        self.t()
+    }
+    fn x(&self) -> &[f64; D] {
+        self.x()
+    }
+    fn sides(&self) -> &Sides<f64> {
+        self.sides()
+    }
+    fn from(&self) -> f64 {
+        self.from()
+    }
+    fn size(&self) -> f64 {
+        self.size()
+    }
+    fn dense(&self, dt: f64) -> [f64; D] {
+        self.dense(dt)
+    }
+    fn counts(&self) -> Counts {
+        self.counts()
+    }
+    fn polynomial(&self, coefficients: &mut Vec<[f64; D]>) -> f64 {
+        self.method().polynomial(coefficients)
+    }
+}

@@ -1,0 +1,88 @@
+//! One of two models of the same dimension.
+
+use super::{Family, Parameter, Sides, System};
+use crate::scalar::Scalar;
+
+/// A model of one kind or of another, told apart when the program runs.
+///
+/// What is done with models is compiled once for each: two that share an `Either` share it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Either<A, B> {
+    First(A),
+    Second(B),
+}
+
+/// Asks the one that there is.
+macro_rules! ask {
+    ($either:expr, $model:ident => $answer:expr) => {
+        match $either {
+            Either::First($model) => $answer,
+            Either::Second($model) => $answer,
+        }
+    };
+}
+
+impl<A, B, S, const D: usize> System<S, D> for Either<A, B>
+where
+    S: Scalar,
+    A: System<S, D>,
+    B: System<S, D>,
+{
+    const SMOOTH: bool = A::SMOOTH && B::SMOOTH;
+
+    #[inline(always)]
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        ask!(self, model => model.rates(t, x, sides))
+    }
+    #[inline(always)]
+    fn surfaces(&self) -> usize {
+        ask!(self, model => model.surfaces())
+    }
+    #[inline(always)]
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        ask!(self, model => model.surface(j, t, x, sides))
+    }
+    #[inline(always)]
+    fn watched(&self) -> [bool; D] {
+        ask!(self, model => model.watched())
+    }
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        ask!(self, model => model.surface_name(j, side))
+    }
+    #[inline(always)]
+    fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
+        ask!(self, model => model.settle(t, x, sides));
+    }
+    #[inline(always)]
+    fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        ask!(self, model => model.switch(j, t, x, sides, here));
+    }
+    #[inline(always)]
+    fn jumps(&self, j: usize) -> bool {
+        ask!(self, model => model.jumps(j))
+    }
+    #[inline(always)]
+    fn wall(&self, x: &[S; D]) -> Option<S> {
+        ask!(self, model => model.wall(x))
+    }
+}
+
+impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
+    type Built<S: Scalar> = Either<A::Built<S>, B::Built<S>>;
+
+    // What one is worth in packets is not worth compiling the other for them.
+    const PACKETS: bool = A::PACKETS && B::PACKETS;
+    const STARTS_IN_PACKETS: bool = A::STARTS_IN_PACKETS && B::STARTS_IN_PACKETS;
+
+    fn parameters(&self) -> Vec<Parameter> {
+        ask!(self, family => family.parameters())
+    }
+
+    #[inline]
+    fn build<S: Scalar>(&self, values: &[S]) -> Either<A::Built<S>, B::Built<S>> {
+        match self {
+            Either::First(family) => Either::First(family.build(values)),
+            Either::Second(family) => Either::Second(family.build(values)),
+        }
+    }
+}

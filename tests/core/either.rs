@@ -1,0 +1,52 @@
+//! Two models behind one type are what they are by themselves.
+
+use udd::model::effects::{Effect, Kind, Treatment};
+use udd::model::{DiskFamily, Either, Family, OwnFamily, System, sides_of};
+use udd::scalar::{Dual, Scalar, constants};
+
+type Four = Either<DiskFamily, OwnFamily<4>>;
+
+const VALUES: [f64; 8] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055, 0.003, 0.05];
+
+fn own() -> OwnFamily<4> {
+    let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+    let equations = ["b-a*d", "c*t", "d-k1*a", "k2*k3*a"];
+    let parameters = names(&["k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8"]);
+    OwnFamily::parse(&names(&["a", "b", "c", "d"]), &equations, &parameters).unwrap()
+}
+
+/// Compares all that a system says at a state, on both sides of every surface.
+fn same<S: Scalar<Real = f64, Mask = bool> + PartialEq>(one: &impl System<S, 4>, other: &impl System<S, 4>) {
+    let (t, x): (S, [S; 4]) = (S::constant(0.7), [-0.8, 0.01, -0.02, 0.3].map(S::constant));
+    let sides = sides_of(one, t, &x);
+    assert!(sides == sides_of(other, t, &x));
+    assert_eq!((one.surfaces(), one.watched()), (other.surfaces(), other.watched()));
+    assert!(one.wall(&x) == other.wall(&x));
+    assert!(one.rates(t, &x, &sides) == other.rates(t, &x, &sides));
+    for j in 0..one.surfaces() {
+        assert!(one.surface(j, t, &x, &sides) == other.surface(j, t, &x, &sides));
+        assert_eq!(one.jumps(j), other.jumps(j));
+        let (mut a, mut b) = ((x, sides), (x, sides));
+        one.switch(j, t, &mut a.0, &mut a.1, true);
+        other.switch(j, t, &mut b.0, &mut b.1, true);
+        assert!(a == b, "surface {j}");
+        for side in [false, true] {
+            assert_eq!(one.surface_name(j, side), other.surface_name(j, side));
+        }
+        assert!(one.rates(t, &x, &a.1) == other.rates(t, &x, &b.1));
+    }
+}
+
+#[test]
+fn either_is_the_one_that_it_holds() {
+    let friction = Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued);
+    let disk = DiskFamily { effects: vec![friction], edge: true };
+    let (first, second) = (Four::First(disk.clone()), Four::Second(own()));
+    assert_eq!(first.parameters(), disk.parameters());
+    assert_eq!(second.parameters(), own().parameters());
+    same::<f64>(&disk.build(&VALUES), &first.build(&VALUES));
+    same::<f64>(&own().build(&VALUES), &second.build(&VALUES));
+    let wide: Vec<Dual<f64, 1>> = constants(&VALUES);
+    same(&disk.build(&wide), &first.build(&wide));
+    same(&own().build(&wide), &second.build(&wide));
+}
