@@ -173,15 +173,17 @@ def test_cycles_are_born_at_the_hopf_bifurcation(rotation: udd.Branch) -> None:
     assert spread[5] / spread[0] == pytest.approx(math.sqrt(distance[5] / distance[0]), rel=0.02)
 
 
-def test_a_branch_of_the_disk_goes_through_its_folds() -> None:
-    disk = udd.Disk(0.004)
-    start = next(rest for rest in udd.equilibria(disk) if 1.2 < rest.state[0] < 1.65)
+# The three rotating states at W = 0.0045: one on each side of the kink's and of the smooth fold.
+@pytest.mark.parametrize(("low", "high"), [(0.5, 1.2), (1.2, 1.65), (1.66, 3.0)])
+def test_a_branch_of_the_disk_goes_through_its_folds(low: float, high: float) -> None:
+    disk = udd.Disk(0.0045)
+    start = next(rest for rest in udd.equilibria(disk) if low < rest.state[0] < high)
     branch = udd.continuation(start, "W", (0.0005, 0.05))
     kinds = {point.kind: point.value for point in branch.points}
     # k(Omega) Omega^2 = g W has its maximum at Omega = 2 k1/(3 k2), its minimum at the kink.
     top, kink = 2 * 0.103 / (3 * 0.055), (0.103 - 0.012) / 0.055
     assert kinds["fold"] == pytest.approx((0.103 - 0.055 * top) * top**2 / 9.81, abs=1e-12)
-    assert kinds["fold at a kink"] == pytest.approx(0.012 * kink**2 / 9.81, abs=1e-12)
+    assert kinds["nonsmooth fold"] == pytest.approx(0.012 * kink**2 / 9.81, abs=1e-12)
     assert sorted([branch.values[0], branch.values[-1]]) == pytest.approx([0.0005, 0.05])
 
 

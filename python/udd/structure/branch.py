@@ -30,9 +30,9 @@ class BifurcationPoint:
     Attributes
     ----------
     kind : str
-        Of equilibria and cycles: "fold", "branch point", "kink" (an equilibrium on a surface where the law
-        changes) and "fold at a kink"; of equilibria: "Hopf"; of cycles: "symmetry breaking",
-        "period doubling", "Neimark-Sacker".
+        Of equilibria and cycles: "fold", "branch point"; of equilibria: "Hopf", "border collision" (on a
+        surface where the law changes, the branch goes on) and "nonsmooth fold" (there, it turns back); of
+        cycles: "symmetry breaking", "period doubling", "Neimark-Sacker".
     parameter : str
     value : float
         The parameter's value.

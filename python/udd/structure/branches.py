@@ -82,8 +82,11 @@ def continuation(
     method in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of
     pairs of multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method
     along the arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its
-    period, where losing the symmetry is a multiplier -1. Where an equilibrium meets a surface on which the
-    law has a kink, the branch lands on it and goes on with the other law's tangent.
+    period, where losing the symmetry is a multiplier -1. Multipliers come from a periodic Schur decomposition
+    of the pieces' derivatives, so that weak ones are right beside strong ones; where rounding leaves their
+    sign open, or their product is not that of Liouville's formula, no bifurcation is told. Where an
+    equilibrium meets a surface on which the law has a kink (a border collision), the branch lands on it, from
+    whichever side, and goes on with the other law's tangent.
 
     Examples
     --------

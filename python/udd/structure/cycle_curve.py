@@ -29,6 +29,15 @@ def _pattern(m: int, r: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.concatenate(rows), np.concatenate(columns)
 
 
+def _planes(rates: Floats) -> Floats:
+    """Orthonormal bases (m, r, r - 1) of the planes across these rates (m, r)."""
+    m, r = rates.shape
+    stacked = np.concatenate([rates[:, :, None], np.broadcast_to(np.eye(r), (m, r, r))], axis=2)
+    # The first vector of each basis is along the flow, which the pieces take to one another.
+    bases, _ = np.linalg.qr(stacked)
+    return bases[:, :, 1:]
+
+
 @dataclass(eq=False)
 class CycleCurve:
     """Scaled nodes of an orbit that closes after the time `span`, and that time, and the parameter.
@@ -165,13 +174,17 @@ class CycleCurve:
             product = matrix @ product
         return self.mirror[:, None] * product
 
-    def across_flow(self, u: Floats) -> Floats:
-        """The same (r - 1, r - 1) across the flow, in scaled coordinates: what multipliers come from."""
-        size = self.flow.size
-        scaled = self.closing(u) * size / size[:, None]
-        rate = self.rate_at(self.values_at(u), self.nodes(u)[0]) / size
-        # An orthonormal basis whose first vector is along the flow, which the map leaves as it is.
-        basis, _ = np.linalg.qr(np.column_stack([rate, np.eye(self.flow.dim)]))
-        rest = basis[:, 1:]
-        result: Floats = rest.T @ scaled @ rest
-        return result
+    def factors_across(self, u: Floats) -> Floats:
+        """The pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
+
+        Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
+        """
+        size, found = self.flow.size, self.flight(u)
+        turn = np.ones((self.pieces, self.flow.dim))
+        turn[-1] = self.mirror
+        scaled = found.by_state * turn[:, :, None] * size / size[:, None]
+        # Where one piece ends the next begins, in the same plane.
+        after = _planes(found.rate * turn / size)
+        before = np.roll(after, 1, axis=0)
+        factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before
+        return np.ascontiguousarray(factors)

@@ -26,6 +26,7 @@ __all__ = ["Limits", "Way", "follow", "solution_at", "solutions_at"]
 
 _WATCHED = 6  # points in which a branch shows that it comes to a connection,
 _CONVERGED = 1e-11  # by this relative change of its parameter
+_GROWN = 1.005  # while the period grows by this factor
 _ASIDE = 1e-9  # from a corner, in scaled unknowns
 _SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
 
@@ -246,7 +247,7 @@ def _connection(way: Way) -> float | None:
     values = [curve.value(u) for curve, u in last]
     spans = [curve.span(u) for curve, u in last]
     still = max(values) - min(values) < _CONVERGED * max(abs(value) for value in values)
-    growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > 1.05 * spans[0]
+    growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > _GROWN * spans[0]
     return values[-1] if still and growing else None
 
 
@@ -282,6 +283,6 @@ def _round(
     if not limits.low <= value <= limits.high:
         way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
         return here, before, arclength
-    kind = "fold at a kink" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "kink"
+    kind = "nonsmooth fold" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "border collision"
     _note(curve, arriving, at, kind, rounding_of(value), way, limits, arclength)
     return leaving, after, arclength

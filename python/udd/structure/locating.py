@@ -8,6 +8,7 @@ from scipy import optimize
 from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
 from .flow import Floats
+from .multipliers import as_liouville
 from .path import Lost, Place, correct, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs, signs_at
@@ -38,11 +39,12 @@ def found_between(
     `a` is followed by a point at the distance `step`, where the functions are `after`.
     """
     changed = changes(before, after)
-    rest = isinstance(curve, RestCurve)
     found = []
     for name in changed:
         if name == "plus" and "fold" in changed:
             continue
+        if name == "fold" and np.isnan([before.plus, after.plus]).any():
+            continue  # not decided: towards a connection the parameter stands still, but for rounding
         if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
             continue
         try:
@@ -54,6 +56,8 @@ def found_between(
         except (Lost, ValueError):
             continue
         here = signs_at(curve, place)
+        if isinstance(curve, CycleCurve) and not as_liouville(curve, place.u):
+            continue
         if name == "fold":
             kind = "fold"
         elif name == "plus":
@@ -64,9 +68,9 @@ def found_between(
             kind = "symmetry breaking" if symmetric else "period doubling"
         else:
             pair = here.pair
-            if rest and abs(pair.imag) * curve.flow.clock > _TURNING and _on_axis(pair):
+            if isinstance(curve, RestCurve) and abs(pair.imag) * curve.flow.clock > _TURNING and _on_axis(pair):
                 kind = "Hopf"
-            elif not rest and abs(np.angle(pair)) > _TURNING and abs(abs(pair) - 1.0) < 1e-5:
+            elif isinstance(curve, CycleCurve) and abs(np.angle(pair)) > _TURNING and abs(abs(pair) - 1.0) < 1e-5:
                 kind = "Neimark-Sacker"
             else:
                 continue  # two real ones: a neutral saddle

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from udd.trajectory import simulate
 
 from .cycle_curve import CycleCurve
 from .flow import Floats, Flow, flow_of
+from .multipliers import multipliers_at
 from .path import Lost, along_parameter, correct
 from .solutions import PeriodicOrbit
 
@@ -25,6 +27,8 @@ _FINE = 64  # states looked at in a typical time
 _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
 _SAME = 1e-7  # two states within this part of the sizes are one
 _HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
+_PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
+_WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
 _RESIDUAL = 1e-9  # gaps that are as good as none
 
 
@@ -119,7 +123,7 @@ def pieces_for(flow: Flow, span: float) -> int:
 def cycle_at(curve: CycleCurve, u: Floats) -> PeriodicOrbit:
     """The cycle that solves a curve's equations."""
     flow, values = curve.flow, curve.values_at(u)
-    multipliers = np.linalg.eigvals(curve.across_flow(u)).astype(complex)
+    multipliers = multipliers_at(curve, u).values
     if curve.symmetric:
         multipliers = multipliers**2
     multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
@@ -186,23 +190,29 @@ def closes_earlier(curve: CycleCurve, u: Floats) -> str:
 def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
     """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
     flow, values = curve.flow, curve.values_at(u)
-    plain = np.ones(flow.dim)
-    span, start = curve.span(u), curve.nodes(u)[0]
-    ways = [(k, plain) for k in (2, 3, 5, 7)]
-    if flow.mirror is not None:
-        ways = [*ways, (2, flow.mirror), (3, flow.mirror)]
-    if curve.symmetric:
-        # A third of a half, seen in the mirror: what is symmetric closes after odd parts only.
-        ways = [(k, curve.mirror) for k in (3, 5, 7)]
-    for parts, mirror in ways:
-        share = span / parts
-        pieces = pieces_for(flow, share)
-        nodes = flown(flow, values, start, share, pieces)
-        gap = mirror * nodes[-1] - start
+    span, start, plain = curve.span(u), curve.nodes(u)[0], np.ones(flow.dim)
+    # What is symmetric closes after odd parts only, seen in the mirror.
+    ways = [(k, curve.mirror) for k in _PRIMES if k > 2 or not curve.symmetric]
+    if flow.mirror is not None and not curve.symmetric:
+        ways.append((2, flow.mirror))
+    ways.sort(key=lambda way: -way[0])
+    times = np.array([0.0, *(span / k for k, _ in ways)])
+    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"}
+    distinct, place = np.unique(times, return_inverse=True)
+    run = simulate(flow.with_values(values), distinct, flow.full(start), **options)
+    ends = flow.reduced(run.state)[place]
+    extent = (np.ptp(curve.nodes(u), axis=0) / flow.size).max()
+    for (parts, mirror), end in zip(ways, ends[1:], strict=True):
+        gap = mirror * end - start
         shift = flow.turns(gap)
-        if np.abs((gap + shift) / flow.size).max() < _SAME:
-            found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
-            return _simplest(*found)
+        if np.abs((gap + shift) / flow.size).max() > _SAME:
+            continue
+        share = span / parts
+        nodes = flown(flow, values, start, share, pieces_for(flow, share))
+        if (np.ptp(nodes, axis=0) / flow.size).max() < _WHOLE * extent:
+            continue  # it has hardly left its start, where it is slow
+        found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
+        return _simplest(*found)
     return curve, u
 
 
