@@ -9,11 +9,13 @@ from typing import Literal
 import numpy as np
 
 from udd._validate import whole
-from udd.errors import ModelError
+from udd.errors import IntegrationError, ModelError
 
 from .branch import BifurcationPoint, Branch
-from .branches import continuation
+from .branches import bounds_of, continuation
+from .doublings import next_doubling
 from .flow import Floats
+from .path import Lost
 from .solutions import PeriodicOrbit
 
 __all__ = ["Cascade", "cascade"]
@@ -22,6 +24,7 @@ _KIND = "period doubling"
 _CLOSER = (
     2.5  # by about so much the doubled orbits differ less from one doubling to the next (Feigenbaum's alpha)
 )
+_KNOWN = 3  # doublings, whose spacings say where the next one is
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +120,7 @@ def cascade(
     [5.394713, 5.086062, 5.02182]
     """
     n = whole("n", n, 1)
+    low, high = bounds_of(bounds)
     points: list[BifurcationPoint] = []
     branches: list[Branch] = []
     if isinstance(start, BifurcationPoint) and start.kind == _KIND:
@@ -127,15 +131,7 @@ def cascade(
             branch = continuation(start, parameter, bounds, direction=direction, until=_KIND)
         else:
             closer *= _CLOSER
-            branch = continuation(
-                points[-1],
-                bounds=bounds,
-                until=_KIND,
-                period=4.0 * points[-1].period,
-                step=0.01 / closer,
-                longest=0.05 / closer,
-                amplitude=0.01 / closer,
-            )
+            branch = _next(points, (low, high), closer)
         found = branch.find(_KIND)
         if not found:
             last = f"after that at {points[-1].value:.10g}" if points else "from the start"
@@ -145,3 +141,25 @@ def cascade(
         branches.append(branch)
         points.append(found[0])
     return Cascade(points[0].parameter, tuple(points), tuple(branches))
+
+
+def _next(points: list[BifurcationPoint], bounds: tuple[float, float], closer: float) -> Branch:
+    """The branch born at the last doubling, up to the doubling of its own."""
+    if len(points) >= _KNOWN:
+        a, b, c = (point.value for point in points[-3:])
+        ahead = (c - b) ** 2 / (b - a)
+        try:
+            branch = next_doubling(points[-1], ahead, 0.01 / closer)
+            if bounds[0] <= branch.values[-1] <= bounds[1]:
+                return branch
+        except (Lost, IntegrationError):
+            pass  # step by step, then
+    return continuation(
+        points[-1],
+        bounds=bounds,
+        until=_KIND,
+        period=4.0 * points[-1].period,
+        step=0.01 / closer,
+        longest=0.05 / closer,
+        amplitude=0.01 / closer,
+    )

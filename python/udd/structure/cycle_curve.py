@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import sparse
 
+from .condensing import CyclicEquations
 from .flow import Flight, Floats, Flow
 from .path import _DENSE
 
 __all__ = ["CycleCurve"]
-
-
-@lru_cache(maxsize=16)
-def _pattern(m: int, r: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows and columns of the matrix of the equations.
-
-    In this order: the pieces' derivatives, the nodes after them, the span, the parameter, and the phase.
-    """
-    n = m * r
-    own, each = np.arange(n), np.arange(n).reshape(m, r)
-    rows = [np.repeat(own, r), own, own, own, np.full(r, n)]
-    after = np.roll(each, -1, axis=0).ravel()
-    columns = [np.repeat(each, r, axis=0).ravel(), after, np.full(n, n), np.full(n, n + 1), np.arange(r)]
-    return np.concatenate(rows), np.concatenate(columns)
 
 
 def _planes(rates: Floats) -> Floats:
@@ -137,7 +121,7 @@ class CycleCurve:
             self.seen = u.copy(), found
         return self.seen[1]
 
-    def equations(self, u: Floats) -> tuple[Floats, Floats | sparse.csr_array]:
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
         """Scaled gaps between the pieces and the phase, and their derivatives."""
         m, r, size = self.pieces, self.flow.dim, self.flow.size
         weight = 1.0 / np.sqrt(m)
@@ -162,10 +146,8 @@ class CycleCurve:
             dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
             dense[n, :r] = self.across * size / weight
             return residual, dense
-        minus = np.full(n, -1.0 / weight)
-        row = self.across * size / weight
-        data = np.concatenate([by_state.ravel(), minus, by_span.ravel(), by_value.ravel(), row])
-        return residual, sparse.csr_array((data, _pattern(m, r)), shape=(n + 1, n + 2))
+        both = np.stack([by_span, by_value], axis=2)
+        return residual, CyclicEquations(by_state, 1.0 / weight, both, self.across * size / weight)
 
     def closing(self, u: Floats) -> Floats:
         """The derivative (r, r) of the map from the first node to where the orbit closes."""

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from udd.errors import IntegrationError
 
+from .condensing import CyclicEquations
 from .flow import Floats
 
 __all__ = ["Curve", "Lost", "Place", "advance", "along_parameter", "correct", "tangent_at"]
@@ -31,7 +30,7 @@ class Lost(Exception):
 class Curve(Protocol):
     """`n` equations for `n + 1` scaled unknowns."""
 
-    def equations(self, u: Floats) -> tuple[Floats, Floats | sparse.csr_array]:
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
         """Residuals (n,) and their derivatives (n, n + 1)."""
         ...
 
@@ -44,22 +43,20 @@ class Place:
     tangent: Floats
 
 
-def solve(matrix: Floats | sparse.csr_array, row: Floats, right: Floats) -> Floats:
+def solve(matrix: Floats | CyclicEquations, row: Floats, right: Floats) -> Floats:
     """The solution of the equations below which one more row stands."""
-    result: Floats
     if isinstance(matrix, np.ndarray):
+        result: Floats
         full = np.vstack([matrix, row])
         try:
             result = np.linalg.solve(full, right)
         except np.linalg.LinAlgError:
             result = np.linalg.lstsq(full, right, rcond=None)[0]
         return result
-    square = sparse.vstack([matrix, sparse.csr_array(row[np.newaxis])], format="csc")
     try:
-        result = splu(square).solve(right)
-    except RuntimeError:
+        return matrix.solve(row, right)
+    except np.linalg.LinAlgError:
         raise Lost("the equations are singular") from None
-    return result
 
 
 def along_parameter(u: Floats) -> Floats:

@@ -15,7 +15,7 @@ from .orbits import pieces_for
 from .path import Lost, Place, correct, tangent_at
 from .rest_curve import RestCurve, expansion
 
-__all__ = ["born_at"]
+__all__ = ["born_at", "doubled"]
 
 
 def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place]:
@@ -33,7 +33,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place]
     made: tuple[AnyCurve, Floats, Floats]
     for size in amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03]):
         if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, CycleCurve):
-            made = _doubled(curve, place)
+            made = doubled(curve, place)
         elif point.kind == "Hopf" and isinstance(curve, RestCurve):
             made = _from_rest(curve, place)
         elif point.kind == "branch point":
@@ -51,7 +51,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place]
     raise ModelError(f"the branch born at the {point.kind} is not found: try another amplitude")
 
 
-def _doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats]:
+def doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats]:
     """Twice the time, and the direction in which the two rounds differ."""
     u, m = place.u, curve.pieces
     values, vectors = np.linalg.eig(curve.closing(u))
