@@ -142,6 +142,69 @@ def test_the_asymmetric_pair_doubles_and_doubles(figure_eight: udd.Branch) -> No
     assert found.branches[0].ends[0] == "born at a symmetry breaking"
 
 
+def test_a_cascade_to_the_sixth_digit_of_feigenbaums_constant() -> None:
+    # Ten doublings: cycles of 1024 rounds, some 6000 pieces.
+    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=10)
+    # The last spacing, 1.3e-6, is known to 1e-12 or so.
+    assert found.ratios[-1] == pytest.approx(4.669201609, abs=1e-5)
+    # The doublings of the branch followed step by step, of another run.
+    assert found.values[5] == pytest.approx(5.0045538093, abs=1e-10)
+    assert all(branch.ends[0] == "born at a period doubling" for branch in found.branches[1:])
+
+
+def test_a_step_off_a_bifurcation_does_not_jump_over_the_next() -> None:
+    # A window of the DLE 3e-5 wide, in which the cycle of 22 section points loses its symmetry and doubles.
+    state = [0.6415522621501002, -4.139594982525741, 7.896287533019794e-18]
+    orbit = udd.periodic_orbit(udd.DLE(4.500018), state, period=53.11554)
+    branch = udd.continuation(
+        orbit, "w", (4.4999, 4.51), direction="down", step=1e-6, longest=1e-3, until="symmetry breaking"
+    )
+    (breaking,) = branch.points
+    assert breaking.value == pytest.approx(4.500013676, abs=1e-9)
+    born = udd.continuation(breaking, bounds=(4.49, 4.51), most=20)
+    assert [point.kind for point in born.points] == ["period doubling"]
+    assert 4.49999 < born.points[0].value < breaking.value
+    assert born.stable[0] and not born.stable[-1]
+
+
+def lorenz(rho: float) -> udd.Model:
+    """The Lorenz equations with the usual sigma and beta."""
+    rates = {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"}
+    return udd.Model(["x", "y", "z"], rates, {"sigma": 10.0, "rho": rho, "beta": 8 / 3})
+
+
+def test_weak_multipliers_beside_strong_ones_bring_no_false_bifurcations() -> None:
+    rest = next(rest for rest in udd.equilibria(lorenz(24.0), near=[7.8, 7.8, 23.0]) if rest.state[0] > 1)
+    (hopf,) = udd.continuation(rest, "rho", (20.0, 30.0)).points
+    branch = udd.continuation(hopf)
+    # From the Hopf bifurcation at 470/19 to the homoclinic one rho falls all the way.
+    assert hopf.value == pytest.approx(470 / 19, abs=1e-10)
+    assert branch.points == ()
+    assert branch.ends[1].startswith("a connection near 13.9265574")
+    # The volume shrinks at the rate -41/3: by Liouville's formula the logarithms of the multipliers add up to
+    # that, though the strong ones are 1e10 and more, and the weak ones below 1e-70.
+    logs = np.log(np.abs(branch.multipliers)).sum(axis=1)
+    np.testing.assert_allclose(logs, -41 / 3 * branch.periods, rtol=1e-6)
+    assert np.abs(branch.multipliers[-1, 0]) > 1e10
+    assert (branch.multipliers.real > 0).all()
+
+
+def test_the_readmes_cycles_come_to_their_connection_without_bifurcations(rotation: udd.Branch) -> None:
+    cycles = udd.continuation(rotation.find("Hopf")[0])
+    assert cycles.points == ()
+    assert cycles.ends[1].startswith("a connection near 4.2599490")
+
+
+def test_the_period_is_the_least_whatever_the_number_of_rounds() -> None:
+    # In Lorenz's window about rho = 160 the run nearly comes back after each of 19 rounds.
+    orbit = udd.periodic_orbit(lorenz(160.0), [1.0, 1.0, 1.0], settle=100.0)
+    assert orbit.period == pytest.approx(1.152948928, abs=1e-8)
+    # Thirteen rounds of the figure-eight, asked for by their period.
+    known = udd.periodic_orbit(udd.DLE(10.0))
+    again = udd.periodic_orbit(udd.DLE(10.0), known.state, period=13 * known.period)
+    assert again.period == pytest.approx(known.period, abs=1e-10) and again.symmetric
+
+
 @pytest.mark.parametrize("B", [0.1, 0.2, 0.5])
 def test_where_rotation_becomes_stable(B: float) -> None:
     known = (1.0 - B) / (B * (1.0 + B))

@@ -65,7 +65,8 @@ def continuation(
         A kind of bifurcation whose first point ends the branch, or what tells it of a
         :class:`BifurcationPoint`.
     amplitude : float
-        How far from a bifurcation point its new branch is looked for first.
+        How far from a bifurcation point its new branch is looked for first. It is halved, and the first step
+        with it, until the branch does as the normal form of the bifurcation says.
 
     Returns
     -------
@@ -114,7 +115,9 @@ def continuation(
     step = number("step", step, above=0.0)
     longest = max(number("longest", longest, above=0.0), step)
     if isinstance(start, BifurcationPoint):
-        curve, place = born_at(start, number("amplitude", amplitude, above=0.0))
+        size = number("amplitude", amplitude, above=0.0)
+        curve, place, off = born_at(start, size)
+        step *= min(1.0, off / size)
         model = start.solution.model
     else:
         model = start.model

@@ -20,7 +20,9 @@ __all__ = ["next_doubling"]
 
 _KIND = "period doubling"
 _MOST = 12  # orbits that the secant method may take
-_EXACT = 1e-10  # of the square of the amplitude, relative: of the way between two doublings
+_NOISE = 1e-5  # of the test function, below which rounding may keep it from getting smaller
+_EXACT = 1e-11  # of the square of the amplitude, relative: of the way between two doublings
+_WAY = (0.1, 0.5, 1.0)  # of the square that is expected: each orbit is the guess of the next
 _FARTHEST = 1e4  # between the squares of the first amplitude and the one that is expected
 
 
@@ -66,12 +68,14 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         found[square] = place, signs_at(new, place)
         return u
 
-    first = amplitude**2
-    u = at(first, base)
-    square = ahead * first / (new.value(u) - point.value)
-    if not 0.0 < square < _FARTHEST * first:
-        raise Lost("the branch does not lead there")
-    u = at(square, u)
+    square = amplitude**2
+    u = at(square, base)
+    for part in _WAY:
+        expected = ahead * square / (new.value(u) - point.value)
+        if not 0.0 < expected < _FARTHEST * amplitude**2:
+            raise Lost("the branch does not lead there")
+        square = part * expected
+        u = at(square, u)
     value = found[square][1].minus
     # From the birth to the doubling the multiplier falls from 1 to -1: half of it and 1, nearly along a line.
     other = square * (1.0 + float(np.clip(value, -0.3, 0.3)))
@@ -82,6 +86,8 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
             break
         u = at(other, u)
         before, value = value, found[other][1].minus
+        if abs(before) < _NOISE and abs(value) >= 0.5 * abs(before):
+            break  # as near as rounding lets it come
         if not np.isfinite(value) or value == before:
             raise Lost("the multiplier does not fall to -1")
         square, other = other, other - value * (other - square) / (value - before)

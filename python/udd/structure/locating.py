@@ -14,7 +14,7 @@ from .rest_curve import RestCurve
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["error_of", "found_between", "frequency_of", "locate", "point_at", "rounding_of"]
+__all__ = ["changes", "error_of", "found_between", "frequency_of", "locate", "point_at", "rounding_of"]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
