@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from scipy import optimize
 from scipy.integrate import solve_ivp
 
 import udd
+from exact_cycles import symmetric_period
 from udd.errors import ModelError
 from udd.structure import loci
 
@@ -142,11 +145,12 @@ def test_the_asymmetric_pair_doubles_and_doubles(figure_eight: udd.Branch) -> No
     assert found.branches[0].ends[0] == "born at a symmetry breaking"
 
 
-def test_a_cascade_to_the_sixth_digit_of_feigenbaums_constant() -> None:
-    # Ten doublings: cycles of 1024 rounds, some 6000 pieces.
-    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=10)
-    # The last spacing, 1.3e-6, is known to 1e-12 or so.
+def test_a_cascade_to_the_fifth_digit_of_feigenbaums_constant() -> None:
+    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=9)
+    # The ratios come nearer by a factor of 4.67 each: 9e-6 after nine doublings.
     assert found.ratios[-1] == pytest.approx(4.669201609, abs=1e-5)
+    # Solved for, not followed step by step: the last cycle has 256 rounds, and some 1500 pieces.
+    assert max(len(branch) for branch in found.branches[3:]) < 10
     # The doublings of the branch followed step by step, of another run.
     assert found.values[5] == pytest.approx(5.0045538093, abs=1e-10)
     assert all(branch.ends[0] == "born at a period doubling" for branch in found.branches[1:])
@@ -203,6 +207,42 @@ def test_the_period_is_the_least_whatever_the_number_of_rounds() -> None:
     known = udd.periodic_orbit(udd.DLE(10.0))
     again = udd.periodic_orbit(udd.DLE(10.0), known.state, period=13 * known.period)
     assert again.period == pytest.approx(known.period, abs=1e-10) and again.symmetric
+
+
+@pytest.mark.parametrize("w", [7.1, 10.0, 100.0])
+def test_the_bound_of_a_period_holds_against_thirty_digits(w: float) -> None:
+    orbit = udd.periodic_orbit(udd.DLE(w))
+    error = abs(float(Decimal(orbit.period) - symmetric_period(orbit)))
+    assert error <= orbit.period_error < 1e-12
+
+
+# 0.9: the bound was that of the value's rounding, 1e-16, and the error 2e-15.
+@pytest.mark.parametrize("B", [0.02, 0.1, 0.2, 0.5, 0.9, 0.99])
+def test_the_bound_of_a_hopf_bifurcation_holds(B: float) -> None:
+    b = Fraction(B)
+    exact = (1 - b) / (b * (1 + b))
+    known = float(exact)
+    rests = udd.equilibria(udd.DLE(0.8 * known, B=B))
+    start = next(rest for rest in rests if rest.state[0] > 1e-3)
+    (hopf,) = udd.continuation(start, "w", (0.5 * known, 2.0 * known)).points
+    assert abs(float(Fraction(hopf.value) - exact)) <= hopf.error < 1e-12 * max(known, 1.0)
+    period = 2 * math.pi / math.sqrt((1 - B) / B)
+    assert abs(hopf.period - period) <= hopf.period_error < 1e-9
+
+
+def test_the_bound_of_where_doublings_accumulate_holds() -> None:
+    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=6)
+    # From eleven doublings.
+    known = 5.0043826710
+    assert abs(found.limit - known) < found.limit_error < 1e-6
+    assert "error below" in repr(found)
+
+
+def test_the_bound_of_a_connection_is_not_zero(rotation: udd.Branch) -> None:
+    hopf = rotation.find("Hopf")[0]
+    a, b = (udd.connection(udd.continuation(hopf, period=period)) for period in (12.0, 18.0))
+    # Two that were found from cycles of different length, with pieces of their own.
+    assert 0.0 < abs(a.value - b.value) + 1e-15 < a.error + b.error < 1e-11
 
 
 @pytest.mark.parametrize("B", [0.1, 0.2, 0.5])

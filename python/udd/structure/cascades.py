@@ -63,15 +63,30 @@ class Cascade:
     @property
     def limit(self) -> float:
         """Where the doublings accumulate, extrapolated from the last three (Aitken); NaN of fewer."""
+        return _aitken(self.values)
+
+    @property
+    def limit_error(self) -> float:
+        """A bound of its error: what the last doubling changes in it, which is more than what all others will."""
         if len(self.points) < 3:
             return float("nan")
-        a, b, c = self.values[-3:]
-        return float(c - (c - b) ** 2 / ((c - b) - (b - a)))
+        before = _aitken(self.values[:-1]) if len(self.points) > 3 else float(self.values[-1])
+        # An error of one of the three moves the limit by no more than itself, of all three by twice as much.
+        return abs(self.limit - before) + 2.0 * float(self.errors[-3:].max())
 
     def __repr__(self) -> str:
         values = ", ".join(f"{value:.11g}" for value in self.values)
         ratios = ", ".join(f"{ratio:.5g}" for ratio in self.ratios)
-        return f"<Cascade over {self.parameter}: {values}; ratios {ratios}; limit {self.limit:.9g}>"
+        limit = f"limit {self.limit:.11g} (error below {self.limit_error:.1g})"
+        return f"<Cascade over {self.parameter}: {values}; ratios {ratios}; {limit}>"
+
+
+def _aitken(values: Floats) -> float:
+    """The limit of a sequence whose last differences fall by one factor."""
+    if len(values) < 3:
+        return float("nan")
+    a, b, c = values[-3:]
+    return float(c - (c - b) ** 2 / ((c - b) - (b - a)))
 
 
 def cascade(

@@ -95,8 +95,8 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         raise Lost("the secant method does not converge")
     place, signs = found[square]
     size = square**0.5
-    error = error_of(new, Place(place.u - size * place.tangent, place.tangent), size, place, size, "minus")
-    own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, error)
+    errors = error_of(new, Place(place.u - size * place.tangent, place.tangent), size, place, size, "minus")
+    own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
     # What the secant method passed beyond the doubling is left out.
     places = [(new, *found[s], s**0.5) for s in sorted(found) if s <= square]
     way = Way(places, [own], "the point that was wanted")

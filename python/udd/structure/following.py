@@ -151,8 +151,8 @@ def _pass(
             way.places.append((curve, place, signs, arclength + sigma))
             way.end = _birth(curve, place, here)
         else:
-            error = _error(curve, here, sigma, place, gone, kind)
-            _note(curve, place, signs, kind, error, way, limits, arclength + sigma)
+            errors = _errors(curve, here, sigma, place, gone, kind)
+            _note(curve, place, signs, kind, errors, way, limits, arclength + sigma)
         if way.end:
             return
 
@@ -162,24 +162,26 @@ def _note(
     place: Place,
     signs: Signs,
     kind: str,
-    error: float,
+    errors: tuple[float, float],
     way: Way,
     limits: Limits,
     arclength: float,
 ) -> None:
     """Note a bifurcation point; the way ends with the last one that is wanted."""
-    point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, error)
+    point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, errors)
     way.points.append(point)
     way.places.append((curve, place, signs, arclength))
     if limits.until(point):
         way.end = "the point that was wanted"
 
 
-def _error(curve: AnyCurve, here: Place, sigma: float, place: Place, gone: float, kind: str) -> float:
+def _errors(
+    curve: AnyCurve, here: Place, sigma: float, place: Place, gone: float, kind: str
+) -> tuple[float, float]:
     try:
         return error_of(curve, here, sigma, place, gone, FUNCTIONS[kind])
     except (Lost, IntegrationError):
-        return float("nan")
+        return float("nan"), float("nan")
 
 
 def _birth(curve: AnyCurve, place: Place, before: Place) -> str:
@@ -284,5 +286,6 @@ def _round(
         way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
         return here, before, arclength
     kind = "nonsmooth fold" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "border collision"
-    _note(curve, arriving, at, kind, rounding_of(value), way, limits, arclength)
+    errors = float(rounding_of(value)), float("nan")
+    _note(curve, arriving, at, kind, errors, way, limits, arclength)
     return leaving, after, arclength

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from scipy import optimize
+
+from udd.errors import IntegrationError
 
 from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
 from .flow import Floats
 from .multipliers import as_liouville
-from .path import Lost, Place, correct, tangent_at
+from .path import Lost, Place, along_parameter, correct, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["changes", "error_of", "found_between", "frequency_of", "locate", "point_at", "rounding_of"]
+__all__ = ["COARSE", "changes", "error_of", "found_between", "frequency_of", "locate", "period_error_of", "point_at", "rounding_of"]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
-_COARSE = 100.0  # by this factor runs are less accurate where the error is told
+_SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
+_NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
+_SURE = 2.0  # and how far beyond the largest scatter the error may lie
+COARSE = 100.0  # by this factor runs are less accurate where the error is told
 
 
 def changes(before: Signs, after: Signs) -> list[str]:
@@ -122,33 +130,71 @@ def locate(curve: AnyCurve, a: Place, step: float, name: str) -> tuple[float, Pl
     return sigma, cache[sigma]
 
 
-def error_of(curve: AnyCurve, a: Place, sigma: float, place: Place, step: float, name: str) -> float:
-    """How far the value moves when runs are less accurate."""
-    value = curve.value(place.u)
-    rounding = rounding_of(value)
-    if isinstance(curve, RestCurve):
-        return rounding
+def error_of(
+    curve: AnyCurve, a: Place, sigma: float, place: Place, step: float, name: str
+) -> tuple[float, float]:
+    """Bounds of the errors of the value and of the period at a zero of the test function `name`.
 
-    def at(distance: float) -> tuple[float, float]:
+    Of cycles: how far they move when runs are less accurate. Of equilibria: what the rounding of the test
+    function, seen in its values near by, makes of its zero; the period is that of the cycles born there.
+    """
+    if isinstance(curve, RestCurve):
+        return _scatter(curve, a, sigma, place, step, name)
+
+    def at(distance: float) -> tuple[float, Floats]:
         u = correct(curve, a.u + distance * a.tangent, a.tangent)
         there = Place(u, tangent_at(curve, u, a.tangent))
-        return float(getattr(signs_at(curve, there), name)), curve.value(u)
+        return float(getattr(signs_at(curve, there), name)), np.array([curve.value(u), curve.period(u)])
 
+    known = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
     (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
-    curve.loose, curve.seen = _COARSE, None
+    curve.loose, curve.seen = COARSE, None
     try:
         moved, there = at(sigma)
     finally:
         curve.loose, curve.seen = 1.0, None
     here, _ = at(sigma)
-    shift = (moved - here) * (last - first) / (high - low) if high != low else 0.0
-    return rounding + abs(there - value) + abs(shift)
+    shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
+    value, period = rounding_of(known) + np.abs(there - known) + np.abs(shift)
+    return float(value), float(period)
 
 
-def rounding_of(value: float) -> float:
-    """How far rounding may move a value."""
-    return 8.0 * float(np.finfo(float).eps) * abs(value)
+def _scatter(
+    curve: RestCurve, a: Place, sigma: float, place: Place, step: float, name: str
+) -> tuple[float, float]:
+    """Bounds of the errors of the value and of the period from how values near by scatter about smooth curves."""
+    near = np.linspace(-1.0, 1.0, _SAMPLES)
+    seen = []
+    for distance in sigma + _NEAR * step * near:
+        u = correct(curve, a.u + distance * a.tangent, a.tangent)
+        signs = signs_at(curve, Place(u, tangent_at(curve, u, a.tangent)))
+        turning = abs(signs.pair.imag)
+        period = 2.0 * np.pi / turning if name == "torus" and turning else np.nan
+        seen.append((float(getattr(signs, name)), curve.value(u), period))
+    table, powers = np.array(seen), np.vander(near, 3)
+    fitted = np.linalg.lstsq(powers, np.nan_to_num(table), rcond=None)[0]
+    noise = np.abs(powers @ fitted - table).max(axis=0)
+    slope = np.abs(fitted[1])
+    # So far along the branch the zero may be off.
+    off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
+    value, period = _SURE * (noise[1:] + off * slope[1:])
+    return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(table[0, 2]))
+
+
+def rounding_of(value: Any) -> Any:
+    """How far rounding may move a value, or several."""
+    return 8.0 * float(np.finfo(float).eps) * np.abs(value)
+
+
+def period_error_of(curve: CycleCurve, u: Floats) -> float:
+    """A bound of the error of a cycle's period: how far it moves when runs are less accurate."""
+    known, coarse = curve.period(u), replace(curve, loose=COARSE)
+    try:
+        moved = coarse.period(correct(coarse, u, along_parameter(u)))
+    except (Lost, IntegrationError):
+        return float("nan")
+    return float(abs(moved - known) + rounding_of(known))
 
 
 def frequency_of(curve: AnyCurve, u: Floats, signs: Signs) -> float:
@@ -165,7 +211,7 @@ def point_at(
     signs: Signs,
     solution: Equilibrium | PeriodicOrbit,
     arclength: float,
-    error: float,
+    errors: tuple[float, float],
 ) -> BifurcationPoint:
     """The point with what belongs to its kind."""
     frequency = coefficient = float("nan")
@@ -175,5 +221,5 @@ def point_at(
         coefficient = solution.lyapunov_coefficient
     value = curve.value(place.u)
     return BifurcationPoint(
-        kind, curve.name, value, error, solution, arclength, frequency, coefficient, curve, place
+        kind, curve.name, value, *errors, solution, arclength, frequency, coefficient, curve, place
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -110,6 +111,15 @@ class PeriodicOrbit:
         """Whether all multipliers are inside the unit circle."""
         return bool((np.abs(self.multipliers) < 1).all())
 
+    @cached_property
+    def period_error(self) -> float:
+        """A bound of the period's error: how far it moves when runs are a hundred times less accurate."""
+        from .locating import period_error_of
+
+        if self._curve is None or self._unknowns is None:
+            return float("nan")
+        return period_error_of(self._curve, self._unknowns)
+
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
         from udd.trajectory import simulate
@@ -123,6 +133,6 @@ class PeriodicOrbit:
         mirror = "symmetric, " if self.symmetric else ""
         largest = ", ".join(f"{value:.6g}" for value in self.multipliers)
         return (
-            f"<PeriodicOrbit of {self.model!r}: period {self.period:.12g}, {mirror}{stable}, "
-            f"multipliers {largest}>"
+            f"<PeriodicOrbit of {self.model!r}: period {self.period:.13g} (error below {self.period_error:.1g}), "
+            f"{mirror}{stable}, multipliers {largest}>"
         )
