@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import optimize
+from scipy import optimize, special
 from scipy.integrate import solve_ivp
 
 import udd
@@ -78,6 +78,18 @@ def test_the_period_of_the_figure_eight(w: float) -> None:
     orbit = udd.periodic_orbit(udd.DLE(w))
     assert orbit.symmetric and orbit.stable
     assert orbit.period == pytest.approx(PERIODS[w], abs=1e-10)  # the reference's last digit is 1e-11
+
+
+@pytest.mark.parametrize("period", [None, 1.15])
+def test_a_cycle_of_a_family_where_energy_is_kept(period: float | None) -> None:
+    orbit = udd.periodic_orbit(udd.Pendulum(0.3), [0.0, 1.0], period=period)
+    omega, theta = orbit.state
+    # T = 4 sqrt(l/g) K(sin(a/2)) for the amplitude a of its own energy.
+    m = math.sin(theta / 2) ** 2 + omega**2 * 0.3 / (4 * 9.81)
+    assert orbit.period == pytest.approx(4 * math.sqrt(0.3 / 9.81) * special.ellipk(m), abs=1e-11)
+    # The other multiplier is 1 too.
+    assert orbit.multipliers[0] == pytest.approx(1.0, abs=1e-6)
+    assert not orbit.stable and "neutral" in repr(orbit)
 
 
 def test_the_period_of_the_disks_asymmetric_pair() -> None:

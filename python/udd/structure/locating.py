@@ -14,7 +14,7 @@ from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
 from .flow import Floats
 from .multipliers import as_liouville
-from .path import Lost, Place, along_parameter, correct, tangent_at
+from .path import Lost, Place, along_parameter, correct, nearest_of_family, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
@@ -189,9 +189,12 @@ def rounding_of(value: Any) -> Any:
 
 def period_error_of(curve: CycleCurve, u: Floats) -> float:
     """A bound of the error of a cycle's period: how far it moves when runs are less accurate."""
-    known, coarse = curve.period(u), replace(curve, loose=COARSE)
+    known, coarse, row = curve.period(u), replace(curve, loose=COARSE), along_parameter(u)
     try:
-        moved = coarse.period(correct(coarse, u, along_parameter(u)))
+        try:
+            moved = coarse.period(correct(coarse, u, row))
+        except Lost:
+            moved = coarse.period(nearest_of_family(coarse, u, row))
     except (Lost, IntegrationError):
         return float("nan")
     return float(abs(moved - known) + rounding_of(known))

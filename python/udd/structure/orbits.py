@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from udd.trajectory import simulate
 from .cycle_curve import CycleCurve
 from .flow import Floats, Flow, flow_of
 from .multipliers import multipliers_at
-from .path import Lost, along_parameter, correct
+from .path import Lost, along_parameter, correct, nearest_of_family
 from .solutions import PeriodicOrbit
 
 __all__ = ["closed", "closes_earlier", "cycle_at", "flown", "periodic_orbit", "pieces_for"]
@@ -29,6 +30,8 @@ _SAME = 1e-7  # two states within this part of the sizes are one
 _HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
 _PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
 _WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
+_SINGULAR = (1e-2, 1e-4, 1e-7)  # singular values that count as zero, relative to the largest
+_FAMILY = 400  # unknowns up to which singular values are asked for
 _RESIDUAL = 1e-9  # gaps that are as good as none
 
 
@@ -72,7 +75,8 @@ def periodic_orbit(
     -----
     The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
     Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
-    Newton's method closes the gaps. Where the law has kinks, runs land on them. A cycle that is its own
+    Newton's method closes the gaps, where energy is kept in the sense of least squares: of the family of cycles
+    the one nearest to the guess is found. Where the law has kinks, runs land on them. A cycle that is its own
     mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's close
     returns there are unstable ones.
 
@@ -157,18 +161,32 @@ def closed(
     )
     guess = curve.pack(nodes, span, float(flow.values[held]))
     curve.fix_phase(guess)
-    try:
-        u = correct(curve, guess, along_parameter(guess), patience=30)
-    except (Lost, IntegrationError) as error:
-        raise ModelError(
-            f"no cycle of period {curve.period(guess):.6g} is found near the guess: {error}"
-        ) from None
-    residual, _ = curve.equations(u)
-    ends = curve.nodes(u)
-    rest = np.abs(curve.rate_at(flow.values, ends[0]) * flow.clock / flow.size).max()
-    if np.abs(residual).max() > _RESIDUAL or rest < 1e-9 or curve.span(u) < 1e-6 * flow.clock:
-        raise ModelError("no cycle is found near the guess: the orbit shrinks to a state of rest")
-    return curve, u
+    tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
+    row = along_parameter(guess)
+    # Where energy is kept cycles come in families: the equations leave a direction free, the more so the nearer.
+    few = _SINGULAR if len(guess) < _FAMILY else ()
+    ways = [correct, *(partial(nearest_of_family, singular=size) for size in few)]
+    failure = ""
+    for way in ways:
+        try:
+            u = way(curve, guess, row, patience=30)
+            reason = _no_cycle(curve, u)
+        except (Lost, IntegrationError) as error:
+            reason = str(error)
+        if not reason:
+            return curve, u
+        failure = failure or reason
+    raise ModelError(f"{tried}: {failure}")
+
+
+def _no_cycle(curve: CycleCurve, u: Floats) -> str:
+    """Why what solves the equations is no cycle, if it is none."""
+    flow, (residual, _), start = curve.flow, curve.equations(u), curve.nodes(u)[0]
+    if not np.isfinite(u).all() or np.abs(residual).max() > _RESIDUAL:
+        return "Newton's method does not converge"
+    rest = np.abs(curve.rate_at(curve.values_at(u), start) * flow.clock / flow.size).max()
+    short = curve.span(u) < 1e-6 * flow.clock
+    return "the orbit shrinks to a state of rest" if rest < 1e-9 or short else ""
 
 
 def closes_earlier(curve: CycleCurve, u: Floats) -> str:

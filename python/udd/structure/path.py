@@ -12,7 +12,7 @@ from udd.errors import IntegrationError
 from .condensing import CyclicEquations
 from .flow import Floats
 
-__all__ = ["Curve", "Lost", "Place", "advance", "along_parameter", "correct", "tangent_at"]
+__all__ = ["Curve", "Lost", "Place", "advance", "along_parameter", "correct", "nearest_of_family", "tangent_at"]
 
 _ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
 _NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
@@ -83,6 +83,34 @@ def correct(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> 
         size = float(np.abs(step).max())
         if not np.isfinite(size) or size > 1e3:
             raise Lost("Newton's method diverges")
+        u = u + step
+        if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
+            return u
+        before = size
+    raise Lost("Newton's method does not converge")
+
+
+def nearest_of_family(
+    curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, singular: float = 1e-7
+) -> Floats:
+    """A solution in the plane through `guess` of equations that are singular but can be solved (Gauss & Newton).
+
+    Each step is the shortest of those that solve the linear equations; singular values below `singular` times
+    the largest count as zero.
+
+    Raises
+    ------
+    Lost
+    """
+    u, before = guess.copy(), np.inf
+    for _ in range(patience):
+        residual, matrix = curve.equations(u)
+        dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+        full, right = np.vstack([dense, row]), np.append(-residual, row @ (guess - u))
+        step = np.linalg.lstsq(full, right, rcond=singular)[0]
+        size = float(np.abs(step).max())
+        if not np.isfinite(size) or size > 1e3:
+            break
         u = u + step
         if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
             return u

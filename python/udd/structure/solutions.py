@@ -22,6 +22,8 @@ __all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
 
 Complex = NDArray[np.complex128]
 
+_ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
+
 
 def kind_of_rest(eigenvalues: Complex) -> str:
     """What the flow near an equilibrium with these eigenvalues looks like."""
@@ -108,8 +110,8 @@ class PeriodicOrbit:
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle."""
-        return bool((np.abs(self.multipliers) < 1).all())
+        """Whether all multipliers are inside the unit circle, and not on it but for rounding."""
+        return bool((np.abs(self.multipliers) < 1.0 - _ON).all())
 
     @cached_property
     def period_error(self) -> float:
@@ -129,10 +131,12 @@ class PeriodicOrbit:
         return simulate(beyond_the_edge(self.model), times, self.state, **tight)
 
     def __repr__(self) -> str:
-        stable = "stable" if self.stable else "unstable"
+        neutral = bool((np.abs(self.multipliers) <= 1.0 + _ON).all())
+        stable = "stable" if self.stable else "neutral" if neutral else "unstable"
         mirror = "symmetric, " if self.symmetric else ""
         largest = ", ".join(f"{value:.6g}" for value in self.multipliers)
+        bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"
         return (
-            f"<PeriodicOrbit of {self.model!r}: period {self.period:.13g} (error below {self.period_error:.1g}), "
+            f"<PeriodicOrbit of {self.model!r}: period {self.period:.13g} ({bound}), "
             f"{mirror}{stable}, multipliers {largest}>"
         )
