@@ -44,7 +44,9 @@ def symmetric_period(orbit: udd.PeriodicOrbit) -> Decimal:
     small = 1e-5
     matrix = np.zeros((4, 4))
     for k, e in enumerate(np.eye(3)):
-        matrix[:3, k] = mirror * (end(orbit.state + small * e) - end(orbit.state - small * e)) / (2 * small) - e
+        matrix[:3, k] = (
+            mirror * (end(orbit.state + small * e) - end(orbit.state - small * e)) / (2 * small) - e
+        )
     matrix[:3, 3] = mirror * orbit.model.rates(0.0, end(orbit.state))
     matrix[3, :3] = orbit.model.rates(0.0, orbit.state)
     inverse = [[Decimal(float(value)) for value in row] for row in np.linalg.inv(matrix)]

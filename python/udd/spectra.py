@@ -82,7 +82,9 @@ class Spectrum:
         pairs = zip(self.exponents, self.standard_errors, strict=True)
         values = ", ".join(f"{value:.5g}({error:.1g})" for value, error in pairs)
         after = f" after a transient of {self.transient:.4g}" if self.transient else ""
-        return f"<Spectrum of {self.model!r}: {values}; {self.verdict}{after}, dimension {self.dimension:.4g}>"
+        return (
+            f"<Spectrum of {self.model!r}: {values}; {self.verdict}{after}, dimension {self.dimension:.4g}>"
+        )
 
 
 def lyapunov_spectrum(

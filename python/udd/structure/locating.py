@@ -19,7 +19,17 @@ from .rest_curve import RestCurve
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["COARSE", "changes", "error_of", "found_between", "frequency_of", "locate", "period_error_of", "point_at", "rounding_of"]
+__all__ = [
+    "COARSE",
+    "changes",
+    "error_of",
+    "found_between",
+    "frequency_of",
+    "locate",
+    "period_error_of",
+    "point_at",
+    "rounding_of",
+]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
@@ -76,9 +86,17 @@ def found_between(
             kind = "symmetry breaking" if symmetric else "period doubling"
         else:
             pair = here.pair
-            if isinstance(curve, RestCurve) and abs(pair.imag) * curve.flow.clock > _TURNING and _on_axis(pair):
+            if (
+                isinstance(curve, RestCurve)
+                and abs(pair.imag) * curve.flow.clock > _TURNING
+                and _on_axis(pair)
+            ):
                 kind = "Hopf"
-            elif isinstance(curve, CycleCurve) and abs(np.angle(pair)) > _TURNING and abs(abs(pair) - 1.0) < 1e-5:
+            elif (
+                isinstance(curve, CycleCurve)
+                and abs(np.angle(pair)) > _TURNING
+                and abs(abs(pair) - 1.0) < 1e-5
+            ):
                 kind = "Neimark-Sacker"
             else:
                 continue  # two real ones: a neutral saddle

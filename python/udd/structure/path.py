@@ -12,7 +12,16 @@ from udd.errors import IntegrationError
 from .condensing import CyclicEquations
 from .flow import Floats
 
-__all__ = ["Curve", "Lost", "Place", "advance", "along_parameter", "correct", "nearest_of_family", "tangent_at"]
+__all__ = [
+    "Curve",
+    "Lost",
+    "Place",
+    "advance",
+    "along_parameter",
+    "correct",
+    "nearest_of_family",
+    "tangent_at",
+]
 
 _ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
 _NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
