@@ -126,7 +126,10 @@ fn expansion<'py>(
 /// The eigenvalues of the product of square factors (m, n, n), the first of them the first to act, largest
 /// first: logarithms of their sizes, their phases, their conditions; `None` where the iteration does not converge.
 #[pyfunction]
-fn floquet<'py>(py: Python<'py>, factors: PyReadonlyArray3<'py, f64>) -> PyResult<Option<Bound<'py, PyDict>>> {
+fn floquet<'py>(
+    py: Python<'py>,
+    factors: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
     let factors = factors.as_array();
     let (count, n, columns) = factors.dim();
     if count == 0 || n != columns {

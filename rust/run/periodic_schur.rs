@@ -295,12 +295,12 @@ mod tests {
     #[test]
     fn a_pair_beside_a_strong_one_keeps_its_angle() {
         let (n, m) = (3, 30);
-        let bases: Vec<_> = (0..m).map(|i| matrix(n, i as u64 + 50) + DMatrix::identity(n, n) * 2.0).collect();
+        let bases: Vec<_> =
+            (0..m).map(|i| matrix(n, i as u64 + 50) + DMatrix::identity(n, n) * 2.0).collect();
         let (a, b) = (0.99 * 0.3_f64.cos(), 0.99 * 0.3_f64.sin());
         let middle = DMatrix::from_row_slice(3, 3, &[5.0, 0.0, 0.0, 0.0, a, -b, 0.0, b, a]);
-        let factors: Vec<_> = (0..m)
-            .map(|i| &bases[(i + 1) % m] * &middle * bases[i].clone().try_inverse().unwrap())
-            .collect();
+        let factors: Vec<_> =
+            (0..m).map(|i| &bases[(i + 1) % m] * &middle * bases[i].clone().try_inverse().unwrap()).collect();
         let found = values(&factors);
         let known = C::from_polar(0.99_f64.powi(m as i32), 0.3 * m as f64);
         let known = if known.im > 0.0 { known } else { known.conj() };

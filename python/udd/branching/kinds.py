@@ -18,8 +18,8 @@ from .verdicts import Judge, Verdicts, decided
 __all__ = ["MOTIONS", "kinds_of", "of_kinds"]
 
 MOTIONS = ("none", "equilibrium", "rotating state", "cycle", "torus", "chaos", "aperiodic", "left")
-"""Without a verdict; at rest but for angles that nothing depends on; ...; aperiodic, but by which exponents is open;
-off the wheels, or to infinity."""
+"""``none`` has no verdict; of what is ``aperiodic`` the exponents leave open what it is; ``left`` is off the
+wheels, or at infinity."""
 
 _LEFT = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
 _PARTS = 20.0  # a distance that grows by exp of this does so in chaos

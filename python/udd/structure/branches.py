@@ -216,7 +216,7 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
         own = signs.values
         if isinstance(curve, CycleCurve):
             symmetric = curve.symmetric
-            own = own**2 if symmetric else own
+            own = own**2 + 0.0 if symmetric else own
             state = curve.flow.full(curve.nodes(place.u)[0])
             periods.append(curve.period(place.u))
         else:

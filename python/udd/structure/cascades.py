@@ -67,7 +67,7 @@ class Cascade:
 
     @property
     def limit_error(self) -> float:
-        """A bound of its error: what the last doubling changes in it, which is more than what all others will."""
+        """A bound of its error: what the last doubling changes in it, more than all that follow will."""
         if len(self.points) < 3:
             return float("nan")
         before = _aitken(self.values[:-1]) if len(self.points) > 3 else float(self.values[-1])

@@ -1,4 +1,4 @@
-"""The linear equations of multiple shooting, condensed to those of one node: structured orthogonal factorization."""
+"""Structured orthogonal factorization: the equations of multiple shooting, condensed to those of one node."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class CyclicEquations:
     def solve(self, row: Floats, right: Floats) -> Floats:
         """The unknowns for these right sides (m r + 2,), of which the last is that of one more `row`.
 
-        Two neighbouring pieces become one by an orthogonal transformation that frees the node between them, and
-        so on (S. J. Wright, SIAM J. Sci. Stat. Comput. 13 (1992) 742): stable where orbits are not, in a time
-        that is proportional to the number of pieces.
+        Two neighbouring pieces become one by an orthogonal transformation that frees the node between them,
+        and so on (S. J. Wright, SIAM J. Sci. Stat. Comput. 13 (1992) 742): stable where orbits are not, in a
+        time that is proportional to the number of pieces.
 
         Raises
         ------

@@ -96,8 +96,8 @@ class Connection:
     def __repr__(self) -> str:
         eigenvalues = ", ".join(f"{value:.5g}" for value in self.equilibrium.eigenvalues)
         return (
-            f"<{self.kind} connection at {self.parameter} = {self.value:.13g} (error below {self.error:.1g}), "
-            f"eigenvalues {eigenvalues}>"
+            f"<{self.kind} connection at {self.parameter} = {self.value:.13g} "
+            f"(error below {self.error:.1g}), eigenvalues {eigenvalues}>"
         )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from udd.errors import IntegrationError
 
-from .branch import BifurcationPoint, Branch
+from .branch import AnyCurve, BifurcationPoint, Branch
 from .branches import branch_from
 from .cycle_curve import CycleCurve
 from .flow import Floats
@@ -98,6 +98,8 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     errors = error_of(new, Place(place.u - size * place.tangent, place.tangent), size, place, size, "minus")
     own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
     # What the secant method passed beyond the doubling is left out.
-    places = [(new, *found[s], s**0.5) for s in sorted(found) if s <= square]
+    places: list[tuple[AnyCurve, Place, Signs, float]] = [
+        (new, *found[s], s**0.5) for s in sorted(found) if s <= square
+    ]
     way = Way(places, [own], "the point that was wanted")
     return branch_from([way], point.solution.model, point.parameter, f"born at a {_KIND}")

@@ -181,7 +181,7 @@ def error_of(
 def _scatter(
     curve: RestCurve, a: Place, sigma: float, place: Place, step: float, name: str
 ) -> tuple[float, float]:
-    """Bounds of the errors of the value and of the period from how values near by scatter about smooth curves."""
+    """Bounds of the errors of the value and of the period: from how those near by scatter about a curve."""
     near = np.linspace(-1.0, 1.0, _SAMPLES)
     seen = []
     for distance in sigma + _NEAR * step * near:

@@ -60,8 +60,8 @@ class Multipliers:
 def multipliers_at(curve: CycleCurve, u: Floats) -> Multipliers:
     """The multipliers of the orbit with these unknowns.
 
-    The derivatives of the pieces, restricted to the planes across the flow at their ends, are never multiplied
-    with one another: weak multipliers are right beside strong ones.
+    The derivatives of the pieces, restricted to the planes across the flow at their ends, are never
+    multiplied with one another: weak multipliers are right beside strong ones.
     """
     factors = curve.factors_across(u)
     found = _core.floquet(factors)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -75,10 +76,10 @@ def periodic_orbit(
     -----
     The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
     Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
-    Newton's method closes the gaps, where energy is kept in the sense of least squares: of the family of cycles
-    the one nearest to the guess is found. Where the law has kinks, runs land on them. A cycle that is its own
-    mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's close
-    returns there are unstable ones.
+    Newton's method closes the gaps; where energy is kept, so that cycles come in families, one near the guess
+    is found by the method of Gauss and Newton. Where the law has kinks, runs land on them. A cycle that is its
+    own mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's
+    close returns there are unstable ones.
 
     Examples
     --------
@@ -129,7 +130,7 @@ def cycle_at(curve: CycleCurve, u: Floats) -> PeriodicOrbit:
     flow, values = curve.flow, curve.values_at(u)
     multipliers = multipliers_at(curve, u).values
     if curve.symmetric:
-        multipliers = multipliers**2
+        multipliers = multipliers**2 + 0.0
     multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
     residual, _ = curve.equations(u)
     nodes = flow.full(curve.nodes(u))
@@ -163,9 +164,10 @@ def closed(
     curve.fix_phase(guess)
     tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
     row = along_parameter(guess)
-    # Where energy is kept cycles come in families: the equations leave a direction free, the more so the nearer.
+    # Where energy is kept cycles come in families: near one the equations leave a direction nearly free.
     few = _SINGULAR if len(guess) < _FAMILY else ()
-    ways = [correct, *(partial(nearest_of_family, singular=size) for size in few)]
+    ways: list[Callable[..., Floats]] = [correct]
+    ways += [partial(nearest_of_family, singular=size) for size in few]
     failure = ""
     for way in ways:
         try:
@@ -208,7 +210,7 @@ def closes_earlier(curve: CycleCurve, u: Floats) -> str:
 def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
     """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
     flow, values = curve.flow, curve.values_at(u)
-    span, start, plain = curve.span(u), curve.nodes(u)[0], np.ones(flow.dim)
+    span, start = curve.span(u), curve.nodes(u)[0]
     # What is symmetric closes after odd parts only, seen in the mirror.
     ways = [(k, curve.mirror) for k in _PRIMES if k > 2 or not curve.symmetric]
     if flow.mirror is not None and not curve.symmetric:

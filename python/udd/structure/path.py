@@ -54,18 +54,19 @@ class Place:
 
 def solve(matrix: Floats | CyclicEquations, row: Floats, right: Floats) -> Floats:
     """The solution of the equations below which one more row stands."""
+    result: Floats
     if isinstance(matrix, np.ndarray):
-        result: Floats
         full = np.vstack([matrix, row])
         try:
-            result = np.linalg.solve(full, right)
+            result = np.asarray(np.linalg.solve(full, right), dtype=np.float64)
         except np.linalg.LinAlgError:
-            result = np.linalg.lstsq(full, right, rcond=None)[0]
+            result = np.asarray(np.linalg.lstsq(full, right, rcond=None)[0], dtype=np.float64)
         return result
     try:
-        return matrix.solve(row, right)
+        result = matrix.solve(row, right)
     except np.linalg.LinAlgError:
         raise Lost("the equations are singular") from None
+    return result
 
 
 def along_parameter(u: Floats) -> Floats:
@@ -102,10 +103,10 @@ def correct(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> 
 def nearest_of_family(
     curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, singular: float = 1e-7
 ) -> Floats:
-    """A solution in the plane through `guess` of equations that are singular but can be solved (Gauss & Newton).
+    """A solution in the plane through `guess` of equations that are singular but can be solved.
 
-    Each step is the shortest of those that solve the linear equations; singular values below `singular` times
-    the largest count as zero.
+    By the method of Gauss and Newton: each step is the shortest of those that solve the linear equations;
+    singular values below `singular` times the largest count as zero.
 
     Raises
     ------

@@ -81,8 +81,8 @@ def signs_at(curve: RestCurve | CycleCurve, place: Place) -> Signs:
         return Signs(fold, nothing, nothing, nothing, np.zeros(0), values)
     both = list(combinations(range(len(values)), 2))
     one, other = np.array(both, dtype=np.intp).reshape(-1, 2).T
-    pairs = found.log[one] + found.log[other], found.phases[one] * found.phases[other]
-    torus = _less(*pairs, 1.0) if both else float("nan")
+    logs, phases = found.log[one] + found.log[other], found.phases[one] * found.phases[other]
+    torus = _less(logs, phases, 1.0) if both else float("nan")
     plus, minus = (_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
     return Signs(fold, plus, minus, torus, np.zeros(0), values)
 

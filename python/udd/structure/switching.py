@@ -25,9 +25,10 @@ _STILL = 1e-9  # a parameter that moves less does not move, as where a conservat
 
 
 def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place, float]:
-    """The curve of the solutions that bifurcate at a point, a place on it with the way that leads off, its amplitude.
+    """The curve of the solutions that bifurcate at a point, a place on it, and the amplitude there.
 
-    The amplitude is halved until nothing more bifurcates between the point and the place.
+    The place's tangent leads away. The amplitude is halved until nothing more bifurcates between the point
+    and the place.
 
     Raises
     ------
@@ -70,7 +71,8 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place,
         return new, found, size
     where = f"the {point.kind} at {point.parameter} = {point.value:.10g}"
     raise ModelError(
-        f"the branch born at {where} is not found at amplitudes of {0.03 * amplitude:.2g} to {3 * amplitude:.2g}"
+        f"the branch born at {where} is not found at amplitudes of {0.03 * amplitude:.2g} to "
+        f"{3 * amplitude:.2g}"
     )
 
 
@@ -79,7 +81,7 @@ def _nothing_between(curve: AnyCurve, point: BifurcationPoint, half: Place, whol
     if point.kind == "branch point":
         return not changes(signs_at(curve, half), signs_at(curve, whole))
     signs = signs_at(curve, whole)
-    # Where cycles are born the multipliers other than 1 lie off the unit circle, or are squares of what is born.
+    # At birth no multiplier is negative: they are squares, or exponentials of eigenvalues.
     if changes(signs_at(curve, half), signs) or signs.minus < 0.0:
         return False
     # The parameter moves with the square of the amplitude.
