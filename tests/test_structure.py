@@ -559,3 +559,45 @@ def test_the_command_refuses_in_one_sentence(
 def test_bad_input_gets_a_sentence(call: object, message: str) -> None:
     with pytest.raises(udd.UddError, match=message):
         call()  # type: ignore[operator]
+
+
+def test_a_multiplier_without_a_sign_of_its_own_decides_nothing() -> None:
+    from udd.structure.multipliers import Multipliers
+
+    one = np.ones(1, dtype=complex)
+    assert Multipliers(np.log([3.0]), one, np.array([1e-9])).decided
+    # Of the order of 1, and not known: on which side of the unit circle is open.
+    assert not Multipliers(np.log([0.9]), one, np.array([2.0])).decided
+    assert Multipliers(np.array([-60.0]), one, np.array([2.0])).decided
+
+
+def test_multipliers_that_break_liouvilles_formula_bring_no_bifurcation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from dataclasses import replace
+
+    from udd.structure import multipliers, signs
+
+    orbit, right = udd.periodic_orbit(udd.DLE(7.3)), multipliers.multipliers_at
+
+    def wrong(curve: object, u: np.ndarray) -> multipliers.Multipliers:
+        found = right(curve, u)  # type: ignore[arg-type]
+        return replace(found, log=found.log + np.array([0.0, 5.0]))
+
+    monkeypatch.setattr(multipliers, "multipliers_at", wrong)
+    monkeypatch.setattr(signs, "multipliers_at", wrong)
+    assert udd.continuation(orbit, "w", (6.9, 7.4)).find("symmetry breaking") == []
+
+
+def test_from_an_attractor_to_its_cycle() -> None:
+    scan = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 6.0, 9.0])
+    one = scan.isel(path=0, start=0)
+    orbit = udd.periodic_orbit(udd.DLE(1.0), one.sel(w=9.0))
+    assert orbit.model.parameters["w"] == 9.0 and orbit.symmetric
+    assert orbit.period == pytest.approx(float(one["period_time"].sel(w=9.0)), rel=1e-6)
+    with pytest.raises(ModelError, match="not periodic"):
+        udd.periodic_orbit(udd.DLE(1.0), one.sel(w=1.0))
+    with pytest.raises(ModelError, match="select it"):
+        udd.periodic_orbit(udd.DLE(1.0), scan)
+    with pytest.raises(ModelError, match="a model of Omega"):
+        udd.periodic_orbit(udd.Disk(0.06), one.sel(w=9.0))

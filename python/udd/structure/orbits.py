@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,10 @@ from .flow import Floats, Flow, flow_of
 from .multipliers import multipliers_at
 from .path import Lost, along_parameter, correct, nearest_of_family
 from .solutions import PeriodicOrbit
+from .states import state_of_attractor
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["closed", "closes_earlier", "cycle_at", "flown", "periodic_orbit", "pieces_for"]
 
@@ -38,7 +42,7 @@ _RESIDUAL = 1e-9  # gaps that are as good as none
 
 def periodic_orbit(
     model: Model,
-    guess: ArrayLike | None = None,
+    guess: ArrayLike | xr.Dataset | None = None,
     *,
     period: float | None = None,
     settle: float | None = None,
@@ -50,9 +54,11 @@ def periodic_orbit(
     ----------
     model : Model
         Its rates must not depend on time. The disk's edge is ignored.
-    guess : array_like, shape (dim,) or (n, dim), optional
+    guess : array_like, shape (dim,) or (n, dim), or xarray.Dataset, optional
         A state near the cycle, or states on it at equal distances of time over one period, which must then
-        be given. By default the search starts where :func:`udd.lyapunov` does.
+        be given; or one attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
+        ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``: its state, its period and the
+        value of the parameter are taken. By default the search starts where :func:`udd.lyapunov` does.
     period : float, optional
         About its period. By default the run from the guess tells it: the first time that it comes back, or
         nearly back, be it to the mirror image.
@@ -76,8 +82,8 @@ def periodic_orbit(
     -----
     The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
     Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
-    Newton's method closes the gaps; where energy is kept, so that cycles come in families, one near the guess
-    is found by the method of Gauss and Newton. Where the law has kinks, runs land on them. A cycle that is its
+    Newton's method closes the gaps; where energy is kept, so that cycles come in families, the method of
+    Gauss and Newton finds one near the guess. Where the law has kinks, runs land on them. A cycle that is its
     own mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's
     close returns there are unstable ones.
 
@@ -89,8 +95,19 @@ def periodic_orbit(
     >>> orbit = udd.periodic_orbit(udd.DLE(10.0))
     >>> print(round(orbit.period, 10), orbit.symmetric, orbit.stable)
     3.3583222491 True True
+
+    From an attractor that a basin belongs to:
+
+    >>> import numpy as np
+    >>> axis = np.linspace(-3, 3, 8)
+    >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
+    >>> udd.periodic_orbit(udd.DLE(6.2), found.sel(number=2)).symmetric
+    False
     """
     require_model(model)
+    if guess is not None and hasattr(guess, "data_vars"):
+        model, guess, lasts = state_of_attractor(model, guess)
+        period = lasts if period is None else period
     dim = len(model.state_names)
     given = array("guess", default_start(model) if guess is None else guess)
     if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
