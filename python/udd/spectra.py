@@ -27,6 +27,7 @@ __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
 _Floats = NDArray[np.float64]
 
 _SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_LATE = 4  # times that a motion that nearly comes back is looked at again
 _POINTS = 600  # section points in which a periodic motion shows itself
 
 
@@ -190,6 +191,7 @@ def lyapunov_spectrum(
         # The averages are of the way there: once more, of what it leads to.
         found = run(fate.state, time, 0.0, goal)
         fate = run.fate(found["end"][0])
+        aside = aside if fate.kind != "aperiodic" else 0.0
     values, errors = found["value"][0], found["standard_error"][0]
     converged = bool(errors[0] <= goal) and fate.kind != "settling"
     if fate.kind == "settling":
@@ -297,7 +299,7 @@ class _Run:
 
         if rests(start, tight.settled):
             return _Fate("equilibrium", np.nan, start, 0.0)
-        state, spent, skip = start, 0.0, 0
+        state, spent, skip, late = start, 0.0, 0, 0
         while True:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", IncompleteWarning)
@@ -317,9 +319,11 @@ class _Run:
                 moved = np.abs(places[last : last + period] - places[:period]).max()
                 there = skip == 0 and moved < tight.same
                 return _Fate("periodic orbit", time, *((start, 0.0) if there else (state, spent)))
-            if spent >= longest:
+            if spent >= longest and (period != SETTLING or late == _LATE):
                 return _Fate("settling" if period == SETTLING else "aperiodic", np.nan, state, spent)
-            skip = 2 * skip + _POINTS
+            # Intermittent chaos nearly comes back for a while: it is looked at again, a little later.
+            late += spent >= longest
+            skip = _POINTS if late else 2 * skip + _POINTS
 
 
 def kaplan_yorke(exponents: ArrayLike) -> float:
