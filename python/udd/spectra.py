@@ -27,6 +27,7 @@ __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
 _Floats = NDArray[np.float64]
 
 _SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
 _LATE = 4  # times that a motion that nearly comes back is looked at again
 _POINTS = 600  # section points in which a periodic motion shows itself
 
@@ -144,7 +145,7 @@ def lyapunov_spectrum(
     -----
     Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
     (G. Benettin et al., Meccanica 15 (1980) 9). Chaos is followed on, without tangents, for the time `t` in
-    all. Where it ends on a periodic orbit or at rest, or the orbit spirals there slowly, the exponents are
+    all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there slowly, the exponents are
     taken again from what it has settled on. Transients longer than `t` are not seen as such: their mean is
     8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
 
@@ -290,7 +291,7 @@ class _Run:
             self.points(start, section, n=1, t_max=1e-9)
 
     def fate(self, start: _Floats, longest: float = 0.0) -> _Fate:
-        """What the orbit does from here on: 600 section points, and more until the time `longest`."""
+        """What the orbit does from here on: 600 section points, and more for the time `longest`."""
         from udd.branching.coordinates import coordinates_of
         from udd.branching.recurrence import SETTLING, periods, tightness
 
@@ -302,7 +303,7 @@ class _Run:
 
         if rests(start, tight.settled):
             return _Fate("equilibrium", np.nan, start, 0.0)
-        state, spent, skip, late = start, 0.0, 0, 0
+        state, spent, seen, skip, late = start, 0.0, 0, 0, 0
         while True:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", IncompleteWarning)
@@ -322,10 +323,12 @@ class _Run:
                 moved = np.abs(places[last : last + period] - places[:period]).max()
                 there = skip == 0 and moved < tight.same
                 return _Fate("periodic orbit", time, *((start, 0.0) if there else (state, spent)))
-            if spent >= longest and (period != SETTLING or late == _LATE):
+            seen += skip + _POINTS
+            enough = spent >= longest or seen >= _FOLLOWED
+            if enough and (period != SETTLING or late == _LATE):
                 return _Fate("settling" if period == SETTLING else "aperiodic", np.nan, state, spent)
             # Intermittent chaos nearly comes back for a while: it is looked at again, a little later.
-            late += spent >= longest
+            late += enough
             skip = _POINTS if late else 2 * skip + _POINTS
 
 
