@@ -145,9 +145,9 @@ def lyapunov_spectrum(
     -----
     Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
     (G. Benettin et al., Meccanica 15 (1980) 9). Chaos is followed on, without tangents, for the time `t` in
-    all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there slowly, the exponents are
-    taken again from what it has settled on. Transients longer than `t` are not seen as such: their mean is
-    8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
+    all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there
+    slowly, the exponents are taken again from what it has settled on. Longer transients are not seen as such:
+    their mean is 8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
 
     Examples
     --------

@@ -248,7 +248,10 @@ def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
         nodes = flown(flow, values, start, share, pieces_for(flow, share))
         if (np.ptp(nodes, axis=0) / flow.size).max() < _WHOLE * extent:
             continue  # it has hardly left its start, where it is slow
-        found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
+        try:
+            found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
+        except ModelError:
+            continue
         return _simplest(*found)
     return curve, u
 
