@@ -89,7 +89,9 @@ def test_a_cycle_of_a_family_where_energy_is_kept(period: float | None) -> None:
     assert orbit.period == pytest.approx(4 * math.sqrt(0.3 / 9.81) * special.ellipk(m), abs=1e-11)
     # The other multiplier is 1 too.
     assert orbit.multipliers[0] == pytest.approx(1.0, abs=1e-6)
-    assert not orbit.stable and "neutral" in repr(orbit)
+    assert orbit.neutral and not orbit.stable and "neutral" in repr(orbit)
+    with pytest.raises(ModelError, match="cycles come in families"):
+        udd.continuation(orbit, "g", (5.0, 12.0))
 
 
 def test_the_period_of_the_disks_asymmetric_pair() -> None:

@@ -113,6 +113,11 @@ class PeriodicOrbit:
         """Whether all multipliers are inside the unit circle, and not on it but for rounding."""
         return bool((np.abs(self.multipliers) < 1.0 - _ON).all())
 
+    @property
+    def neutral(self) -> bool:
+        """Whether no multiplier is outside the unit circle, and one on it but for rounding."""
+        return not self.stable and bool((np.abs(self.multipliers) <= 1.0 + _ON).all())
+
     @cached_property
     def period_error(self) -> float:
         """A bound of the period's error: how far it moves when runs are a hundred times less accurate."""
@@ -131,8 +136,7 @@ class PeriodicOrbit:
         return simulate(beyond_the_edge(self.model), times, self.state, **tight)
 
     def __repr__(self) -> str:
-        neutral = bool((np.abs(self.multipliers) <= 1.0 + _ON).all())
-        stable = "stable" if self.stable else "neutral" if neutral else "unstable"
+        stable = "stable" if self.stable else "neutral" if self.neutral else "unstable"
         mirror = "symmetric, " if self.symmetric else ""
         largest = ", ".join(f"{value:.6g}" for value in self.multipliers)
         bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"

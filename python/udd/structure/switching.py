@@ -21,6 +21,7 @@ __all__ = ["born_at", "doubled"]
 
 _HALVINGS = 24
 _BENT = 1.5  # by so much the ratio of two distances, at an amplitude and at half of it, may differ from 4
+_ROUNDING = 1e-6  # a test function that is smaller has no sign
 _STILL = 1e-9  # a parameter that moves less does not move, as where a conservative cycle is born
 
 
@@ -78,11 +79,15 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place,
 
 def _nothing_between(curve: AnyCurve, point: BifurcationPoint, half: Place, whole: Place) -> bool:
     """Whether a branch does as its normal form says, up to an amplitude and up to half of it."""
+    before, after = signs_at(curve, half), signs_at(curve, whole)
+    # What vanishes all along, as where energy is kept, changes its sign by rounding.
+    clear = [max(abs(getattr(s, name)) for s in (before, after)) for name in changes(before, after)]
+    if any(size > _ROUNDING for size in clear):
+        return False
     if point.kind == "branch point":
-        return not changes(signs_at(curve, half), signs_at(curve, whole))
-    signs = signs_at(curve, whole)
+        return True
     # At birth no multiplier is negative: they are squares, or exponentials of eigenvalues.
-    if changes(signs_at(curve, half), signs) or signs.minus < 0.0:
+    if after.minus < 0.0:
         return False
     # The parameter moves with the square of the amplitude.
     first, last = (curve.value(place.u) - point.value for place in (half, whole))
