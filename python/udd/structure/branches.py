@@ -193,11 +193,10 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, P
             curve.fix_phase(u)
         return curve, Place(u, tangent_at(curve, u, row))
     except Lost as error:
+        reason = str(error)
         if isinstance(start, PeriodicOrbit) and start.neutral:
-            error = Lost(
-                "where energy is kept cycles come in families, of which no parameter singles out one"
-            )
-        raise ModelError(f"the start cannot be followed: {error}") from None
+            reason = "where energy is kept cycles come in families, of which no parameter singles out one"
+        raise ModelError(f"the start cannot be followed: {reason}") from None
 
 
 def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Branch:
