@@ -18,8 +18,17 @@ from .asked import parameter_rows, parameter_values, runner_of, start_states
 from .branches import intervals
 from .coordinates import Floats, coordinates_of
 from .crossings import INTERRUPTED, UNDECIDED, parts
-from .kinds import kinds_of, of_kinds
-from .labels import Variables, of_outcomes, of_parameter, of_result, of_state, require_xarray, time_unit
+from .kinds import MOTIONS, kinds_of
+from .labels import (
+    Variables,
+    of_flags,
+    of_outcomes,
+    of_parameter,
+    of_result,
+    of_state,
+    require_xarray,
+    time_unit,
+)
 from .paths import PATHS, kick, nothing, walk
 from .recurrence import SETTLING, tightness
 from .telling import Told, tell
@@ -242,7 +251,7 @@ def _of_attractors(
     period = np.where(told.label > 0, verdicts.period, SETTLING).astype(np.int32)
     time = {"long_name": "duration of a period", "units": time_unit(model)}
     return {
-        "kind": (dims, kinds.reshape(shape), of_kinds()),
+        "kind": (dims, kinds.reshape(shape), of_flags("kind of motion", MOTIONS)),
         "period": (dims, period.reshape(shape), {"long_name": "number of distinct section points"}),
         "period_time": (dims, told.duration.reshape(shape), time),
         "attractor": (dims, told.label.reshape(shape), {"long_name": "label of the attractor"}),

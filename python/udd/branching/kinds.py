@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +13,7 @@ from .crossings import Crossings, Runner
 from .recurrence import APERIODIC
 from .verdicts import Judge, Verdicts, decided
 
-__all__ = ["MOTIONS", "kinds_of", "of_kinds"]
+__all__ = ["MOTIONS", "kinds_of"]
 
 MOTIONS = ("none", "equilibrium", "rotating state", "cycle", "torus", "chaos", "aperiodic", "left")
 """``none`` has no verdict; of what is ``aperiodic`` the exponents leave open what it is; ``left`` is off the
@@ -26,16 +24,6 @@ _PARTS = 20.0  # a distance that grows by exp of this does so in chaos
 _STAYS = 3.0  # one that changes by less than exp of this does not change
 _SPANS = (0.4, 4.0)  # of the time of the section points: for most chaos, and for the rest
 _TURNS = 1e-6  # typical sizes per typical time: what is slower does not turn
-
-
-def of_kinds() -> dict[str, Any]:
-    """For the array ``kind``, by the CF conventions."""
-    meanings = " ".join(name.replace(" ", "_") for name in MOTIONS)
-    return {
-        "long_name": "kind of motion",
-        "flag_values": list(range(len(MOTIONS))),
-        "flag_meanings": meanings,
-    }
 
 
 def kinds_of(
