@@ -33,7 +33,7 @@ pub struct Multiplier {
 pub fn multipliers(factors: &[DMatrix<f64>]) -> Option<Vec<Multiplier>> {
     let n = factors.first()?.nrows();
     let mut product = Product::of(factors);
-    product.to_hessenberg();
+    product.make_hessenberg();
     let mut high = n;
     while high > 1 {
         high = product.deflate(high)?;
@@ -125,7 +125,7 @@ impl Product {
         self.last[(k, j)] = C::new(0.0, 0.0);
     }
 
-    fn to_hessenberg(&mut self) {
+    fn make_hessenberg(&mut self) {
         for j in 0..self.n.saturating_sub(2) {
             for k in (j + 2..self.n).rev() {
                 self.annihilate(k, j);
