@@ -217,6 +217,9 @@ def test_the_period_is_the_least_whatever_the_number_of_rounds() -> None:
     # In Lorenz's window about rho = 160 the run nearly comes back after each of 19 rounds.
     orbit = udd.periodic_orbit(lorenz(160.0), [1.0, 1.0, 1.0], settle=100.0)
     assert orbit.period == pytest.approx(1.152948928, abs=1e-8)
+    # 32 rounds in as many pieces: the nodes are one state.
+    orbit = udd.periodic_orbit(lorenz(232.42857142857144), [1.0, 1.0, 1.0], settle=100.0)
+    assert orbit.period == pytest.approx(0.4776215936, abs=1e-8)
     # Thirteen rounds of the figure-eight, asked for by their period.
     known = udd.periodic_orbit(udd.DLE(10.0))
     again = udd.periodic_orbit(udd.DLE(10.0), known.state, period=13 * known.period)

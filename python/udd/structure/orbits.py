@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,7 @@ _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a
 _SAME = 1e-7  # two states within this part of the sizes are one
 _HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
 _PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
+_LOOKS = 100  # states that show the extent of a cycle
 _WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
 _SINGULAR = (1e-2, 1e-4, 1e-7)  # singular values that count as zero, relative to the largest
 _FAMILY = 400  # unknowns up to which singular values are asked for
@@ -234,20 +235,28 @@ def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
         ways.append((2, flow.mirror))
     ways.sort(key=lambda way: -way[0])
     times = np.array([0.0, *(span / k for k, _ in ways)])
-    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"}
+    model = flow.with_values(values)
+
+    def states_at(moments: Floats) -> Floats:
+        run = simulate(model, moments, flow.full(start), rtol=1e-12, atol=1e-14, method="auto")
+        return flow.reduced(run.state)
+
+    def extent(time: float) -> float:
+        # At unequal distances: equal ones may be a round each.
+        states = states_at(time * np.linspace(0.0, 1.0, _LOOKS) ** 1.3)
+        return float((np.ptp(states, axis=0) / flow.size).max())
+
     distinct, place = np.unique(times, return_inverse=True)
-    run = simulate(flow.with_values(values), distinct, flow.full(start), **options)
-    ends = flow.reduced(run.state)[place]
-    extent = (np.ptp(curve.nodes(u), axis=0) / flow.size).max()
+    ends = states_at(distinct)[place]
     for (parts, mirror), end in zip(ways, ends[1:], strict=True):
         gap = mirror * end - start
         shift = flow.turns(gap)
         if np.abs((gap + shift) / flow.size).max() > _SAME:
             continue
         share = span / parts
-        nodes = flown(flow, values, start, share, pieces_for(flow, share))
-        if (np.ptp(nodes, axis=0) / flow.size).max() < _WHOLE * extent:
+        if extent(share) < _WHOLE * extent(span):
             continue  # it has hardly left its start, where it is slow
+        nodes = flown(flow, values, start, share, pieces_for(flow, share))
         try:
             found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
         except ModelError:
