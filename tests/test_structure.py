@@ -574,6 +574,8 @@ def test_a_multiplier_without_a_sign_of_its_own_decides_nothing() -> None:
     # Of the order of 1, and not known: on which side of the unit circle is open.
     assert not Multipliers(np.log([0.9]), one, np.array([2.0])).decided
     assert Multipliers(np.array([-60.0]), one, np.array([2.0])).decided
+    # A contact that sticks: a multiplier that is zero.
+    assert Multipliers(np.array([-np.inf]), one, np.array([np.inf])).decided
 
 
 def test_multipliers_that_break_liouvilles_formula_bring_no_bifurcation(

@@ -44,16 +44,17 @@ class Multipliers:
 
     @property
     def values(self) -> NDArray[np.complex128]:
-        """The multipliers; what is too large for a float is 1e300 long."""
+        """The multipliers; what is too large for its square to be a float is 1e150 long."""
         with np.errstate(over="ignore", under="ignore"):
-            values: NDArray[np.complex128] = self.phases * np.minimum(np.exp(self.log), 1e300)
+            values: NDArray[np.complex128] = self.phases * np.minimum(np.exp(self.log), 1e150)
         return values
 
     @property
     def decided(self) -> bool:
         """Whether it is known of each multiplier where it lies beside the unit circle."""
-        with np.errstate(over="ignore"):
-            weak = np.exp(self.log) * (1.0 + self.error) < _WEAK
+        with np.errstate(over="ignore", invalid="ignore"):
+            # A direction that dies out, as where a contact sticks, is zero to the last bit.
+            weak = np.isneginf(self.log) | (np.exp(self.log) * (1.0 + self.error) < _WEAK)
         return bool(((self.error < _KNOWN) | weak).all())
 
 
