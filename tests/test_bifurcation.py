@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -153,6 +154,37 @@ def test_the_period_doubles_where_it_should() -> None:
     square = (omega[:, -1] - omega[:, -3]) ** 2
     # A cubic in the square: what it leaves is measured by leaving out the farthest points, below 1e-5.
     assert grown(found, square, 3) == pytest.approx(5.394713224, abs=2e-5)
+
+
+def kinds(found: Any) -> list[str]:
+    names = str(found["kind"].attrs["flag_meanings"]).split()
+    return [names[k] for k in found["kind"].to_numpy().ravel()]
+
+
+def test_attractors_have_a_kind() -> None:
+    found = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 6.0, 9.0])
+    assert kinds(found) == ["chaos", "cycle", "cycle"]
+    # Rotation is stable from w = 10/3 on at B = 0.2; at B = 0.9 the disk comes to rest at z = 1/B.
+    steady = udd.bifurcation(udd.DLE(1.0, B=0.2), "w", [3.7, 5.0], starts=[2.0, 2.0, 0.1])
+    assert kinds(steady) == ["rotating_state"] * 2
+    assert kinds(udd.bifurcation(udd.DLE(1.0, B=0.9), "w", [5.0], starts=[0.0, 0.0, 0.1])) == ["equilibrium"]
+    # From the edge of the wheels at W = 0.055 the disk leaves.
+    assert kinds(udd.bifurcation(udd.Disk(0.06), "W", [0.055, 0.088])) == ["left", "cycle"]
+
+
+def test_a_motion_of_two_frequencies_is_a_torus() -> None:
+    model = udd.Model(
+        ["x", "y", "u", "v"],
+        {
+            "x": "x*(1 - x^2 - y^2) - y",
+            "y": "y*(1 - x^2 - y^2) + x",
+            "u": "mu*u - s*v - u*(u^2 + v^2)",
+            "v": "mu*v + s*u - v*(u^2 + v^2)",
+        },
+        {"mu": 0.2, "s": 0.3037},
+    )
+    found = udd.bifurcation(model, "mu", [-0.2, 0.2], starts=[0.5, 0.2, 0.3, 0.1])
+    assert kinds(found) == ["cycle", "torus"]
 
 
 def test_the_symmetry_breaks_where_it_should() -> None:

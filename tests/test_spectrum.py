@@ -55,6 +55,20 @@ def test_an_equilibrium():
     assert abs(found.exponents.sum() + 2.0) < 1e-8
 
 
+def test_a_chaotic_transient_is_told_as_one():
+    # Figure 16b: chaos that lives some 27,000 units and ends in rotation, which is stable.
+    w, B = 3.7, 0.2
+    found = udd.lyapunov_spectrum(udd.DLE(w, B=B), state0=[np.sqrt(w), np.sqrt(w), -3.5])
+    assert found.verdict == "equilibrium" and found.converged
+    # The exponents are those of the end: l^3 + (1 + B w) l^2 + w (1 + B) l + 2 w = 0.
+    roots = np.sort(np.roots([1.0, 1.0 + B * w, w * (1.0 + B), 2.0 * w]).real)[::-1]
+    assert np.abs(found.exponents - roots).max() < 4 * found.standard_errors.max() + 1e-3
+    assert 1000.0 < found.transient < 2e5 and "after a transient" in repr(found)
+    # What begins where it ends has none.
+    there = udd.lyapunov_spectrum(udd.DLE(w, B=B), state0=found.end)
+    assert there.verdict == "equilibrium" and there.transient == 0.0
+
+
 def test_a_section_on_request():
     model = udd.DLE(1.0)
     found = udd.lyapunov_spectrum(model, tol=5e-3, section="maxima of z")

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import optimize
+from scipy import optimize, special
 from scipy.integrate import solve_ivp
 
 import udd
+from exact_cycles import symmetric_period
 from udd.errors import ModelError
 from udd.structure import loci
 
@@ -75,6 +78,20 @@ def test_the_period_of_the_figure_eight(w: float) -> None:
     orbit = udd.periodic_orbit(udd.DLE(w))
     assert orbit.symmetric and orbit.stable
     assert orbit.period == pytest.approx(PERIODS[w], abs=1e-10)  # the reference's last digit is 1e-11
+
+
+@pytest.mark.parametrize("period", [None, 1.15])
+def test_a_cycle_of_a_family_where_energy_is_kept(period: float | None) -> None:
+    orbit = udd.periodic_orbit(udd.Pendulum(0.3), [0.0, 1.0], period=period)
+    omega, theta = orbit.state
+    # T = 4 sqrt(l/g) K(sin(a/2)) for the amplitude a of its own energy.
+    m = math.sin(theta / 2) ** 2 + omega**2 * 0.3 / (4 * 9.81)
+    assert orbit.period == pytest.approx(4 * math.sqrt(0.3 / 9.81) * special.ellipk(m), abs=1e-11)
+    # The other multiplier is 1 too.
+    assert orbit.multipliers[0] == pytest.approx(1.0, abs=1e-6)
+    assert orbit.neutral and not orbit.stable and "neutral" in repr(orbit)
+    with pytest.raises(ModelError, match="cycles come in families"):
+        udd.continuation(orbit, "g", (5.0, 12.0))
 
 
 def test_the_period_of_the_disks_asymmetric_pair() -> None:
@@ -142,6 +159,109 @@ def test_the_asymmetric_pair_doubles_and_doubles(figure_eight: udd.Branch) -> No
     assert found.branches[0].ends[0] == "born at a symmetry breaking"
 
 
+def test_a_cascade_to_the_fifth_digit_of_feigenbaums_constant() -> None:
+    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=9)
+    # The ratios come nearer by a factor of 4.67 each: 9e-6 after nine doublings.
+    assert found.ratios[-1] == pytest.approx(4.669201609, abs=1e-5)
+    # Solved for, not followed step by step: the last cycle has 256 rounds, and some 1500 pieces.
+    assert max(len(branch) for branch in found.branches[3:]) < 10
+    # The doublings of the branch followed step by step, of another run.
+    assert found.values[5] == pytest.approx(5.0045538093, abs=1e-10)
+    assert all(branch.ends[0] == "born at a period doubling" for branch in found.branches[1:])
+
+
+def test_a_step_off_a_bifurcation_does_not_jump_over_the_next() -> None:
+    # A window of the DLE 3e-5 wide, in which the cycle of 22 section points loses its symmetry and doubles.
+    state = [0.6415522621501002, -4.139594982525741, 7.896287533019794e-18]
+    orbit = udd.periodic_orbit(udd.DLE(4.500018), state, period=53.11554)
+    branch = udd.continuation(
+        orbit, "w", (4.4999, 4.51), direction="down", step=1e-6, longest=1e-3, until="symmetry breaking"
+    )
+    (breaking,) = branch.points
+    assert breaking.value == pytest.approx(4.500013676, abs=1e-9)
+    born = udd.continuation(breaking, bounds=(4.49, 4.51), most=20)
+    assert [point.kind for point in born.points] == ["period doubling"]
+    assert 4.49999 < born.points[0].value < breaking.value
+    assert born.stable[0] and not born.stable[-1]
+
+
+def lorenz(rho: float) -> udd.Model:
+    """The Lorenz equations with the usual sigma and beta."""
+    rates = {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"}
+    return udd.Model(["x", "y", "z"], rates, {"sigma": 10.0, "rho": rho, "beta": 8 / 3})
+
+
+def test_weak_multipliers_beside_strong_ones_bring_no_false_bifurcations() -> None:
+    rest = next(rest for rest in udd.equilibria(lorenz(24.0), near=[7.8, 7.8, 23.0]) if rest.state[0] > 1)
+    (hopf,) = udd.continuation(rest, "rho", (20.0, 30.0)).points
+    branch = udd.continuation(hopf)
+    # From the Hopf bifurcation at 470/19 to the homoclinic one rho falls all the way.
+    assert hopf.value == pytest.approx(470 / 19, abs=1e-10)
+    assert branch.points == ()
+    assert branch.ends[1].startswith("a connection near 13.9265574")
+    # The volume shrinks at the rate -41/3: by Liouville's formula the logarithms of the multipliers add up to
+    # that, though the strong ones are 1e10 and more, and the weak ones below 1e-70.
+    logs = np.log(np.abs(branch.multipliers)).sum(axis=1)
+    np.testing.assert_allclose(logs, -41 / 3 * branch.periods, rtol=1e-6)
+    assert np.abs(branch.multipliers[-1, 0]) > 1e10
+    assert (branch.multipliers.real > 0).all()
+
+
+def test_the_readmes_cycles_come_to_their_connection_without_bifurcations(rotation: udd.Branch) -> None:
+    cycles = udd.continuation(rotation.find("Hopf")[0])
+    assert cycles.points == ()
+    assert cycles.ends[1].startswith("a connection near 4.2599490")
+
+
+def test_the_period_is_the_least_whatever_the_number_of_rounds() -> None:
+    # In Lorenz's window about rho = 160 the run nearly comes back after each of 19 rounds.
+    orbit = udd.periodic_orbit(lorenz(160.0), [1.0, 1.0, 1.0], settle=100.0)
+    assert orbit.period == pytest.approx(1.152948928, abs=1e-8)
+    # 32 rounds in as many pieces: the nodes are one state.
+    orbit = udd.periodic_orbit(lorenz(232.42857142857144), [1.0, 1.0, 1.0], settle=100.0)
+    assert orbit.period == pytest.approx(0.4776215936, abs=1e-8)
+    # Thirteen rounds of the figure-eight, asked for by their period.
+    known = udd.periodic_orbit(udd.DLE(10.0))
+    again = udd.periodic_orbit(udd.DLE(10.0), known.state, period=13 * known.period)
+    assert again.period == pytest.approx(known.period, abs=1e-10) and again.symmetric
+
+
+@pytest.mark.parametrize("w", [7.1, 10.0, 100.0])
+def test_the_bound_of_a_period_holds_against_thirty_digits(w: float) -> None:
+    orbit = udd.periodic_orbit(udd.DLE(w))
+    error = abs(float(Decimal(orbit.period) - symmetric_period(orbit)))
+    assert error <= orbit.period_error < 1e-12
+
+
+# 0.9: the bound was that of the value's rounding, 1e-16, and the error 2e-15.
+@pytest.mark.parametrize("B", [0.02, 0.1, 0.2, 0.5, 0.9, 0.99])
+def test_the_bound_of_a_hopf_bifurcation_holds(B: float) -> None:
+    b = Fraction(B)
+    exact = (1 - b) / (b * (1 + b))
+    known = float(exact)
+    rests = udd.equilibria(udd.DLE(0.8 * known, B=B))
+    start = next(rest for rest in rests if rest.state[0] > 1e-3)
+    (hopf,) = udd.continuation(start, "w", (0.5 * known, 2.0 * known)).points
+    assert abs(float(Fraction(hopf.value) - exact)) <= hopf.error < 1e-12 * max(known, 1.0)
+    period = 2 * math.pi / math.sqrt((1 - B) / B)
+    assert abs(hopf.period - period) <= hopf.period_error < 1e-9
+
+
+def test_the_bound_of_where_doublings_accumulate_holds() -> None:
+    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=6)
+    # From eleven doublings.
+    known = 5.0043826710
+    assert abs(found.limit - known) < found.limit_error < 1e-6
+    assert "error below" in repr(found)
+
+
+def test_the_bound_of_a_connection_is_not_zero(rotation: udd.Branch) -> None:
+    hopf = rotation.find("Hopf")[0]
+    a, b = (udd.connection(udd.continuation(hopf, period=period)) for period in (12.0, 18.0))
+    # Two that were found from cycles of different length, with pieces of their own.
+    assert 0.0 < abs(a.value - b.value) + 1e-15 < a.error + b.error < 1e-11
+
+
 @pytest.mark.parametrize("B", [0.1, 0.2, 0.5])
 def test_where_rotation_becomes_stable(B: float) -> None:
     known = (1.0 - B) / (B * (1.0 + B))
@@ -173,15 +293,17 @@ def test_cycles_are_born_at_the_hopf_bifurcation(rotation: udd.Branch) -> None:
     assert spread[5] / spread[0] == pytest.approx(math.sqrt(distance[5] / distance[0]), rel=0.02)
 
 
-def test_a_branch_of_the_disk_goes_through_its_folds() -> None:
-    disk = udd.Disk(0.004)
-    start = next(rest for rest in udd.equilibria(disk) if 1.2 < rest.state[0] < 1.65)
+# The three rotating states at W = 0.0045: one on each side of the kink's and of the smooth fold.
+@pytest.mark.parametrize(("low", "high"), [(0.5, 1.2), (1.2, 1.65), (1.66, 3.0)])
+def test_a_branch_of_the_disk_goes_through_its_folds(low: float, high: float) -> None:
+    disk = udd.Disk(0.0045)
+    start = next(rest for rest in udd.equilibria(disk) if low < rest.state[0] < high)
     branch = udd.continuation(start, "W", (0.0005, 0.05))
     kinds = {point.kind: point.value for point in branch.points}
     # k(Omega) Omega^2 = g W has its maximum at Omega = 2 k1/(3 k2), its minimum at the kink.
     top, kink = 2 * 0.103 / (3 * 0.055), (0.103 - 0.012) / 0.055
     assert kinds["fold"] == pytest.approx((0.103 - 0.055 * top) * top**2 / 9.81, abs=1e-12)
-    assert kinds["fold at a kink"] == pytest.approx(0.012 * kink**2 / 9.81, abs=1e-12)
+    assert kinds["nonsmooth fold"] == pytest.approx(0.012 * kink**2 / 9.81, abs=1e-12)
     assert sorted([branch.values[0], branch.values[-1]]) == pytest.approx([0.0005, 0.05])
 
 
@@ -442,3 +564,47 @@ def test_the_command_refuses_in_one_sentence(
 def test_bad_input_gets_a_sentence(call: object, message: str) -> None:
     with pytest.raises(udd.UddError, match=message):
         call()  # type: ignore[operator]
+
+
+def test_a_multiplier_without_a_sign_of_its_own_decides_nothing() -> None:
+    from udd.structure.multipliers import Multipliers
+
+    one = np.ones(1, dtype=complex)
+    assert Multipliers(np.log([3.0]), one, np.array([1e-9])).decided
+    # Of the order of 1, and not known: on which side of the unit circle is open.
+    assert not Multipliers(np.log([0.9]), one, np.array([2.0])).decided
+    assert Multipliers(np.array([-60.0]), one, np.array([2.0])).decided
+    # A contact that sticks: a multiplier that is zero.
+    assert Multipliers(np.array([-np.inf]), one, np.array([np.inf])).decided
+
+
+def test_multipliers_that_break_liouvilles_formula_bring_no_bifurcation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from dataclasses import replace
+
+    from udd.structure import multipliers, signs
+
+    orbit, right = udd.periodic_orbit(udd.DLE(7.3)), multipliers.multipliers_at
+
+    def wrong(curve: object, u: np.ndarray) -> multipliers.Multipliers:
+        found = right(curve, u)  # type: ignore[arg-type]
+        return replace(found, log=found.log + np.array([0.0, 5.0]))
+
+    monkeypatch.setattr(multipliers, "multipliers_at", wrong)
+    monkeypatch.setattr(signs, "multipliers_at", wrong)
+    assert udd.continuation(orbit, "w", (6.9, 7.4)).find("symmetry breaking") == []
+
+
+def test_from_an_attractor_to_its_cycle() -> None:
+    scan = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 6.0, 9.0])
+    one = scan.isel(path=0, start=0)
+    orbit = udd.periodic_orbit(udd.DLE(1.0), one.sel(w=9.0))
+    assert orbit.model.parameters["w"] == 9.0 and orbit.symmetric
+    assert orbit.period == pytest.approx(float(one["period_time"].sel(w=9.0)), rel=1e-6)
+    with pytest.raises(ModelError, match="not periodic"):
+        udd.periodic_orbit(udd.DLE(1.0), one.sel(w=1.0))
+    with pytest.raises(ModelError, match="select it"):
+        udd.periodic_orbit(udd.DLE(1.0), scan)
+    with pytest.raises(ModelError, match="a model of Omega"):
+        udd.periodic_orbit(udd.Disk(0.06), one.sel(w=9.0))

@@ -75,6 +75,12 @@ class _Pieces(TypedDict):
     by_parameter: _Floats
     rate: _Floats
 
+class _Floquet(TypedDict):
+    log: _Floats
+    re: _Floats
+    im: _Floats
+    condition: _Floats
+
 class _Expansion(TypedDict):
     rate: _Floats
     by_state: _Floats
@@ -216,6 +222,7 @@ def shoot(
     atol: float,
 ) -> _Pieces: ...
 def expansion(model: Model, t: float, x: list[float], all: bool) -> _Expansion: ...
+def floquet(factors: _Floats) -> _Floquet | None: ...
 def solve(
     model: Model,
     data: _Data,

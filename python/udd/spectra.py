@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,8 @@ __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
 _Floats = NDArray[np.float64]
 
 _SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
+_LATE = 4  # times that a motion that nearly comes back is looked at again
 _POINTS = 600  # section points in which a periodic motion shows itself
 
 
@@ -52,10 +54,13 @@ class Spectrum:
         divergence: how far the run is from it. Averages of chaotic motion scatter like the exponents do.
     t : float
         The time that the averages cover, after the transient.
+    transient : float
+        How long the orbit at most took to settle on what it ends on, where the first averages were those of
+        another motion on the way there, such as chaos that lasts long but not for ever; else 0.
     end : ndarray, shape (dim,)
         The last state.
     converged : bool
-        Whether the largest exponent's standard error met the tolerance.
+        Whether the largest exponent's standard error met the tolerance, and the motion has settled.
     model : Model
         What was run.
     section : Section or None
@@ -69,6 +74,7 @@ class Spectrum:
     period: float
     invariants: dict[str, float]
     t: float
+    transient: float
     end: _Floats
     converged: bool
     model: Model
@@ -77,7 +83,10 @@ class Spectrum:
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.standard_errors, strict=True)
         values = ", ".join(f"{value:.5g}({error:.1g})" for value, error in pairs)
-        return f"<Spectrum of {self.model!r}: {values}; {self.verdict}, dimension {self.dimension:.4g}>"
+        after = f" after a transient of {self.transient:.4g}" if self.transient else ""
+        return (
+            f"<Spectrum of {self.model!r}: {values}; {self.verdict}{after}, dimension {self.dimension:.4g}>"
+        )
 
 
 def lyapunov_spectrum(
@@ -135,9 +144,10 @@ def lyapunov_spectrum(
     Notes
     -----
     Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
-    (G. Benettin et al., Meccanica 15 (1980) 9). Where the run ended on a periodic orbit or at rest, but the
-    exponents still remember a chaotic transient, they are taken again from there. Transients longer than `t`
-    are not seen as such: near w = 4.5 a mean 8200, and 27000 at B = 0.2, w = 3.7.
+    (G. Benettin et al., Meccanica 15 (1980) 9). Chaos is followed on, without tangents, for the time `t` in
+    all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there
+    slowly, the exponents are taken again from what it has settled on. Longer transients are not seen as such:
+    their mean is 8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
 
     Examples
     --------
@@ -165,32 +175,47 @@ def lyapunov_spectrum(
     if section is not None:
         run.refuse(section, start)
     found = run(start, time, skipped, goal)
-    rest, period = run.settled(found["end"][0])
+    fate = run.fate(found["end"][0])
     spent, finer = float(found["time"][0]), goal
-    while not (rest or np.isfinite(period) or _positive(found)) and spent < time:
+    while not (fate.ordered or _positive(found)) and spent < time:
         # Neither order nor chaos yet: on from here, for longer.
         finer /= 2.0
         found = run(found["end"][0], time - spent, 0.0, finer)
-        rest, period = run.settled(found["end"][0])
+        fate = run.fate(found["end"][0])
         spent += float(found["time"][0])
-    ordered = rest or bool(np.isfinite(period))
-    if ordered and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
-        found = run(found["end"][0], time, 0.0, goal)
+    if not fate.ordered:
+        # Chaos that has not ended may yet do so; without tangents the way there is short.
+        fate = run.fate(found["end"][0], time - spent)
+    other = fate.kind != "aperiodic" and (_positive(found) or fate.t > 0.0)
+    aside = spent + fate.t if other else 0.0
+    if fate.kind != "aperiodic" and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
+        # The averages are of the way there: once more, of what it leads to.
+        found = run(fate.state, time, 0.0, goal)
+        fate = run.fate(found["end"][0])
+        if fate.kind == "settling" and _positive(found):
+            # Neighbours part all the way: chaos in bands too narrow to be told from points.
+            fate = replace(fate, kind="aperiodic")
+        aside = aside if fate.kind != "aperiodic" else 0.0
     values, errors = found["value"][0], found["standard_error"][0]
-    converged = bool(errors[0] <= goal)
-    if not converged:
+    converged = bool(errors[0] <= goal) and fate.kind != "settling"
+    if fate.kind == "settling":
+        warnings.warn(
+            f"the motion still settles after t = {spent + fate.t:g}: these are no exponents of its end; "
+            f"a longer t (now {time:g}) would help",
+            ConvergenceWarning,
+            stacklevel=2,
+        )
+    elif not converged:
         warnings.warn(
             f"the largest exponent has a standard error of {errors[0]:.2g}, above tol = {goal:g}; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
             stacklevel=2,
         )
-    if rest:
-        verdict = "equilibrium"
-    elif ordered:
-        verdict = "periodic orbit"
+    if fate.ordered:
+        verdict = fate.kind
     else:
-        verdict = "chaos" if _positive(found) else "undecided"
+        verdict = "chaos" if fate.kind == "aperiodic" and _positive(found) else "undecided"
     order = np.argsort(-values, kind="stable")
     values, errors = values[order], errors[order]
     # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
@@ -198,11 +223,12 @@ def lyapunov_spectrum(
     return Spectrum(
         values,
         errors,
-        0.0 if rest else dimension,
+        0.0 if verdict == "equilibrium" else dimension,
         verdict,
-        period,
+        fate.period,
         _invariants(model, values, found["mean"][0], found["product"][0]),
         float(found["time"][0]),
+        aside,
         found["end"][0],
         converged,
         model,
@@ -213,6 +239,24 @@ def lyapunov_spectrum(
 def _positive(found: _core._Orbits) -> bool:
     """Whether neighbouring orbits part."""
     return bool(found["value"][0, 0] > _SIGMAS * found["standard_error"][0, 0])
+
+
+@dataclass(frozen=True)
+class _Fate:
+    """What an orbit is on: a verdict, "settling" or "aperiodic".
+
+    From `state` on, after the time `t`, if it is ordered.
+    """
+
+    kind: str
+    period: float
+    state: _Floats
+    t: float
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the orbit comes back, or rests."""
+        return self.kind in ("equilibrium", "periodic orbit")
 
 
 @dataclass(frozen=True)
@@ -237,8 +281,8 @@ class _Run:
         """Where the orbit crosses a surface from here on."""
         from udd.sections import poincare
 
-        options = {"n": _POINTS, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
-        return poincare(self.model, section, state0=start, transient=0, **options)
+        options = {"n": _POINTS, "transient": 0, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
+        return poincare(self.model, section, state0=start, **options)
 
     def refuse(self, section: str | Sequence[str], start: _Floats) -> None:
         """Refuse a surface that cannot be used, before the long run."""
@@ -246,22 +290,46 @@ class _Run:
             warnings.simplefilter("ignore", IncompleteWarning)
             self.points(start, section, n=1, t_max=1e-9)
 
-    def settled(self, end: _Floats) -> tuple[bool, float]:
-        """Whether the orbit rests from here on, and its period where it has one, else NaN."""
+    def fate(self, start: _Floats, longest: float = 0.0) -> _Fate:
+        """What the orbit does from here on: 600 section points, and more for the time `longest`."""
         from udd.branching.coordinates import coordinates_of
-        from udd.branching.recurrence import periods, tightness
+        from udd.branching.recurrence import SETTLING, periods, tightness
 
         tight = tightness(self.rtol)
-        coordinates = coordinates_of(self.model, end[None])
-        if coordinates.speed(self.model, end[None])[0] < tight.settled:
-            return True, np.nan
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", IncompleteWarning)
-            points = self.points(end)
-        if points.outcome != "finished":
-            return False, np.nan
-        period = int(periods(coordinates(points.state)[None], tight)[0])
-        return False, float(points.t[-1] - points.t[-1 - period]) if period > 0 else np.nan
+        coordinates = coordinates_of(self.model, start[None])
+
+        def rests(state: _Floats, within: float) -> bool:
+            return bool(coordinates.speed(self.model, state[None])[0] < within)
+
+        if rests(start, tight.settled):
+            return _Fate("equilibrium", np.nan, start, 0.0)
+        state, spent, seen, skip, late = start, 0.0, 0, 0, 0
+        while True:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", IncompleteWarning)
+                points = self.points(state, transient=skip)
+            state, spent = points.end, spent + float(points.t_end)
+            if points.outcome != "finished":
+                kind = "equilibrium" if rests(state, 20.0 * tight.settled) else "aperiodic"
+                return _Fate(kind, np.nan, state, spent)
+            places = coordinates(points.state)
+            period = int(periods(places[None], tight)[0])
+            if period > 0:
+                # An equilibrium on the section, and the slow spiral into it, have the period 1.
+                if period == 1 and rests(state, 20.0 * tight.settled):
+                    return _Fate("equilibrium", np.nan, state, spent)
+                time = float(points.t[-1] - points.t[-1 - period])
+                last = period * (len(places) // period - 1)
+                moved = np.abs(places[last : last + period] - places[:period]).max()
+                there = skip == 0 and moved < tight.same
+                return _Fate("periodic orbit", time, *((start, 0.0) if there else (state, spent)))
+            seen += skip + _POINTS
+            enough = spent >= longest or seen >= _FOLLOWED
+            if enough and (period != SETTLING or late == _LATE):
+                return _Fate("settling" if period == SETTLING else "aperiodic", np.nan, state, spent)
+            # Intermittent chaos nearly comes back for a while: it is looked at again, a little later.
+            late += enough
+            skip = _POINTS if late else 2 * skip + _POINTS
 
 
 def kaplan_yorke(exponents: ArrayLike) -> float:

@@ -1,6 +1,7 @@
 //! What `udd.equilibria`, `udd.periodic_orbit` and `udd.continuation` are made of.
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use nalgebra::DMatrix;
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -10,7 +11,7 @@ use super::jobs;
 use super::model::{AnyModel, state, with_wide_model};
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;
-use crate::run::{Flown, MOST_PARAMETERS, Piece, Stop, higher, linear, pieces};
+use crate::run::{Flown, MOST_PARAMETERS, Multiplier, Piece, Stop, higher, linear, multipliers, pieces};
 
 /// Pieces of orbits: their ends, with derivatives by their starts and by up to two parameters.
 ///
@@ -122,7 +123,32 @@ fn expansion<'py>(
     Ok(dict)
 }
 
+/// The eigenvalues of the product of square factors (m, n, n), the first of them the first to act, largest
+/// first: logarithms of their sizes, their phases, their conditions; `None` where the iteration does not converge.
+#[pyfunction]
+fn floquet<'py>(
+    py: Python<'py>,
+    factors: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let factors = factors.as_array();
+    let (count, n, columns) = factors.dim();
+    if count == 0 || n != columns {
+        return Err(ModelError::new_err("square factors are needed"));
+    }
+    let list: Vec<_> =
+        (0..count).map(|i| DMatrix::from_fn(n, n, |row, column| factors[[i, row, column]])).collect();
+    let Some(found) = multipliers(&list) else { return Ok(None) };
+    let dict = PyDict::new(py);
+    let column = |get: &dyn Fn(&Multiplier) -> f64| PyArray1::from_iter(py, found.iter().map(get));
+    dict.set_item("log", column(&|one| one.log))?;
+    dict.set_item("re", column(&|one| one.phase.re))?;
+    dict.set_item("im", column(&|one| one.phase.im))?;
+    dict.set_item("condition", column(&|one| one.condition))?;
+    Ok(Some(dict))
+}
+
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(shoot, module)?)?;
-    module.add_function(wrap_pyfunction!(expansion, module)?)
+    module.add_function(wrap_pyfunction!(expansion, module)?)?;
+    module.add_function(wrap_pyfunction!(floquet, module)?)
 }

@@ -18,7 +18,17 @@ from .asked import parameter_rows, parameter_values, runner_of, start_states
 from .branches import intervals
 from .coordinates import Floats, coordinates_of
 from .crossings import INTERRUPTED, UNDECIDED, parts
-from .labels import Variables, of_outcomes, of_parameter, of_result, of_state, require_xarray, time_unit
+from .kinds import MOTIONS, kinds_of
+from .labels import (
+    Variables,
+    of_flags,
+    of_outcomes,
+    of_parameter,
+    of_result,
+    of_state,
+    require_xarray,
+    time_unit,
+)
 from .paths import PATHS, kick, nothing, walk
 from .recurrence import SETTLING, tightness
 from .telling import Told, tell
@@ -100,7 +110,10 @@ def bifurcation(
 
         - the components of the state at the section, NaN where there are fewer points;
         - ``outcome``: how each job ended;
-        - ``period``: the number of distinct points, 0 not periodic, -1 without a verdict;
+        - ``kind``: ``flag_meanings`` names what each number stands for: equilibrium, rotating state, cycle,
+          torus, chaos; aperiodic where the exponents leave that open; left; none without a verdict;
+        - ``period``: the number of distinct points (the rounds of a cycle, 1 at rest), 0 not periodic, -1
+          without a verdict;
         - ``period_time``: how long a period takes;
         - ``attractor``: a label from 1 on, 0 where there is none; attractors of neighbouring values have the
           same one where the points hardly move;
@@ -124,7 +137,7 @@ def bifurcation(
 
     Notes
     -----
-    Not periodic means chaos, a quasi-periodic motion, or a long period. A chaotic transient that outlives the
+    What is not periodic is told by the exponents of a short run on. A chaotic transient that outlives the
     run looks like chaos; where the ways up and down differ, all are followed to the length of
     `extend` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the way up
     or down begins at its initial state again with the next value.
@@ -174,7 +187,7 @@ def bifurcation(
     with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
         added = kick(judge.coordinates.size, nudge)
         interrupted = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
-    told = Told.nothing(places.size, len(axis))
+    told, kinds = Told.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
     try:
         if attractors:
             told = tell(judge, found, verdicts, places, reach)
@@ -186,6 +199,8 @@ def bifurcation(
                     raise KeyboardInterrupt
             found.outcome[unsure[verdicts.period[unsure] == SETTLING]] = UNDECIDED
             told = tell(judge, found, verdicts, places, reach)
+        if attractors:
+            kinds = kinds_of(runner, judge, found, verdicts, rows, of_job)
     except KeyboardInterrupt:
         interrupted = True
     if interrupted:
@@ -205,7 +220,7 @@ def bifurcation(
     }
     data["outcome"] = (dims, found.outcome.astype(np.int8).reshape(shape), of_outcomes())
     if attractors:
-        data |= _of_attractors(model, parameter, axis, shape, verdicts, told)
+        data |= _of_attractors(model, parameter, axis, shape, verdicts, told, kinds)
         if path == "both":
             data |= _of_hysteresis(model, parameter, axis, told)
     coords: Variables = {
@@ -224,12 +239,19 @@ def bifurcation(
 
 
 def _of_attractors(
-    model: Model, parameter: str, axis: Floats, shape: tuple[int, ...], verdicts: Verdicts, told: Told
+    model: Model,
+    parameter: str,
+    axis: Floats,
+    shape: tuple[int, ...],
+    verdicts: Verdicts,
+    told: Told,
+    kinds: NDArray[np.int8],
 ) -> Variables:
     dims = ("path", "start", parameter)
     period = np.where(told.label > 0, verdicts.period, SETTLING).astype(np.int32)
     time = {"long_name": "duration of a period", "units": time_unit(model)}
     return {
+        "kind": (dims, kinds.reshape(shape), of_flags("kind of motion", MOTIONS)),
         "period": (dims, period.reshape(shape), {"long_name": "number of distinct section points"}),
         "period_time": (dims, told.duration.reshape(shape), time),
         "attractor": (dims, told.label.reshape(shape), {"long_name": "label of the attractor"}),

@@ -21,7 +21,7 @@ from .branches import partners
 from .coordinates import Floats, coordinates_of
 from .crossings import ALL_OUTCOMES, INTERRUPTED, START_OUTSIDE
 from .crowd import Crowd
-from .labels import Variables, of_outcomes, of_result, of_state, require_xarray, time_unit
+from .labels import Variables, of_flags, of_outcomes, of_result, of_state, require_xarray, time_unit
 from .recurrence import tightness
 from .register import Register
 from .shares import shares, uncertainty
@@ -233,7 +233,7 @@ def _table(crowd: Crowd, found: list[Attractor]) -> Variables:
     orbits = np.full((len(found), longest, len(model.state_names)), np.nan)
     for k, one in enumerate(found):
         orbits[k, : len(one.states)] = one.states
-    kind = {"long_name": "kind", "flag_values": list(range(len(KINDS))), "flag_meanings": " ".join(KINDS)}
+    kind = of_flags("kind", KINDS)
     time = {"long_name": "duration of a period", "units": time_unit(model)}
     return {
         "kind": ("number", np.array([KINDS.index(one.kind) for one in found], dtype=np.int8), kind),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeAlias
 
@@ -26,14 +26,15 @@ def require_xarray() -> Any:
     return xarray
 
 
+def of_flags(words: str, names: Sequence[str]) -> dict[str, Any]:
+    """For an array of places in `names`, by the CF conventions."""
+    meanings = " ".join(name.replace(" ", "_") for name in names)
+    return {"long_name": words, "flag_values": list(range(len(names))), "flag_meanings": meanings}
+
+
 def of_outcomes() -> dict[str, Any]:
-    """For the array ``outcome``, by the CF conventions."""
-    names = " ".join(name.replace(" ", "_") for name in ALL_OUTCOMES)
-    return {
-        "long_name": "how it ended",
-        "flag_values": list(range(len(ALL_OUTCOMES))),
-        "flag_meanings": names,
-    }
+    """For the array ``outcome``."""
+    return of_flags("how it ended", ALL_OUTCOMES)
 
 
 def of_state(model: Model, name: str, words: str) -> dict[str, Any]:

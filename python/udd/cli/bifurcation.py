@@ -95,11 +95,14 @@ def summary_of(found: xr.Dataset) -> dict[str, Any]:
 
 
 def _stretches(one: xr.Dataset, parameter: str) -> list[dict[str, Any]]:
-    """Neighbouring values with the same period and attractor."""
+    """Neighbouring values with the same kind, period and attractor."""
     rows: list[dict[str, Any]] = []
-    columns = (one[name].to_numpy().tolist() for name in (parameter, "period", "attractor", "symmetric"))
-    for value, period, attractor, symmetric in zip(*columns, strict=True):
-        now = {"period": period, "attractor": attractor, "symmetric": symmetric}
+    names = str(one["kind"].attrs["flag_meanings"]).split()
+    keys = (parameter, "kind", "period", "attractor", "symmetric")
+    columns = (one[name].to_numpy().tolist() for name in keys)
+    for value, kind, period, attractor, symmetric in zip(*columns, strict=True):
+        word = names[kind].replace("_", " ")
+        now = {"kind": word, "period": period, "attractor": attractor, "symmetric": symmetric}
         if rows and all(rows[-1][key] == what for key, what in now.items()):
             rows[-1]["last"] = value
         else:
@@ -115,11 +118,12 @@ def _text(found: xr.Dataset, data: dict[str, Any]) -> str:
     ]
     if len(data["stretches"]) <= _MANY:
         for s in data["stretches"]:
-            period = {0: "aperiodic", -1: "no verdict"}.get(s["period"], f"period {s['period']}")
+            what = "no verdict" if s["kind"] == "none" else s["kind"]
+            what += f" of period {s['period']}" if s["kind"] == "cycle" and s["period"] > 0 else ""
             on = f", attractor {s['attractor']}" if s["attractor"] else ""
             on += ", its own mirror image" if s["symmetric"] == 1 else ""
             way = f"{s['path']}: " if shape["path"] > 1 else ""
-            lines.append(f"  {way}{name} = {s['first']:.6g} to {s['last']:.6g}: {period}{on}")
+            lines.append(f"  {way}{name} = {s['first']:.6g} to {s['last']:.6g}: {what}{on}")
     for first, last in data["hysteresis"] or []:
         lines.append(f"  hysteresis: {name} = {first:.6g} to {last:.6g}")
     return "\n".join(lines + [f"written: {path}" for path in data["files"]])

@@ -133,12 +133,13 @@ def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str
         "errors": found.errors.tolist(),
         "ratios": found.ratios.tolist(),
         "limit": found.limit,
+        "limit_error": found.limit_error,
     }
     lines = [f"period doublings over {found.parameter}:"]
     for k, (value, error) in enumerate(zip(found.values, found.errors, strict=True)):
         ratio = f"   ratio {found.ratios[k - 2]:.6g}" if k >= 2 else ""
         lines.append(f"  {value:.12g} (error below {error:.1g}){ratio}")
-    lines.append(f"  they accumulate at {found.limit:.10g}")
+    lines.append(f"  they accumulate at {found.limit:.11g} (error below {found.limit_error:.1g})")
     return data, "\n".join(lines)
 
 

@@ -23,13 +23,13 @@ Rows = list[list["NDArray[Any]"]]
 _STABLE, _UNSTABLE = "#000000", "#cc3311"
 _MARKS = {
     "fold": ("v", "#0072b2"),
-    "fold at a kink": (">", "#0072b2"),
+    "nonsmooth fold": (">", "#0072b2"),
     "Hopf": ("s", "#009e73"),
     "symmetry breaking": ("D", "#cc79a7"),
     "period doubling": ("o", "#e69f00"),
     "Neimark-Sacker": ("p", "#56b4e9"),
     "branch point": ("^", "#999999"),
-    "kink": ("x", "#999999"),
+    "border collision": ("x", "#999999"),
 }
 _OPEN = 400  # lines that a piece may belong to
 _NEAR = 0.12  # crossings of neighbouring cycles are joined within this part of the picture's height

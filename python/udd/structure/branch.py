@@ -30,14 +30,17 @@ class BifurcationPoint:
     Attributes
     ----------
     kind : str
-        Of equilibria and cycles: "fold", "branch point", "kink" (an equilibrium on a surface where the law
-        changes) and "fold at a kink"; of equilibria: "Hopf"; of cycles: "symmetry breaking",
-        "period doubling", "Neimark-Sacker".
+        Of equilibria and cycles: "fold", "branch point"; of equilibria: "Hopf", "border collision" (on a
+        surface where the law changes, the branch goes on) and "nonsmooth fold" (there, it turns back); of
+        cycles: "symmetry breaking", "period doubling", "Neimark-Sacker".
     parameter : str
     value : float
         The parameter's value.
     error : float
-        How far the value moves when runs are a hundred times less accurate: a bound, not an estimate.
+        A bound of the value's error: of cycles how far it moves when runs are a hundred times less accurate,
+        of equilibria what rounding makes of it.
+    period_error : float
+        The same of the cycle's period, and of that of cycles born at a Hopf bifurcation; else NaN.
     solution : Equilibrium or PeriodicOrbit
         What changes there.
     arclength : float
@@ -53,6 +56,7 @@ class BifurcationPoint:
     parameter: str
     value: float
     error: float
+    period_error: float
     solution: Equilibrium | PeriodicOrbit
     arclength: float
     frequency: float = float("nan")
@@ -76,7 +80,8 @@ class BifurcationPoint:
 
     def __repr__(self) -> str:
         more = f", {self.criticality} (first Lyapunov coefficient {self.lyapunov_coefficient:.6g})"
-        period = f", period {self.period:.12g}" if np.isfinite(self.period) else ""
+        bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"
+        period = f", period {self.period:.12g} ({bound})" if np.isfinite(self.period) else ""
         return (
             f"<{self.kind} at {self.parameter} = {self.value:.13g} (error below {self.error:.1g}){period}"
             f"{more if self.criticality else ''}>"
@@ -192,6 +197,7 @@ class Branch:
                     "value": point.value,
                     "error": point.error,
                     "period": point.period,
+                    "period_error": point.period_error,
                     "state": point.solution.state.tolist(),
                     "frequency": point.frequency,
                     "lyapunov_coefficient": point.lyapunov_coefficient,

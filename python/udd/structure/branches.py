@@ -65,7 +65,8 @@ def continuation(
         A kind of bifurcation whose first point ends the branch, or what tells it of a
         :class:`BifurcationPoint`.
     amplitude : float
-        How far from a bifurcation point its new branch is looked for first.
+        How far from a bifurcation point its new branch is looked for first. It is halved, and the first step
+        with it, until the branch does as the normal form of the bifurcation says.
 
     Returns
     -------
@@ -82,8 +83,11 @@ def continuation(
     method in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of
     pairs of multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method
     along the arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its
-    period, where losing the symmetry is a multiplier -1. Where an equilibrium meets a surface on which the
-    law has a kink, the branch lands on it and goes on with the other law's tangent.
+    period, where losing the symmetry is a multiplier -1. Multipliers come from a periodic Schur decomposition
+    of the pieces' derivatives, so that weak ones are right beside strong ones; where rounding leaves their
+    sign open, or their product is not that of Liouville's formula, no bifurcation is told. Where an
+    equilibrium meets a surface on which the law has a kink (a border collision), the branch lands on it, from
+    whichever side, and goes on with the other law's tangent.
 
     Examples
     --------
@@ -111,7 +115,9 @@ def continuation(
     step = number("step", step, above=0.0)
     longest = max(number("longest", longest, above=0.0), step)
     if isinstance(start, BifurcationPoint):
-        curve, place = born_at(start, number("amplitude", amplitude, above=0.0))
+        size = number("amplitude", amplitude, above=0.0)
+        curve, place, off = born_at(start, size)
+        step *= min(1.0, off / size)
         model = start.solution.model
     else:
         model = start.model
@@ -187,7 +193,10 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, P
             curve.fix_phase(u)
         return curve, Place(u, tangent_at(curve, u, row))
     except Lost as error:
-        raise ModelError(f"the start cannot be followed: {error}") from None
+        reason = str(error)
+        if isinstance(start, PeriodicOrbit) and start.neutral:
+            reason = "where energy is kept cycles come in families, of which no parameter singles out one"
+        raise ModelError(f"the start cannot be followed: {reason}") from None
 
 
 def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Branch:
@@ -210,7 +219,7 @@ def branch_from(ways: list[Way], model: Model, parameter: str, begin: str) -> Br
         own = signs.values
         if isinstance(curve, CycleCurve):
             symmetric = curve.symmetric
-            own = own**2 if symmetric else own
+            own = own**2 + 0.0 if symmetric else own
             state = curve.flow.full(curve.nodes(place.u)[0])
             periods.append(curve.period(place.u))
         else:

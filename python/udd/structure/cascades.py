@@ -9,11 +9,13 @@ from typing import Literal
 import numpy as np
 
 from udd._validate import whole
-from udd.errors import ModelError
+from udd.errors import IntegrationError, ModelError
 
 from .branch import BifurcationPoint, Branch
-from .branches import continuation
+from .branches import bounds_of, continuation
+from .doublings import next_doubling
 from .flow import Floats
+from .path import Lost
 from .solutions import PeriodicOrbit
 
 __all__ = ["Cascade", "cascade"]
@@ -22,6 +24,7 @@ _KIND = "period doubling"
 _CLOSER = (
     2.5  # by about so much the doubled orbits differ less from one doubling to the next (Feigenbaum's alpha)
 )
+_KNOWN = 3  # doublings, whose spacings say where the next one is
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +63,30 @@ class Cascade:
     @property
     def limit(self) -> float:
         """Where the doublings accumulate, extrapolated from the last three (Aitken); NaN of fewer."""
+        return _aitken(self.values)
+
+    @property
+    def limit_error(self) -> float:
+        """A bound of its error: what the last doubling changes in it, more than all that follow will."""
         if len(self.points) < 3:
             return float("nan")
-        a, b, c = self.values[-3:]
-        return float(c - (c - b) ** 2 / ((c - b) - (b - a)))
+        before = _aitken(self.values[:-1]) if len(self.points) > 3 else float(self.values[-1])
+        # An error of one of the three moves the limit by no more than itself, of all three by twice as much.
+        return abs(self.limit - before) + 2.0 * float(self.errors[-3:].max())
 
     def __repr__(self) -> str:
         values = ", ".join(f"{value:.11g}" for value in self.values)
         ratios = ", ".join(f"{ratio:.5g}" for ratio in self.ratios)
-        return f"<Cascade over {self.parameter}: {values}; ratios {ratios}; limit {self.limit:.9g}>"
+        limit = f"limit {self.limit:.11g} (error below {self.limit_error:.1g})"
+        return f"<Cascade over {self.parameter}: {values}; ratios {ratios}; {limit}>"
+
+
+def _aitken(values: Floats) -> float:
+    """The limit of a sequence whose last differences fall by one factor."""
+    if len(values) < 3:
+        return float("nan")
+    a, b, c = values[-3:]
+    return float(c - (c - b) ** 2 / ((c - b) - (b - a)))
 
 
 def cascade(
@@ -117,6 +135,7 @@ def cascade(
     [5.394713, 5.086062, 5.02182]
     """
     n = whole("n", n, 1)
+    low, high = bounds_of(bounds)
     points: list[BifurcationPoint] = []
     branches: list[Branch] = []
     if isinstance(start, BifurcationPoint) and start.kind == _KIND:
@@ -127,15 +146,7 @@ def cascade(
             branch = continuation(start, parameter, bounds, direction=direction, until=_KIND)
         else:
             closer *= _CLOSER
-            branch = continuation(
-                points[-1],
-                bounds=bounds,
-                until=_KIND,
-                period=4.0 * points[-1].period,
-                step=0.01 / closer,
-                longest=0.05 / closer,
-                amplitude=0.01 / closer,
-            )
+            branch = _next(points, (low, high), closer)
         found = branch.find(_KIND)
         if not found:
             last = f"after that at {points[-1].value:.10g}" if points else "from the start"
@@ -145,3 +156,25 @@ def cascade(
         branches.append(branch)
         points.append(found[0])
     return Cascade(points[0].parameter, tuple(points), tuple(branches))
+
+
+def _next(points: list[BifurcationPoint], bounds: tuple[float, float], closer: float) -> Branch:
+    """The branch born at the last doubling, up to the doubling of its own."""
+    if len(points) >= _KNOWN:
+        a, b, c = (point.value for point in points[-3:])
+        ahead = (c - b) ** 2 / (b - a)
+        try:
+            branch = next_doubling(points[-1], ahead, 0.01 / closer)
+            if bounds[0] <= branch.values[-1] <= bounds[1]:
+                return branch
+        except (Lost, IntegrationError):
+            pass  # step by step, then
+    return continuation(
+        points[-1],
+        bounds=bounds,
+        until=_KIND,
+        period=4.0 * points[-1].period,
+        step=0.01 / closer,
+        longest=0.05 / closer,
+        amplitude=0.01 / closer,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +13,7 @@ from udd.errors import IntegrationError, ModelError
 from .branch import Branch
 from .cycle_curve import CycleCurve
 from .flow import Floats, Flow
+from .locating import COARSE, rounding_of
 from .rest_curve import expansion
 from .rests import refined, rest_at
 from .solutions import Equilibrium
@@ -37,7 +39,8 @@ class Connection:
     value : float
         The parameter's value: at others there is no such orbit.
     error : float
-        How far the value moved when the orbit was prolonged at both ends for the last time.
+        A bound of the value's error: how far it moved when the orbit was prolonged at both ends for the last
+        time, and how far it moves when runs are a hundred times less accurate.
     equilibrium : Equilibrium
     t : ndarray, shape (n,)
     state : ndarray, shape (n, dim)
@@ -93,8 +96,8 @@ class Connection:
     def __repr__(self) -> str:
         eigenvalues = ", ".join(f"{value:.5g}" for value in self.equilibrium.eigenvalues)
         return (
-            f"<{self.kind} connection at {self.parameter} = {self.value:.13g} (error {self.error:.1g}), "
-            f"eigenvalues {eigenvalues}>"
+            f"<{self.kind} connection at {self.parameter} = {self.value:.13g} "
+            f"(error below {self.error:.1g}), eigenvalues {eigenvalues}>"
         )
 
 
@@ -148,6 +151,9 @@ def connection(branch: Branch) -> Connection:
             error = abs(value - before)
             if error < 1e-13 * abs(value):
                 break
+        coarse = copy.copy(problem)
+        coarse.loose = COARSE
+        error += abs(coarse.solve() - value) + float(rounding_of(value))
     except (np.linalg.LinAlgError, IntegrationError) as failure:
         raise ModelError(f"the branch tends to no connection that is found: {failure}") from None
     rest = rest_at(problem.flow, problem.values_at(value), problem.rest(value))
@@ -169,6 +175,7 @@ class _Problem:
     nodes: Floats
     span: float
     value: float
+    loose: float = 1.0
     _planes: tuple[Floats, Floats] = field(init=False)
     _rests: dict[float, Floats] = field(default_factory=dict, init=False)
 
@@ -254,7 +261,8 @@ class _Problem:
         before = np.inf
         for _ in range(40):
             x = self.nodes / size
-            found = flow.fly(self.values_at(self.value), self.nodes[:-1], spans, (self.parameter,))
+            values = self.values_at(self.value)
+            found = flow.fly(values, self.nodes[:-1], spans, (self.parameter,), self.loose)
             n = (m + 1) * r
             matrix, right = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
             for i in range(m):

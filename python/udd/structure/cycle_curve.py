@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import sparse
 
+from .condensing import CyclicEquations
 from .flow import Flight, Floats, Flow
 from .path import _DENSE
 
 __all__ = ["CycleCurve"]
 
 
-@lru_cache(maxsize=16)
-def _pattern(m: int, r: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows and columns of the matrix of the equations.
-
-    In this order: the pieces' derivatives, the nodes after them, the span, the parameter, and the phase.
-    """
-    n = m * r
-    own, each = np.arange(n), np.arange(n).reshape(m, r)
-    rows = [np.repeat(own, r), own, own, own, np.full(r, n)]
-    after = np.roll(each, -1, axis=0).ravel()
-    columns = [np.repeat(each, r, axis=0).ravel(), after, np.full(n, n), np.full(n, n + 1), np.arange(r)]
-    return np.concatenate(rows), np.concatenate(columns)
+def _planes(rates: Floats) -> Floats:
+    """Orthonormal bases (m, r, r - 1) of the planes across these rates (m, r)."""
+    m, r = rates.shape
+    stacked = np.concatenate([rates[:, :, None], np.broadcast_to(np.eye(r), (m, r, r))], axis=2)
+    # The first vector of each basis is along the flow, which the pieces take to one another.
+    bases, _ = np.linalg.qr(stacked)
+    return bases[:, :, 1:]
 
 
 @dataclass(eq=False)
@@ -128,7 +121,7 @@ class CycleCurve:
             self.seen = u.copy(), found
         return self.seen[1]
 
-    def equations(self, u: Floats) -> tuple[Floats, Floats | sparse.csr_array]:
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
         """Scaled gaps between the pieces and the phase, and their derivatives."""
         m, r, size = self.pieces, self.flow.dim, self.flow.size
         weight = 1.0 / np.sqrt(m)
@@ -153,10 +146,8 @@ class CycleCurve:
             dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
             dense[n, :r] = self.across * size / weight
             return residual, dense
-        minus = np.full(n, -1.0 / weight)
-        row = self.across * size / weight
-        data = np.concatenate([by_state.ravel(), minus, by_span.ravel(), by_value.ravel(), row])
-        return residual, sparse.csr_array((data, _pattern(m, r)), shape=(n + 1, n + 2))
+        both = np.stack([by_span, by_value], axis=2)
+        return residual, CyclicEquations(by_state, 1.0 / weight, both, self.across * size / weight)
 
     def closing(self, u: Floats) -> Floats:
         """The derivative (r, r) of the map from the first node to where the orbit closes."""
@@ -165,13 +156,17 @@ class CycleCurve:
             product = matrix @ product
         return self.mirror[:, None] * product
 
-    def across_flow(self, u: Floats) -> Floats:
-        """The same (r - 1, r - 1) across the flow, in scaled coordinates: what multipliers come from."""
-        size = self.flow.size
-        scaled = self.closing(u) * size / size[:, None]
-        rate = self.rate_at(self.values_at(u), self.nodes(u)[0]) / size
-        # An orthonormal basis whose first vector is along the flow, which the map leaves as it is.
-        basis, _ = np.linalg.qr(np.column_stack([rate, np.eye(self.flow.dim)]))
-        rest = basis[:, 1:]
-        result: Floats = rest.T @ scaled @ rest
-        return result
+    def factors_across(self, u: Floats) -> Floats:
+        """The pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
+
+        Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
+        """
+        size, found = self.flow.size, self.flight(u)
+        turn = np.ones((self.pieces, self.flow.dim))
+        turn[-1] = self.mirror
+        scaled = found.by_state * turn[:, :, None] * size / size[:, None]
+        # Where one piece ends the next begins, in the same plane.
+        after = _planes(found.rate * turn / size)
+        before = np.roll(after, 1, axis=0)
+        factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before
+        return np.ascontiguousarray(factors)

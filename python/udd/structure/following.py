@@ -26,6 +26,7 @@ __all__ = ["Limits", "Way", "follow", "solution_at", "solutions_at"]
 
 _WATCHED = 6  # points in which a branch shows that it comes to a connection,
 _CONVERGED = 1e-11  # by this relative change of its parameter
+_GROWN = 1.005  # while the period grows by this factor
 _ASIDE = 1e-9  # from a corner, in scaled unknowns
 _SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
 
@@ -150,8 +151,8 @@ def _pass(
             way.places.append((curve, place, signs, arclength + sigma))
             way.end = _birth(curve, place, here)
         else:
-            error = _error(curve, here, sigma, place, gone, kind)
-            _note(curve, place, signs, kind, error, way, limits, arclength + sigma)
+            errors = _errors(curve, here, sigma, place, gone, kind)
+            _note(curve, place, signs, kind, errors, way, limits, arclength + sigma)
         if way.end:
             return
 
@@ -161,24 +162,26 @@ def _note(
     place: Place,
     signs: Signs,
     kind: str,
-    error: float,
+    errors: tuple[float, float],
     way: Way,
     limits: Limits,
     arclength: float,
 ) -> None:
     """Note a bifurcation point; the way ends with the last one that is wanted."""
-    point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, error)
+    point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, errors)
     way.points.append(point)
     way.places.append((curve, place, signs, arclength))
     if limits.until(point):
         way.end = "the point that was wanted"
 
 
-def _error(curve: AnyCurve, here: Place, sigma: float, place: Place, gone: float, kind: str) -> float:
+def _errors(
+    curve: AnyCurve, here: Place, sigma: float, place: Place, gone: float, kind: str
+) -> tuple[float, float]:
     try:
         return error_of(curve, here, sigma, place, gone, FUNCTIONS[kind])
     except (Lost, IntegrationError):
-        return float("nan")
+        return float("nan"), float("nan")
 
 
 def _birth(curve: AnyCurve, place: Place, before: Place) -> str:
@@ -246,7 +249,7 @@ def _connection(way: Way) -> float | None:
     values = [curve.value(u) for curve, u in last]
     spans = [curve.span(u) for curve, u in last]
     still = max(values) - min(values) < _CONVERGED * max(abs(value) for value in values)
-    growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > 1.05 * spans[0]
+    growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > _GROWN * spans[0]
     return values[-1] if still and growing else None
 
 
@@ -282,6 +285,7 @@ def _round(
     if not limits.low <= value <= limits.high:
         way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
         return here, before, arclength
-    kind = "fold at a kink" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "kink"
-    _note(curve, arriving, at, kind, rounding_of(value), way, limits, arclength)
+    kind = "nonsmooth fold" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "border collision"
+    errors = float(rounding_of(value)), float("nan")
+    _note(curve, arriving, at, kind, errors, way, limits, arclength)
     return leaving, after, arclength

@@ -1,4 +1,4 @@
-"""Equilibria on a surface where the law changes: corners of their branches."""
+"""Border collisions: equilibria on a surface where the law changes, corners of their branches."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from .rest_curve import RestCurve
 __all__ = ["corner_ahead"]
 
 _ON = 1e-13  # of the surface's function, relative to its change over the step
+_PART = 0.7  # of the distance to the surface, the longest step
+_LAST = 3e-8  # the longest last step: the square of it is rounding
+_SMALL = 1e-6  # for the slope of the surface's function along the branch
 _BEYOND = 1e-7  # so far beyond the corner the law of the other side is asked, in scaled unknowns
 
 
@@ -30,26 +33,41 @@ def corner_ahead(curve: RestCurve, here: Place, step: float) -> tuple[Place, Pla
     scale = abs(float(values[j] - ahead[j]))
     if abs(values[j]) <= 1e3 * _ON * scale:
         return None  # it starts on the corner
-    place = here
-    for _ in range(30):
-        value = float(curve.at(place.u).surfaces[j])
-        if abs(value) <= _ON * scale:
-            break
-        # Newton's method on the near side, from which the curve is smooth.
-        small = 1e-6
-        slope = (float(curve.at(place.u + small * place.tangent).surfaces[j]) - value) / small
-        distance = float(np.clip(-value / slope, -step, step)) if slope else 0.0
-        try:
-            u = correct(curve, place.u + distance * here.tangent, here.tangent)
-        except Lost:
-            return None
-        side = np.sign(values[j])
-        tangent = tangent_at(curve, u, here.tangent) if side * curve.at(u).surfaces[j] > 0 else place.tangent
-        place = Place(u, tangent)
-    else:
+    side = float(np.sign(values[j]))
+    place = _approached(curve, here, j, side, step)
+    if place is None:
         return None
-    leaving = _other_tangent(curve, place, j, float(np.sign(values[j])))
+    leaving = _other_tangent(curve, place, j, side)
     return place, Place(place.u, leaving)
+
+
+def _approached(curve: RestCurve, here: Place, j: int, side: float, step: float) -> Place | None:
+    """The corner at which a branch arrives on surface `j`.
+
+    Behind the surface the branch may not go on, so that Newton's method never steps over it: all but the last
+    step end before.
+    """
+    place, part = here, _PART
+    for _ in range(100):
+        value = float(curve.at(place.u).surfaces[j])
+        back = place.u - _SMALL * place.tangent
+        slope = (value - float(curve.at(back).surfaces[j])) / _SMALL
+        if slope * side >= 0.0:
+            return None  # the branch has turned away
+        distance = -value / slope
+        if distance < _LAST:
+            # What is left of the curve is straight to rounding.
+            return Place(place.u + distance * place.tangent, place.tangent)
+        guess = place.u + part * min(distance, step) * place.tangent
+        try:
+            u = correct(curve, guess, place.tangent)
+            if side * float(curve.at(u).surfaces[j]) <= 0.0:
+                raise Lost("the step leads over the surface")
+        except Lost:
+            part *= 0.5
+            continue
+        place = Place(u, tangent_at(curve, u, place.tangent))
+    return None
 
 
 def _other_tangent(curve: RestCurve, place: Place, j: int, side: float) -> Floats:

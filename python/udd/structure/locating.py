@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from scipy import optimize
+
+from udd.errors import IntegrationError
 
 from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
 from .flow import Floats
-from .path import Lost, Place, correct, tangent_at
+from .multipliers import as_liouville
+from .path import Lost, Place, along_parameter, correct, nearest_of_family, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs, signs_at
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["error_of", "found_between", "frequency_of", "locate", "point_at", "rounding_of"]
+__all__ = [
+    "COARSE",
+    "changes",
+    "error_of",
+    "found_between",
+    "frequency_of",
+    "locate",
+    "period_error_of",
+    "point_at",
+    "rounding_of",
+]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
-_COARSE = 100.0  # by this factor runs are less accurate where the error is told
+_SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
+_NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
+_SURE = 2.0  # and how far beyond the largest scatter the error may lie
+COARSE = 100.0  # by this factor runs are less accurate where the error is told
 
 
 def changes(before: Signs, after: Signs) -> list[str]:
@@ -38,11 +57,12 @@ def found_between(
     `a` is followed by a point at the distance `step`, where the functions are `after`.
     """
     changed = changes(before, after)
-    rest = isinstance(curve, RestCurve)
     found = []
     for name in changed:
         if name == "plus" and "fold" in changed:
             continue
+        if name == "fold" and np.isnan([before.plus, after.plus]).any():
+            continue  # not decided: towards a connection the parameter stands still, but for rounding
         if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
             continue
         try:
@@ -54,6 +74,8 @@ def found_between(
         except (Lost, ValueError):
             continue
         here = signs_at(curve, place)
+        if isinstance(curve, CycleCurve) and not as_liouville(curve, place.u):
+            continue
         if name == "fold":
             kind = "fold"
         elif name == "plus":
@@ -64,9 +86,17 @@ def found_between(
             kind = "symmetry breaking" if symmetric else "period doubling"
         else:
             pair = here.pair
-            if rest and abs(pair.imag) * curve.flow.clock > _TURNING and _on_axis(pair):
+            if (
+                isinstance(curve, RestCurve)
+                and abs(pair.imag) * curve.flow.clock > _TURNING
+                and _on_axis(pair)
+            ):
                 kind = "Hopf"
-            elif not rest and abs(np.angle(pair)) > _TURNING and abs(abs(pair) - 1.0) < 1e-5:
+            elif (
+                isinstance(curve, CycleCurve)
+                and abs(np.angle(pair)) > _TURNING
+                and abs(abs(pair) - 1.0) < 1e-5
+            ):
                 kind = "Neimark-Sacker"
             else:
                 continue  # two real ones: a neutral saddle
@@ -118,33 +148,74 @@ def locate(curve: AnyCurve, a: Place, step: float, name: str) -> tuple[float, Pl
     return sigma, cache[sigma]
 
 
-def error_of(curve: AnyCurve, a: Place, sigma: float, place: Place, step: float, name: str) -> float:
-    """How far the value moves when runs are less accurate."""
-    value = curve.value(place.u)
-    rounding = rounding_of(value)
-    if isinstance(curve, RestCurve):
-        return rounding
+def error_of(
+    curve: AnyCurve, a: Place, sigma: float, place: Place, step: float, name: str
+) -> tuple[float, float]:
+    """Bounds of the errors of the value and of the period at a zero of the test function `name`.
 
-    def at(distance: float) -> tuple[float, float]:
+    Of cycles: how far they move when runs are less accurate. Of equilibria: what the rounding of the test
+    function, seen in its values near by, makes of its zero; the period is that of the cycles born there.
+    """
+    if isinstance(curve, RestCurve):
+        return _scatter(curve, a, sigma, place, step, name)
+
+    def at(distance: float) -> tuple[float, Floats]:
         u = correct(curve, a.u + distance * a.tangent, a.tangent)
         there = Place(u, tangent_at(curve, u, a.tangent))
-        return float(getattr(signs_at(curve, there), name)), curve.value(u)
+        return float(getattr(signs_at(curve, there), name)), np.array([curve.value(u), curve.period(u)])
 
+    known = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
     (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
-    curve.loose, curve.seen = _COARSE, None
+    curve.loose, curve.seen = COARSE, None
     try:
         moved, there = at(sigma)
     finally:
         curve.loose, curve.seen = 1.0, None
     here, _ = at(sigma)
-    shift = (moved - here) * (last - first) / (high - low) if high != low else 0.0
-    return rounding + abs(there - value) + abs(shift)
+    shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
+    value, period = rounding_of(known) + np.abs(there - known) + np.abs(shift)
+    return float(value), float(period)
 
 
-def rounding_of(value: float) -> float:
-    """How far rounding may move a value."""
-    return 8.0 * float(np.finfo(float).eps) * abs(value)
+def _scatter(
+    curve: RestCurve, a: Place, sigma: float, place: Place, step: float, name: str
+) -> tuple[float, float]:
+    """Bounds of the errors of the value and of the period: from how those near by scatter about a curve."""
+    near = np.linspace(-1.0, 1.0, _SAMPLES)
+    seen = []
+    for distance in sigma + _NEAR * step * near:
+        u = correct(curve, a.u + distance * a.tangent, a.tangent)
+        signs = signs_at(curve, Place(u, tangent_at(curve, u, a.tangent)))
+        turning = abs(signs.pair.imag)
+        period = 2.0 * np.pi / turning if name == "torus" and turning else np.nan
+        seen.append((float(getattr(signs, name)), curve.value(u), period))
+    table, powers = np.array(seen), np.vander(near, 3)
+    fitted = np.linalg.lstsq(powers, np.nan_to_num(table), rcond=None)[0]
+    noise = np.abs(powers @ fitted - table).max(axis=0)
+    slope = np.abs(fitted[1])
+    # So far along the branch the zero may be off.
+    off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
+    value, period = _SURE * (noise[1:] + off * slope[1:])
+    return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(table[0, 2]))
+
+
+def rounding_of(value: Any) -> Any:
+    """How far rounding may move a value, or several."""
+    return 8.0 * float(np.finfo(float).eps) * np.abs(value)
+
+
+def period_error_of(curve: CycleCurve, u: Floats) -> float:
+    """A bound of the error of a cycle's period: how far it moves when runs are less accurate."""
+    known, coarse, row = curve.period(u), replace(curve, loose=COARSE), along_parameter(u)
+    try:
+        try:
+            moved = coarse.period(correct(coarse, u, row))
+        except Lost:
+            moved = coarse.period(nearest_of_family(coarse, u, row))
+    except (Lost, IntegrationError):
+        return float("nan")
+    return float(abs(moved - known) + rounding_of(known))
 
 
 def frequency_of(curve: AnyCurve, u: Floats, signs: Signs) -> float:
@@ -161,7 +232,7 @@ def point_at(
     signs: Signs,
     solution: Equilibrium | PeriodicOrbit,
     arclength: float,
-    error: float,
+    errors: tuple[float, float],
 ) -> BifurcationPoint:
     """The point with what belongs to its kind."""
     frequency = coefficient = float("nan")
@@ -171,5 +242,5 @@ def point_at(
         coefficient = solution.lyapunov_coefficient
     value = curve.value(place.u)
     return BifurcationPoint(
-        kind, curve.name, value, error, solution, arclength, frequency, coefficient, curve, place
+        kind, curve.name, value, *errors, solution, arclength, frequency, coefficient, curve, place
     )

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +19,13 @@ from udd.trajectory import simulate
 
 from .cycle_curve import CycleCurve
 from .flow import Floats, Flow, flow_of
-from .path import Lost, along_parameter, correct
+from .multipliers import multipliers_at
+from .path import Lost, along_parameter, correct, nearest_of_family
 from .solutions import PeriodicOrbit
+from .states import state_of_attractor
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["closed", "closes_earlier", "cycle_at", "flown", "periodic_orbit", "pieces_for"]
 
@@ -25,12 +33,17 @@ _FINE = 64  # states looked at in a typical time
 _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
 _SAME = 1e-7  # two states within this part of the sizes are one
 _HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
+_PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
+_LOOKS = 100  # states that show the extent of a cycle
+_WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
+_SINGULAR = (1e-2, 1e-4, 1e-7)  # singular values that count as zero, relative to the largest
+_FAMILY = 400  # unknowns up to which singular values are asked for
 _RESIDUAL = 1e-9  # gaps that are as good as none
 
 
 def periodic_orbit(
     model: Model,
-    guess: ArrayLike | None = None,
+    guess: ArrayLike | xr.Dataset | None = None,
     *,
     period: float | None = None,
     settle: float | None = None,
@@ -42,9 +55,11 @@ def periodic_orbit(
     ----------
     model : Model
         Its rates must not depend on time. The disk's edge is ignored.
-    guess : array_like, shape (dim,) or (n, dim), optional
+    guess : array_like, shape (dim,) or (n, dim), or xarray.Dataset, optional
         A state near the cycle, or states on it at equal distances of time over one period, which must then
-        be given. By default the search starts where :func:`udd.lyapunov` does.
+        be given; or one attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
+        ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``: its state, its period and the
+        value of the parameter are taken. By default the search starts where :func:`udd.lyapunov` does.
     period : float, optional
         About its period. By default the run from the guess tells it: the first time that it comes back, or
         nearly back, be it to the mirror image.
@@ -68,9 +83,10 @@ def periodic_orbit(
     -----
     The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
     Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
-    Newton's method closes the gaps. Where the law has kinks, runs land on them. A cycle that is its own
-    mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's close
-    returns there are unstable ones.
+    Newton's method closes the gaps; where energy is kept, so that cycles come in families, the method of
+    Gauss and Newton finds one near the guess. Where the law has kinks, runs land on them. A cycle that is its
+    own mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's
+    close returns there are unstable ones.
 
     Examples
     --------
@@ -80,8 +96,19 @@ def periodic_orbit(
     >>> orbit = udd.periodic_orbit(udd.DLE(10.0))
     >>> print(round(orbit.period, 10), orbit.symmetric, orbit.stable)
     3.3583222491 True True
+
+    From an attractor that a basin belongs to:
+
+    >>> import numpy as np
+    >>> axis = np.linspace(-3, 3, 8)
+    >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
+    >>> udd.periodic_orbit(udd.DLE(6.2), found.sel(number=2)).symmetric
+    False
     """
     require_model(model)
+    if guess is not None and hasattr(guess, "data_vars"):
+        model, guess, lasts = state_of_attractor(model, guess)
+        period = lasts if period is None else period
     dim = len(model.state_names)
     given = array("guess", default_start(model) if guess is None else guess)
     if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
@@ -119,9 +146,9 @@ def pieces_for(flow: Flow, span: float) -> int:
 def cycle_at(curve: CycleCurve, u: Floats) -> PeriodicOrbit:
     """The cycle that solves a curve's equations."""
     flow, values = curve.flow, curve.values_at(u)
-    multipliers = np.linalg.eigvals(curve.across_flow(u)).astype(complex)
+    multipliers = multipliers_at(curve, u).values
     if curve.symmetric:
-        multipliers = multipliers**2
+        multipliers = multipliers**2 + 0.0
     multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
     residual, _ = curve.equations(u)
     nodes = flow.full(curve.nodes(u))
@@ -153,18 +180,33 @@ def closed(
     )
     guess = curve.pack(nodes, span, float(flow.values[held]))
     curve.fix_phase(guess)
-    try:
-        u = correct(curve, guess, along_parameter(guess), patience=30)
-    except (Lost, IntegrationError) as error:
-        raise ModelError(
-            f"no cycle of period {curve.period(guess):.6g} is found near the guess: {error}"
-        ) from None
-    residual, _ = curve.equations(u)
-    ends = curve.nodes(u)
-    rest = np.abs(curve.rate_at(flow.values, ends[0]) * flow.clock / flow.size).max()
-    if np.abs(residual).max() > _RESIDUAL or rest < 1e-9 or curve.span(u) < 1e-6 * flow.clock:
-        raise ModelError("no cycle is found near the guess: the orbit shrinks to a state of rest")
-    return curve, u
+    tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
+    row = along_parameter(guess)
+    # Where energy is kept cycles come in families: near one the equations leave a direction nearly free.
+    few = _SINGULAR if len(guess) < _FAMILY else ()
+    ways: list[Callable[..., Floats]] = [correct]
+    ways += [partial(nearest_of_family, singular=size) for size in few]
+    failure = ""
+    for way in ways:
+        try:
+            u = way(curve, guess, row, patience=30)
+            reason = _no_cycle(curve, u)
+        except (Lost, IntegrationError) as error:
+            reason = str(error)
+        if not reason:
+            return curve, u
+        failure = failure or reason
+    raise ModelError(f"{tried}: {failure}")
+
+
+def _no_cycle(curve: CycleCurve, u: Floats) -> str:
+    """Why what solves the equations is no cycle, if it is none."""
+    flow, (residual, _), start = curve.flow, curve.equations(u), curve.nodes(u)[0]
+    if not np.isfinite(u).all() or np.abs(residual).max() > _RESIDUAL:
+        return "Newton's method does not converge"
+    rest = np.abs(curve.rate_at(curve.values_at(u), start) * flow.clock / flow.size).max()
+    short = curve.span(u) < 1e-6 * flow.clock
+    return "the orbit shrinks to a state of rest" if rest < 1e-9 or short else ""
 
 
 def closes_earlier(curve: CycleCurve, u: Floats) -> str:
@@ -186,23 +228,40 @@ def closes_earlier(curve: CycleCurve, u: Floats) -> str:
 def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
     """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
     flow, values = curve.flow, curve.values_at(u)
-    plain = np.ones(flow.dim)
     span, start = curve.span(u), curve.nodes(u)[0]
-    ways = [(k, plain) for k in (2, 3, 5, 7)]
-    if flow.mirror is not None:
-        ways = [*ways, (2, flow.mirror), (3, flow.mirror)]
-    if curve.symmetric:
-        # A third of a half, seen in the mirror: what is symmetric closes after odd parts only.
-        ways = [(k, curve.mirror) for k in (3, 5, 7)]
-    for parts, mirror in ways:
-        share = span / parts
-        pieces = pieces_for(flow, share)
-        nodes = flown(flow, values, start, share, pieces)
-        gap = mirror * nodes[-1] - start
+    # What is symmetric closes after odd parts only, seen in the mirror.
+    ways = [(k, curve.mirror) for k in _PRIMES if k > 2 or not curve.symmetric]
+    if flow.mirror is not None and not curve.symmetric:
+        ways.append((2, flow.mirror))
+    ways.sort(key=lambda way: -way[0])
+    times = np.array([0.0, *(span / k for k, _ in ways)])
+    model = flow.with_values(values)
+
+    def states_at(moments: Floats) -> Floats:
+        run = simulate(model, moments, flow.full(start), rtol=1e-12, atol=1e-14, method="auto")
+        return flow.reduced(run.state)
+
+    def extent(time: float) -> float:
+        # At unequal distances: equal ones may be a round each.
+        states = states_at(time * np.linspace(0.0, 1.0, _LOOKS) ** 1.3)
+        return float((np.ptp(states, axis=0) / flow.size).max())
+
+    distinct, place = np.unique(times, return_inverse=True)
+    ends = states_at(distinct)[place]
+    for (parts, mirror), end in zip(ways, ends[1:], strict=True):
+        gap = mirror * end - start
         shift = flow.turns(gap)
-        if np.abs((gap + shift) / flow.size).max() < _SAME:
+        if np.abs((gap + shift) / flow.size).max() > _SAME:
+            continue
+        share = span / parts
+        if extent(share) < _WHOLE * extent(span):
+            continue  # it has hardly left its start, where it is slow
+        nodes = flown(flow, values, start, share, pieces_for(flow, share))
+        try:
             found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
-            return _simplest(*found)
+        except ModelError:
+            continue
+        return _simplest(*found)
     return curve, u
 
 

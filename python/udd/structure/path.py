@@ -6,14 +6,22 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from udd.errors import IntegrationError
 
+from .condensing import CyclicEquations
 from .flow import Floats
 
-__all__ = ["Curve", "Lost", "Place", "advance", "along_parameter", "correct", "tangent_at"]
+__all__ = [
+    "Curve",
+    "Lost",
+    "Place",
+    "advance",
+    "along_parameter",
+    "correct",
+    "nearest_of_family",
+    "tangent_at",
+]
 
 _ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
 _NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
@@ -31,7 +39,7 @@ class Lost(Exception):
 class Curve(Protocol):
     """`n` equations for `n + 1` scaled unknowns."""
 
-    def equations(self, u: Floats) -> tuple[Floats, Floats | sparse.csr_array]:
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
         """Residuals (n,) and their derivatives (n, n + 1)."""
         ...
 
@@ -44,20 +52,19 @@ class Place:
     tangent: Floats
 
 
-def solve(matrix: Floats | sparse.csr_array, row: Floats, right: Floats) -> Floats:
+def solve(matrix: Floats | CyclicEquations, row: Floats, right: Floats) -> Floats:
     """The solution of the equations below which one more row stands."""
     result: Floats
     if isinstance(matrix, np.ndarray):
         full = np.vstack([matrix, row])
         try:
-            result = np.linalg.solve(full, right)
+            result = np.asarray(np.linalg.solve(full, right), dtype=np.float64)
         except np.linalg.LinAlgError:
-            result = np.linalg.lstsq(full, right, rcond=None)[0]
+            result = np.asarray(np.linalg.lstsq(full, right, rcond=None)[0], dtype=np.float64)
         return result
-    square = sparse.vstack([matrix, sparse.csr_array(row[np.newaxis])], format="csc")
     try:
-        result = splu(square).solve(right)
-    except RuntimeError:
+        result = matrix.solve(row, right)
+    except np.linalg.LinAlgError:
         raise Lost("the equations are singular") from None
     return result
 
@@ -86,6 +93,34 @@ def correct(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> 
         size = float(np.abs(step).max())
         if not np.isfinite(size) or size > 1e3:
             raise Lost("Newton's method diverges")
+        u = u + step
+        if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
+            return u
+        before = size
+    raise Lost("Newton's method does not converge")
+
+
+def nearest_of_family(
+    curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, singular: float = 1e-7
+) -> Floats:
+    """A solution in the plane through `guess` of equations that are singular but can be solved.
+
+    By the method of Gauss and Newton: each step is the shortest of those that solve the linear equations;
+    singular values below `singular` times the largest count as zero.
+
+    Raises
+    ------
+    Lost
+    """
+    u, before = guess.copy(), np.inf
+    for _ in range(patience):
+        residual, matrix = curve.equations(u)
+        dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+        full, right = np.vstack([dense, row]), np.append(-residual, row @ (guess - u))
+        step = np.linalg.lstsq(full, right, rcond=singular)[0]
+        size = float(np.abs(step).max())
+        if not np.isfinite(size) or size > 1e3:
+            break
         u = u + step
         if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
             return u

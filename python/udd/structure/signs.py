@@ -1,4 +1,4 @@
-"""What changes its sign where a branch bifurcates."""
+"""Test functions of bifurcations: what changes its sign where a branch bifurcates."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from .cycle_curve import CycleCurve
 from .flow import Floats
+from .multipliers import multipliers_at
 from .path import Place
 from .rest_curve import RestCurve
 
@@ -27,7 +28,7 @@ FUNCTIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Signs:
-    """Functions of a point on a branch, each zero at one kind of bifurcation.
+    """Test functions at a point on a branch, each zero at one kind of bifurcation; NaN where not decided.
 
     Attributes
     ----------
@@ -73,10 +74,22 @@ def signs_at(curve: RestCurve | CycleCurve, place: Place) -> Signs:
         pairs = [a + b for a, b in combinations(values * curve.flow.clock, 2)]
         torus = float(np.prod(pairs).real) if pairs else float("nan")
         return Signs(fold, float(np.linalg.det(matrix)), float("nan"), torus, here.surfaces, values)
-    across = curve.across_flow(place.u)
-    eye = np.eye(len(across))
-    values = np.linalg.eigvals(across).astype(complex)
-    pairs = [a * b - 1.0 for a, b in combinations(values, 2)]
-    torus = float(np.prod(pairs).real) if pairs else float("nan")
-    plus, minus = float(np.linalg.det(across - eye)), float(np.linalg.det(across + eye))
+    found = multipliers_at(curve, place.u)
+    values = found.values
+    if not found.decided:
+        nothing = float("nan")
+        return Signs(fold, nothing, nothing, nothing, np.zeros(0), values)
+    both = list(combinations(range(len(values)), 2))
+    one, other = np.array(both, dtype=np.intp).reshape(-1, 2).T
+    logs, phases = found.log[one] + found.log[other], found.phases[one] * found.phases[other]
+    torus = _less(logs, phases, 1.0) if both else float("nan")
+    plus, minus = (_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
     return Signs(fold, plus, minus, torus, np.zeros(0), values)
+
+
+def _less(log: Floats, phases: np.ndarray, unit: float) -> float:
+    """The product of ``(value - unit)/(1 + |value|)``, without overflow; values are ``phases * exp(log)``."""
+    small = np.exp(-np.abs(log))
+    inside = log <= 0.0
+    parts = (np.where(inside, small, 1.0) * phases - np.where(inside, 1.0, small) * unit) / (1.0 + small)
+    return float(np.prod(parts).real)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
 
 Complex = NDArray[np.complex128]
+
+_ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
 
 
 def kind_of_rest(eigenvalues: Complex) -> str:
@@ -107,8 +110,22 @@ class PeriodicOrbit:
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle."""
-        return bool((np.abs(self.multipliers) < 1).all())
+        """Whether all multipliers are inside the unit circle, and not on it but for rounding."""
+        return bool((np.abs(self.multipliers) < 1.0 - _ON).all())
+
+    @property
+    def neutral(self) -> bool:
+        """Whether no multiplier is outside the unit circle, and one on it but for rounding."""
+        return not self.stable and bool((np.abs(self.multipliers) <= 1.0 + _ON).all())
+
+    @cached_property
+    def period_error(self) -> float:
+        """A bound of the period's error: how far it moves when runs are a hundred times less accurate."""
+        from .locating import period_error_of
+
+        if self._curve is None or self._unknowns is None:
+            return float("nan")
+        return period_error_of(self._curve, self._unknowns)
 
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
@@ -119,10 +136,11 @@ class PeriodicOrbit:
         return simulate(beyond_the_edge(self.model), times, self.state, **tight)
 
     def __repr__(self) -> str:
-        stable = "stable" if self.stable else "unstable"
+        stable = "stable" if self.stable else "neutral" if self.neutral else "unstable"
         mirror = "symmetric, " if self.symmetric else ""
         largest = ", ".join(f"{value:.6g}" for value in self.multipliers)
+        bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"
         return (
-            f"<PeriodicOrbit of {self.model!r}: period {self.period:.12g}, {mirror}{stable}, "
-            f"multipliers {largest}>"
+            f"<PeriodicOrbit of {self.model!r}: period {self.period:.13g} ({bound}), "
+            f"{mirror}{stable}, multipliers {largest}>"
         )

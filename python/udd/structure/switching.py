@@ -11,15 +11,25 @@ from udd.errors import IntegrationError, ModelError
 from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
 from .flow import Floats
+from .locating import changes
 from .orbits import pieces_for
 from .path import Lost, Place, correct, tangent_at
 from .rest_curve import RestCurve, expansion
+from .signs import signs_at
 
-__all__ = ["born_at"]
+__all__ = ["born_at", "doubled"]
+
+_HALVINGS = 24
+_BENT = 1.5  # by so much the ratio of two distances, at an amplitude and at half of it, may differ from 4
+_ROUNDING = 1e-6  # a test function that is smaller has no sign
+_STILL = 1e-9  # a parameter that moves less does not move, as where a conservative cycle is born
 
 
-def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place]:
-    """The curve of the solutions that bifurcate at a point, and a place on it with the way that leads off.
+def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place, float]:
+    """The curve of the solutions that bifurcate at a point, a place on it, and the amplitude there.
+
+    The place's tangent leads away. The amplitude is halved until nothing more bifurcates between the point
+    and the place.
 
     Raises
     ------
@@ -29,29 +39,63 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place]
     curve, place = point._curve, point._place
     if curve is None or place is None:
         raise ModelError("this bifurcation point was not made by udd.continuation")
-    # Nearer and nearer to the point: the branch may bend away from its first direction.
-    made: tuple[AnyCurve, Floats, Floats]
-    for size in amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03]):
-        if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, CycleCurve):
-            made = _doubled(curve, place)
-        elif point.kind == "Hopf" and isinstance(curve, RestCurve):
-            made = _from_rest(curve, place)
-        elif point.kind == "branch point":
-            made = _crossing(curve, place)
-        else:
-            raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
-        new, base, row = made
+    if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, CycleCurve):
+        made: tuple[AnyCurve, Floats, Floats] = doubled(curve, place)
+    elif point.kind == "Hopf" and isinstance(curve, RestCurve):
+        made = _from_rest(curve, place)
+    elif point.kind == "branch point":
+        made = _crossing(curve, place)
+    else:
+        raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
+    new, base, row = made
+
+    def at(size: float) -> Place | None:
         try:
             u = correct(new, base + size * row, row, patience=20)
-            if isinstance(new, CycleCurve):
-                new.fix_phase(u)
-            return new, Place(u, tangent_at(new, u, row))
+            return Place(u, tangent_at(new, u, row))
         except (Lost, IntegrationError):
+            return None
+
+    # Nearer and nearer to the point: the branch may bend away from its first direction.
+    for size in (amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03])).tolist():
+        found = at(size)
+        if found is None:
             continue
-    raise ModelError(f"the branch born at the {point.kind} is not found: try another amplitude")
+        for _ in range(_HALVINGS):
+            nearer = at(0.5 * size)
+            if nearer is None or _nothing_between(new, point, nearer, found):
+                break
+            found, size = nearer, 0.5 * size
+        if isinstance(new, CycleCurve):
+            new.fix_phase(found.u)
+            found = Place(found.u, tangent_at(new, found.u, row))
+        return new, found, size
+    where = f"the {point.kind} at {point.parameter} = {point.value:.10g}"
+    raise ModelError(
+        f"the branch born at {where} is not found at amplitudes of {0.03 * amplitude:.2g} to "
+        f"{3 * amplitude:.2g}"
+    )
 
 
-def _doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats]:
+def _nothing_between(curve: AnyCurve, point: BifurcationPoint, half: Place, whole: Place) -> bool:
+    """Whether a branch does as its normal form says, up to an amplitude and up to half of it."""
+    before, after = signs_at(curve, half), signs_at(curve, whole)
+    # What vanishes all along, as where energy is kept, changes its sign by rounding.
+    clear = [max(abs(getattr(s, name)) for s in (before, after)) for name in changes(before, after)]
+    if any(size > _ROUNDING for size in clear):
+        return False
+    if point.kind == "branch point":
+        return True
+    # At birth no multiplier is negative: they are squares, or exponentials of eigenvalues.
+    if after.minus < 0.0:
+        return False
+    # The parameter moves with the square of the amplitude.
+    first, last = (curve.value(place.u) - point.value for place in (half, whole))
+    still = abs(last) < _STILL * curve.scale
+    return still or abs(last / first - 4.0) < _BENT if first else still
+
+
+def doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats]:
     """Twice the time, and the direction in which the two rounds differ."""
     u, m = place.u, curve.pieces
     values, vectors = np.linalg.eig(curve.closing(u))
