@@ -50,6 +50,13 @@ impl Ending {
     }
 }
 
+/// What one trial step of a single run did.
+enum Attempted {
+    Moved,
+    Failed,
+    Rejected,
+}
+
 /// What one trial step did, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<M> {
@@ -380,12 +387,6 @@ where
         progress
     }
 
-    /// The same as a function of its own: over single numbers one copy serves all.
-    #[inline(never)]
-    pub fn trial_apart(&mut self, end: S::Real) -> Progress<S::Mask> {
-        self.trial(end)
-    }
-
     /// Commits the trial where it crosses no target, and deals with the lanes where it does.
     fn on_surfaces(
         &mut self,
@@ -585,14 +586,30 @@ where
 {
     /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
     pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
+        let mut ending = Ending::Free;
         loop {
-            let progress = self.trial_apart(end);
-            if progress.failed {
-                return Err(self.failure());
+            match self.attempt(end, &mut ending) {
+                Attempted::Moved => return Ok(ending),
+                Attempted::Failed => return Err(self.failure()),
+                Attempted::Rejected => {}
             }
-            if progress.moved {
-                return Ok(Ending::of(&progress.crossed));
+        }
+    }
+
+    /// Tries a step; where it does not end freely, says how. A function of its own: in the loop the compiler makes
+    /// slower code of it.
+    #[inline(never)]
+    fn attempt(&mut self, end: f64, ending: &mut Ending) -> Attempted {
+        let progress = self.trial(end);
+        if progress.failed {
+            Attempted::Failed
+        } else if progress.moved {
+            if const { !M::SMOOTH } {
+                *ending = Ending::of(&progress.crossed);
             }
+            Attempted::Moved
+        } else {
+            Attempted::Rejected
         }
     }
 }

@@ -101,14 +101,9 @@ where
     }
 
     /// Tries a step in every lane.
-    #[inline]
     pub fn trial(&mut self) -> Progress<S::Mask> {
         let end = self.end;
-        if const { S::Real::LANES > 1 } {
-            S::Real::work(self.isa, Trial { driver: &mut self.driver, end })
-        } else {
-            self.driver.trial_apart(end)
-        }
+        work::<S::Real, _>(self.isa, Trial { driver: &mut self.driver, end })
     }
 
     /// Lanes that are at their end.
