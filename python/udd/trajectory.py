@@ -164,7 +164,7 @@ class Trajectory:
         )
 
 
-METHODS = ("auto", "dopri5", "dop853", "taylor")
+METHODS = ("auto", "dopri5", "dop853", "taylor", "rodas")
 """How steps may be taken."""
 
 
@@ -172,7 +172,8 @@ def method_for(model: Model, method: str, rtol: float) -> str:
     """The method that is meant: for ``"auto"`` the faster one at equal error, as measured.
 
     The choice follows the table that `benches/python/methods.py` prints: the series wins for every law that
-    has one. Friction with modes is left to Runge-Kutta methods, which know all its treatments.
+    has one; the core hands runs over to DOP853 where it does not serve. Friction with modes is left to Runge-Kutta
+    methods, which know all its treatments.
     """
     if method not in METHODS:
         raise ModelError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
@@ -183,7 +184,7 @@ def method_for(model: Model, method: str, rtol: float) -> str:
         return "dop853" if rtol <= 1e-8 else "dopri5"
     # A law that a user wrote may depend on comparisons.
     written = model.kind == "own" or any(effect.made for effect in effects)
-    return "dop853" if written and not _core.has_series(model) else "taylor"
+    return "dop853" if written and not _core.has_series(model) else "auto"
 
 
 def tolerances(rtol: float, atol: float) -> tuple[float, float]:
@@ -229,11 +230,14 @@ def simulate(
     rtol, atol : float
         Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
         in the state's units.
-    method : {"dopri5", "dop853", "taylor", "auto"}
+    method : {"dopri5", "dop853", "taylor", "rodas", "auto"}
         ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
         theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
         solution's power series to order 10 or 18, by the tolerance; its dense output is as accurate as its
-        steps. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured.
+        steps. ``"rodas"`` is the Rosenbrock method Rodas5P of order 5(4), with dense output of order 4, for stiff
+        laws. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured: the
+        series where there is one, with ``"dop853"`` for a run where it does not serve, as next to a pole, and
+        with ``"rodas"`` for one of a model of your own that turns out to be stiff.
     dense : bool
         Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
 

@@ -170,6 +170,12 @@ impl AnyModel {
         })
     }
 
+    /// Whether it is the user's own.
+    pub fn is_own(&self) -> bool {
+        use AnyModel::*;
+        matches!(self, Own1(..) | Own2(..) | Own3(..) | Own4(..) | Own5(..) | Own6(..))
+    }
+
     /// The parameter values.
     pub fn values(&self) -> &[f64] {
         with_model!(self, |_family, values| values)

@@ -1,5 +1,6 @@
 //! One run, sampled.
 
+use super::stiffness::{Look, Stiffness};
 use crate::integrate::{Counts, Driver, Ending, Failure, Method, Tolerance};
 use crate::model::System;
 use crate::observe::{Event, Record, Samples};
@@ -50,7 +51,7 @@ pub struct Run<const D: usize> {
 }
 
 /// Runs the system from `x0` by this method, ending on its wall where it has one. A run that ends there,
-/// or where it chatters, is cut: that point is the last one.
+/// or where it chatters, is cut: that point is the last one. Where asked for, it is watched for being stiff.
 pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     system: M,
     method: K,
@@ -58,7 +59,7 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     x0: [f64; D],
     tolerance: &Tolerance,
     keep: bool,
-    stop: &Stop,
+    (stop, stiffness): (&Stop, Option<&Stiffness>),
 ) -> Result<Run<D>, Failure> {
     let (times, start, end) = match output {
         Output::At(times) => match times {
@@ -75,6 +76,7 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     let mut outcome = Outcome::Finished;
 
     let mut driver = Driver::by(method, system, start, x0, None, tolerance).with_wall();
+    let mut look = Look::new();
     while driver.t() < end {
         stop.check()?;
         let ending = match driver.advance(end) {
@@ -84,6 +86,9 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
             }
             ending => ending?,
         };
+        if let Some(stiffness) = stiffness {
+            look.at(&driver, stiffness)?;
+        }
         if times.is_empty() {
             // Two events can share a time.
             if driver.t() > steps.0[steps.0.len() - 1] {

@@ -198,6 +198,13 @@ fn degree(function: &Expression, is_amplitude: &[bool]) -> Degree {
                 (Some(Zero), own) if !own.contains(&true) => Zero,
                 _ => Other,
             },
+            Op::Where | Op::On(..) => {
+                let mut any = false;
+                for _ in 0..op.takes() {
+                    any |= stack.pop() != Some(Zero);
+                }
+                if any { Other } else { Zero }
+            }
             Op::Binary(function) => {
                 let right = stack.pop().unwrap_or(Zero);
                 let left = stack.pop().unwrap_or(Zero);
