@@ -19,8 +19,8 @@ METHODS = ("auto", "taylor", "dopri5", "dop853")
 @pytest.mark.parametrize("method", ["auto", "dopri5", "dop853"])
 @pytest.mark.parametrize("start", [1e-4, 1e-5, 1e-6, 1e-8, 1e-9, 1e-12])
 def test_a_start_next_to_a_pole_of_the_law(start: float, method: str) -> None:
-    # A radius of convergence of x0^2/2: from 1e-6 on the squares of the last terms are no numbers, from 1e-9 the
-    # terms themselves.
+    # A radius of convergence of x0^2/2: from 1e-6 on the squares of the last terms are no numbers, from 1e-9
+    # the terms themselves.
     run = udd.simulate(udd.Model(["x"], ["1/x"]), [0, 0.05], [start], method=method)
     np.testing.assert_allclose(run.state[-1], np.sqrt(start**2 + 0.1), rtol=1e-7)
     cubic = udd.simulate(udd.Model(["v"], ["7.25/v^2"]), [0, 0.05], [start], method=method)
@@ -151,13 +151,17 @@ def ended(law: udd.Model, end: float, start: list[float], **options: Any) -> np.
 def differing(seed: int) -> str | None:
     """What two methods disagree about; `""` where a law is too sensitive or too slow to tell."""
     law, end, start = case(seed)
+    with np.errstate(all="ignore"):
+        if not np.isfinite(law.rates(0.0, start)).all():
+            # As 0/0, which a series that knows the 0 does not see.
+            return ""
     fine = ended(law, end, start, method="dop853", rtol=1e-12, atol=1e-15)
     coarse = ended(law, end, start, method="dop853", rtol=1e-9, atol=1e-12)
     # What an error of the tolerance's size at the start grows to.
     near = ended(law, end, [x * (1 + 1e-9) for x in start], method="dop853", rtol=1e-12, atol=1e-15)
     if isinstance(fine, str) or isinstance(coarse, str) or isinstance(near, str):
         # Nothing to compare with; but no method finishes where the solution blows up.
-        if fine == coarse == near == "failed":
+        if all(isinstance(x, str) and x == "failed" for x in (fine, coarse, near)):
             others = {m: ended(law, end, start, method=m) for m in ("auto", "taylor")}
             finished = [m for m, x in others.items() if not isinstance(x, str)]
             return f"{finished} finish, unlike dop853" if finished else None

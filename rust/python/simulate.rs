@@ -219,8 +219,8 @@ fn stiff(py: Python<'_>, method: &str, t: f64) -> PyResult<()> {
          method=\"rodas\" takes longer ones"
     );
     let category = py.import("udd.errors")?.getattr("StiffnessWarning")?;
-    // From where the user called `udd.simulate`.
-    PyErr::warn(py, &category, CString::new(message)?.as_c_str(), 2)
+    // To where the user called `udd.simulate`, two calls above this one.
+    PyErr::warn(py, &category, CString::new(message)?.as_c_str(), 3)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -44,7 +44,8 @@ class CycleCurve:
     ----------
     flow : Flow
     values : ndarray
-        The model's parameters, of which the one with the index `parameter` is varied: `HELD` where there are none.
+        The model's parameters, of which the one with the index `parameter` is varied: `HELD` where there are
+        none.
     scale : float
         The unit of the parameter in the unknowns.
     clock : float

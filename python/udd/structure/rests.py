@@ -70,9 +70,9 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     -----
     Each start is refined by Powell's hybrid method with exact derivatives (`scipy.optimize.root`); what
     comes out is kept where nothing moves. The search is not exhaustive: an equilibrium with a small basin of
-    that method, or far outside the boxes, can be missed: give a state `near` it. For the DLE the rotating states are
-    ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk ``Omega^2 = g W/k(Omega)``, ``Y = W/Omega``, where
-    angles that nothing depends on go on turning.
+    that method, or far outside the boxes, can be missed: give a state `near` it. For the DLE the rotating
+    states are ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk ``Omega^2 = g W/k(Omega)``, ``Y = W/Omega``,
+    where angles that nothing depends on go on turning.
 
     Examples
     --------
