@@ -39,10 +39,12 @@ def test_a_search_says_where_it_was() -> None:
 
 def test_a_cycle_of_a_model_without_parameters() -> None:
     oscillator = udd.Model(["x", "v"], ["v", "(1 - x^2)*v - x"])
-    orbit = udd.periodic_orbit(oscillator)
+    orbit = udd.periodic_orbit(oscillator, [2.0, 0.0], settle=50.0)
     # Of Van der Pol's oscillator at mu = 1: period and multiplier as integrated with 30 digits elsewhere.
     assert orbit.period == pytest.approx(6.6632868593231301, abs=1e-9)
-    with_one = udd.periodic_orbit(udd.Model(["x", "v"], ["v", "m*(1 - x^2)*v - x"], {"m": 1.0}))
+    with_one = udd.periodic_orbit(
+        udd.Model(["x", "v"], ["v", "m*(1 - x^2)*v - x"], {"m": 1.0}), [2.0, 0.0], settle=50.0
+    )
     assert orbit.multipliers == pytest.approx(with_one.multipliers, rel=1e-6)
     with pytest.raises(udd.UddError, match="no parameter 'm'"):
         udd.continuation(orbit, "m", (0.5, 2.0))

@@ -140,7 +140,7 @@ impl<const D: usize> OwnFamily<D> {
         let mut parsed = Vec::with_capacity(D);
         for (n, text) in equations.iter().enumerate() {
             let wrong = |what: String| Err((n, Mistake(what)));
-            if text.contains('=') {
+            if text.replace("<=", "").replace(">=", "").contains('=') {
                 return wrong("has =, but only the right-hand side is wanted".to_owned());
             }
             let one = Expression::parse(text, Names { states, parameters, rates: false });

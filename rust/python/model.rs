@@ -166,7 +166,9 @@ impl AnyModel {
             AnyModel::BristledDisk(..) | AnyModel::BristledPendulum(..) => {
                 "friction with the treatment lugre is for udd.simulate; here take set-valued"
             }
-            _ => "a model of your own with 1, 5 or 6 states is for udd.simulate and udd.equilibria; here it needs 2 to 4",
+            _ => {
+                "a model of your own with 1, 5 or 6 states is for udd.simulate and udd.equilibria; here it needs 2 to 4"
+            }
         })
     }
 

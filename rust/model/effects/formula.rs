@@ -55,7 +55,7 @@ impl Formula {
                 return wrong(format!("cannot have a parameter called {own}, which means something else"));
             }
         }
-        if text.contains('=') {
+        if text.replace("<=", "").replace(">=", "").contains('=') {
             return wrong("has =, but what is wanted is only what adds to its slot".to_owned());
         }
         let states = QUANTITIES.map(str::to_owned);
