@@ -93,8 +93,8 @@ def test_sympys_kinks_are_ours() -> None:
     x, v = sympy.symbols("x v")
     cases = sympy.Piecewise((1, x > 1), (v, x <= -1), (x * v, True))
     model = udd.Model(["x", "v"], [sympy.Min(x, v, 0) + 2 * sympy.Max(x, v), cases + sympy.sign(v)])
-    states = np.array([[2.0, -1.0], [-1.0, 3.0], [0.5, 3.0]])
-    np.testing.assert_array_equal(model.rates(0.0, states), [[3, 0], [5, 4], [6, 2.5]])
+    states = np.array([[2.0, -1.0], [-2.0, 3.0], [0.5, 3.0]])
+    np.testing.assert_array_equal(model.rates(0.0, states), [[3, 0], [4, 4], [6, 2.5]])
     with pytest.raises(ModelError, match="one inequality for each case"):
         udd.Model(["x"], [sympy.Piecewise((1, x > 1))])
 

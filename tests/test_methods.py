@@ -54,6 +54,14 @@ def test_a_series_with_gaps(law: str, start: float, end: float, exact: float) ->
         np.testing.assert_allclose(run.state[-1], exact, rtol=1e-7, err_msg=method)
 
 
+def test_a_law_that_levels_off_on_both_sides_of_a_step() -> None:
+    # tanh is 1 to the last bit before x reaches y/v, and would be behind: x stays there.
+    law = udd.Model(["x", "y", "z", "v"], ["tanh(y^-1*(x*v) - z)", "x", "0.1*y", "(v^3 - (0.5 + t))^-1"])
+    start = [-0.04705916034077386, 0.00012616069439022387, 4.065780336135038e-05, 1.5251373041921523]
+    runs = [udd.simulate(law, [0, 0.4972892989575818], start, method=m).state[-1] for m in METHODS]
+    np.testing.assert_allclose(runs, [runs[-1]] * len(runs), atol=1e-8)
+
+
 def test_auto_goes_where_no_series_can() -> None:
     # All derivatives of exp(-1/t) vanish at t = 0, where 1/t is infinite.
     law = udd.Model(["x"], ["exp(-1/t)*sin(x)"])

@@ -419,16 +419,12 @@ where
         }
         if crossing.any() {
             if K::SERIES {
-                // Where a surface's function is infinite at the start, its zero is not found.
-                let lost = crossing.and(found.dt.finite().not());
-                progress.failed = progress.failed.or(lost);
-                let crossing = crossing.and(lost.not());
                 // The polynomial is as good as the step: it may end there.
                 let x = self.method.at(found.dt);
                 trial.x = vector!(S, D; n => S::select(crossing, x[n], trial.x[n]));
                 trial.size = S::Real::select(crossing, found.dt, trial.size);
                 for j in 0..TARGETS {
-                    crossed[j] = crossed[j].or(found.crossing[j].and(crossing));
+                    crossed[j] = crossed[j].or(found.crossing[j]);
                 }
                 landed.there = landed.there.or(crossing);
             } else {

@@ -45,10 +45,11 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         Self { tape, parameters, jets: Jets::new(tape, isa).with_order(order), held: false }
     }
 
-    /// Halves steps at whose end the polynomial does not obey the law; fails where none does.
+    /// Halves steps whose polynomial does not obey the law at their end; fails where none does.
     ///
     /// A law that has nearly levelled off, as tanh does, has terms too small to tell how near its poles are; so has
-    /// a series with gaps, such as one in powers of t^4, where the last terms fall into one.
+    /// a series with gaps, such as one in powers of t^4, where the last terms fall into one. Where it has levelled
+    /// off entirely the polynomial may be wrong on the way only.
     #[inline(never)]
     fn obey(
         &self,
@@ -58,14 +59,25 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         trial: &mut Trial<S, D>,
     ) {
         let real = |x: &[S; D]| vector!(S::Real, D; n => x[n].real());
+        let flat = if self.tape.levels_off() { self.jets.flat(self.tape) } else { S::mask(false) };
         let mut bad = S::mask(false);
         for halvings in 0..=MOST_HALVINGS {
             let Trial { x, size, error } = *trial;
-            let rates = system.rates(S::lift(at.t + size), &x, &at.sides);
-            let slope = self.jets.real_slope(size);
-            let defect = vector!(S::Real, D; n => (slope[n] - rates[n].real()) * size);
-            let defect = norm.state().norm(defect, real(&at.x), real(&x));
-            bad = error.finite().and(defect.less(S::Real::constant(MOST_DEFECT)).not());
+            let known = error.finite();
+            let strays = |dt: S::Real, x: &[S; D]| {
+                let rates = system.rates(S::lift(at.t + dt), x, &at.sides);
+                let slope = self.jets.real_slope(dt);
+                let defect = vector!(S::Real, D; n => (slope[n] - rates[n].real()) * size);
+                let defect = norm.state().norm(defect, real(&at.x), real(x));
+                known.and(defect.less(S::Real::constant(MOST_DEFECT)).not())
+            };
+            bad = strays(size, &x);
+            if flat.any() {
+                for part in [0.25, 0.5, 0.75] {
+                    let dt = size.scale(part);
+                    bad = bad.or(flat.and(strays(dt, &self.jets.at(dt))));
+                }
+            }
             if !bad.any() {
                 return;
             }

@@ -2,9 +2,9 @@
 
 use super::known::Known;
 use super::node::{INVERSE, hold};
-use super::{Step, Tape, disk, dle};
+use super::{Node, Step, Tape, disk, dle};
 use crate::model::Sides;
-use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
 use crate::unroll::unroll;
 
 /// The orders whose programs are unrolled, which takes long to compile.
@@ -77,6 +77,24 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             return disk::expand::<V, S, D, N>(work, order, held, x, sides);
         }
         interpreted(&tape.steps, &tape.rates, &mut work[..tape.slots], order, held, t, x, sides);
+    }
+
+    /// Where the law has [levelled off](Tape::levels_off) to the last bit: its series then knows nothing of what is
+    /// beyond.
+    #[inline(never)]
+    pub fn flat(&self, tape: &Tape<D>) -> S::Mask {
+        let mut flat = S::mask(false);
+        for step in &tape.steps {
+            let at = match step.node {
+                Node::Exp(_) => step.to,
+                // Its slope.
+                Node::Tanh(_) => step.to + 1,
+                _ => continue,
+            };
+            let size = self.work[usize::from(at)][0].real().abs();
+            flat = flat.or(size.less(S::Real::constant(f64::MIN_POSITIVE)));
+        }
+        flat
     }
 
     /// The coefficients of each component, order 0 first; those beyond the [`order`](Jets::order) are idle.

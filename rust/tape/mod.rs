@@ -43,6 +43,7 @@ pub struct Tape<const D: usize> {
     /// How many series there are; the first `D` are the state.
     pub(crate) slots: usize,
     known: known::Known,
+    levels_off: bool,
     switches_held: bool,
 }
 
@@ -50,6 +51,12 @@ impl<const D: usize> Tape<D> {
     /// What changes along a solution, in the order of evaluation.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// Whether the law can level off so far that the terms of its series vanish, as exp and tanh do.
+    #[inline(always)]
+    pub fn levels_off(&self) -> bool {
+        self.levels_off
     }
 
     /// Whether [held](Tape::held) values depend on the sides of surfaces.

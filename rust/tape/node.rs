@@ -72,6 +72,11 @@ pub enum Node {
 }
 
 impl Node {
+    /// Whether it comes so near to a constant that the terms of its series vanish.
+    pub(super) fn levels_off(self) -> bool {
+        matches!(self, Node::Exp(_) | Node::Tanh(_))
+    }
+
     /// How many slots it needs.
     pub(super) fn slots(self) -> usize {
         match self {

@@ -90,12 +90,14 @@ impl<'a> Lowering<'a> {
         let rates = rates.map(|s| self.slot(s));
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
         let switches_held = self.held.iter().any(|held| matches!(held, Held::Select(..)));
+        let levels_off = self.steps.iter().any(|step| step.node.levels_off());
         let mut tape = Tape {
             held: self.held,
             steps: self.steps,
             rates,
             slots: self.slots,
             known: Known::Not,
+            levels_off,
             switches_held,
         };
         tape.known = Known::of(&tape);
