@@ -27,8 +27,6 @@ pub fn union<M: Mask>(masks: &[M; TARGETS]) -> M {
 /// A target's function counts as zero below this part of its largest value in the step.
 const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
-/// What is larger, at the start of a step, counts as this.
-const LARGE: f64 = 1e100;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 const NOISE: f64 = 1e-14;
 
@@ -138,9 +136,7 @@ where
             }
             let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
-            // Infinite where the run starts at a pole of the function, which says nothing of its size.
-            let mut scale = S::Real::select(start.finite(), start.abs(), zero);
-            let start = start.min(S::Real::constant(LARGE));
+            let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
             for (i, &theta) in K::PROBES.iter().enumerate() {

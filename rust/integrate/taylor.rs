@@ -30,7 +30,7 @@ pub fn order(tolerance: &Tolerance) -> usize {
 /// coefficients are no numbers, or no step along their polynomial obeys the law, no step is taken: see
 /// [`Failure::NoSeries`](super::Failure::NoSeries).
 #[derive(Clone, Debug)]
-pub struct Taylor<'a, S, const D: usize> {
+pub struct Taylor<'a, S: Scalar, const D: usize> {
     tape: &'a Tape<D>,
     parameters: Vec<S>,
     jets: Jets<S, D, COEFFICIENTS>,
@@ -51,31 +51,27 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// a series with gaps, such as one in powers of t^4, where the last terms fall into one. Where it has levelled
     /// off entirely the polynomial may be wrong on the way only.
     #[inline(never)]
-    fn obey(
-        &self,
-        system: &impl System<S, D>,
-        at: &Point<S, D>,
-        norm: &impl ErrorNorm<S, D>,
-        trial: &mut Trial<S, D>,
-    ) {
-        let real = |x: &[S; D]| vector!(S::Real, D; n => x[n].real());
+    fn obey(&mut self, at: &Point<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
+        let from = vector!(S::Real, D; n => at.x[n].real());
         let flat = if self.tape.levels_off() { self.jets.flat(self.tape) } else { S::mask(false) };
         let mut bad = S::mask(false);
         for halvings in 0..=MOST_HALVINGS {
-            let Trial { x, size, error } = *trial;
+            let Trial { size, error, .. } = *trial;
             let known = error.finite();
-            let strays = |dt: S::Real, x: &[S; D]| {
-                let rates = system.rates(S::lift(at.t + dt), x, &at.sides);
-                let slope = self.jets.real_slope(dt);
-                let defect = vector!(S::Real, D; n => (slope[n] - rates[n].real()) * size);
-                let defect = norm.state().norm(defect, real(&at.x), real(x));
+            let jets = &mut self.jets;
+            let mut strays = |part: f64| {
+                let dt = size.scale(part);
+                let x = jets.real_at(dt, &[true; D]);
+                let rates = jets.rates(self.tape, at.t + dt, &x, &at.sides);
+                let slope = jets.real_slope(dt);
+                let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
+                let defect = norm.state().norm(defect, from, x);
                 known.and(defect.less(S::Real::constant(MOST_DEFECT)).not())
             };
-            bad = strays(size, &x);
+            bad = strays(1.0);
             if flat.any() {
                 for part in [0.25, 0.5, 0.75] {
-                    let dt = size.scale(part);
-                    bad = bad.or(flat.and(strays(dt, &self.jets.at(dt))));
+                    bad = bad.or(flat.and(strays(part)));
                 }
             }
             if !bad.any() {
@@ -113,7 +109,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 
     fn attempt(
         &mut self,
-        system: &impl System<S, D>,
+        _system: &impl System<S, D>,
         at: &Point<S, D>,
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
@@ -125,7 +121,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         let mut trial = S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm });
         // What is written out is known to have no gaps.
         if !self.tape.is_unrolled() {
-            self.obey(system, at, norm, &mut trial);
+            self.obey(at, norm, &mut trial);
         }
         trial
     }

@@ -141,9 +141,10 @@ fn square<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: usize
 }
 
 impl Failure {
-    /// Whether a method that needs no power series may go on.
+    /// Whether a method that needs no power series may do better: from a pole of the law, or of a surface's
+    /// function, a series may lead to where there is no number.
     pub fn is_of_series(&self) -> bool {
-        matches!(self, Failure::NoSeries { .. })
+        matches!(self, Failure::NoSeries { .. } | Failure::NotFinite { .. })
     }
 }
 

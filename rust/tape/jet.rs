@@ -4,7 +4,7 @@ use super::known::Known;
 use super::node::{INVERSE, hold};
 use super::{Node, Step, Tape, disk, dle};
 use crate::model::Sides;
-use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
 use crate::unroll::unroll;
 
 /// The orders whose programs are unrolled, which takes long to compile.
@@ -13,11 +13,14 @@ pub const HIGH: usize = 18;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.
 #[derive(Clone, Debug)]
-pub struct Jets<S, const D: usize, const N: usize> {
+pub struct Jets<S: Scalar, const D: usize, const N: usize> {
     isa: Isa,
     order: usize,
     work: Vec<[S; N]>,
     held: Vec<S>,
+    /// The same without derivatives, for the rates alone.
+    values: Vec<[S::Real; 1]>,
+    held_values: Vec<S::Real>,
 }
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
@@ -25,8 +28,15 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// [`expand`](Jets::expand) allocates nothing.
     pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
         const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
-        let zero = [S::zero(); N];
-        Self { isa, order: N - 1, work: vec![zero; tape.slots], held: vec![S::zero(); tape.held.len()] }
+        let zero = S::Real::zero();
+        Self {
+            isa,
+            order: N - 1,
+            work: vec![[S::zero(); N]; tape.slots],
+            held: vec![S::zero(); tape.held.len()],
+            values: vec![[zero]; tape.slots],
+            held_values: vec![zero; tape.held.len()],
+        }
     }
 
     /// The coefficients of the solution through the state `x` at time `t`, all laws taken on these
@@ -42,6 +52,22 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// Evaluates what does not change along a solution.
     pub fn hold(&mut self, tape: &Tape<D>, parameters: &[S], sides: &Sides<S>) {
         hold(&tape.held, parameters, sides, &mut self.held);
+        for i in 0..self.held.len() {
+            self.held_values[i] = self.held[i].real();
+        }
+    }
+
+    /// The rates at a time and a state after [`hold`](Jets::hold), without derivatives.
+    pub fn rates(
+        &mut self,
+        tape: &Tape<D>,
+        t: S::Real,
+        x: &[S::Real; D],
+        sides: &Sides<S::Real>,
+    ) -> [S::Real; D] {
+        let Self { isa, values, held_values, .. } = self;
+        let rates = Rates { tape, values, held: held_values, t, x, sides };
+        if const { S::Real::LANES > 1 } { S::Real::work(*isa, rates) } else { rates.run::<Plain>() }
     }
 
     /// Goes up to this order only, at least 4.
@@ -119,6 +145,34 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
     #[inline(always)]
     fn run<V: Instructions>(self) {
         self.jets.expand_here::<V>(self.tape, self.t, self.x, self.sides);
+    }
+}
+
+/// The rates alone, compiled once for each instruction set that packets are made of.
+struct Rates<'a, R: Real, const D: usize> {
+    tape: &'a Tape<D>,
+    values: &'a mut [[R; 1]],
+    held: &'a [R],
+    t: R,
+    x: &'a [R; D],
+    sides: &'a Sides<R>,
+}
+
+impl<R: Real, const D: usize> Work for Rates<'_, R, D> {
+    type Output = [R; D];
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> [R; D] {
+        let Self { tape, values, held, t, x, sides } = self;
+        unroll!(n in 0..D => { values[n][0] = x[n]; });
+        if const { R::LANES > 1 } {
+            for step in &tape.steps {
+                step.start(values, held, t, sides);
+            }
+        } else {
+            begin(&tape.steps, values, held, t, sides);
+        }
+        tape.rates.map(|slot| values[usize::from(slot)][0])
     }
 }
 
