@@ -158,7 +158,7 @@ fn disk(name: &'static str, effects: &[(Kind, &[f64])], end: u32) -> Path {
         let times: Vec<f64> = (0..=25 * end).map(|i| 0.04 * f64::from(i)).collect();
         let (x0, tolerance) = ([1.0, 0.01, -0.02, 0.3], tolerance(TIGHT));
         let (method, output) = (Dopri5::default(), Output::At(&times));
-        black_box(trajectory(&system, method, output, x0, &tolerance, false, &Stop::new()).unwrap());
+        black_box(trajectory(&system, method, output, x0, &tolerance, false, (&Stop::new(), None)).unwrap());
     };
     Path::new(name, u64::from(end), work)
 }

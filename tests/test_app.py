@@ -22,6 +22,7 @@ from udd.app import limits, maps, runs, security, server, spec
 from udd.app.catalogue import catalogue
 from udd.app.serving import hosts_of
 from udd.cli import main
+from udd.errors import IncompleteWarning
 
 __all__ = ["client"]
 
@@ -78,7 +79,8 @@ def test_pieces_are_the_bits_of_one_call_of_simulate(model: dict[str, Any], stat
 
 def test_a_run_that_leaves_the_wheels_ends_where_simulate_ends() -> None:
     start = spec.start_of({"model": {"kind": "disk", "W": 0.042}, "state": [3.0, 0.005, 0.0, 0.0]})
-    whole = udd.simulate(start.model, np.arange(60_000) / 240, list(start.state))
+    with pytest.warns(IncompleteWarning, match="left the wheels"):
+        whole = udd.simulate(start.model, np.arange(60_000) / 240, list(start.state))
     assert whole.outcome == "ejected"
     run = runs.Run(start)
     rows, last = run.piece(0, 60_000)

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import udd
 from udd import effects
-from udd.errors import IntegrationError, UddError
+from udd.errors import IncompleteWarning, IntegrationError, UddError
 
 TIGHT = {"rtol": 1e-15, "atol": 1e-15}
 KINK = (0.103 - 0.012) / 0.055
@@ -136,7 +136,9 @@ def test_events_lie_on_their_surfaces() -> None:
 def test_a_disk_that_leaves_its_wheels_is_ejected() -> None:
     t = np.arange(0, 200, 0.04)
     start = [3.832, -0.003, -0.002, 0.0]  # leaves after 5.8 s, before chaos could decide
-    run = udd.simulate(udd.Disk(0.045), t, start)
+    with pytest.warns(IncompleteWarning, match=r"left the wheels at t = 5\.8\d+ s.*edge=\"ignore\"") as told:
+        run = udd.simulate(udd.Disk(0.045), t, start)
+    assert len(told) == 1
     assert run.outcome == "ejected" and run.t[-1] < 60
     assert abs(np.hypot(run.Y[-1], run.Z[-1]) / 0.08 - 1) < 1e-12
     assert run.events[-1].kind == "edge" and run.events[-1].t == run.t[-1]

@@ -16,7 +16,7 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import udd
 from udd.cli import main
-from udd.errors import UddError
+from udd.errors import IncompleteWarning, UddError
 from udd.film import Defects, Film
 from udd.tracking import decode, overlay, pictures_at
 from udd.tracking.find import BODY, COLOURS, Blobs, squares
@@ -65,9 +65,11 @@ def test_a_camera_that_stands_aside_is_found_and_undone(tmp_path: Path) -> None:
 
 def test_after_the_disk_has_left_nothing_is_invented(tmp_path: Path) -> None:
     t = np.arange(0, 12, 0.005)
-    whole = udd.simulate(udd.Disk(0.039), t, [-1.7928, 0.029293, 0.025831, -0.8413])
+    with pytest.warns(IncompleteWarning, match="left the wheels"):
+        whole = udd.simulate(udd.Disk(0.039), t, [-1.7928, 0.029293, 0.025831, -0.8413])
     assert whole.outcome == "ejected"
-    run = udd.simulate(udd.Disk(0.039), t, whole.state[-600], dense=True)  # the last 3 s of it
+    with pytest.warns(IncompleteWarning, match="left the wheels"):
+        run = udd.simulate(udd.Disk(0.039), t, whole.state[-600], dense=True)  # the last 3 s of it
     film = udd.render(run, tmp_path / "gone.mp4", size=SMALL, defects=Defects(after=1.5))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # so short a run need not tell where the contact is

@@ -34,6 +34,7 @@ _PUBLIC = {
     "PeriodicOrbit": "udd.structure",
     "Section": "udd.sections",
     "Spectrum": "udd.spectra",
+    "StiffnessWarning": "udd.errors",
     "SweepSpec": "udd.sweeping",
     "Trajectory": "udd.trajectory",
     "UddError": "udd.errors",
@@ -88,6 +89,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning
     from udd.errors import IncompleteWarning as IncompleteWarning
+    from udd.errors import StiffnessWarning as StiffnessWarning
     from udd.errors import UddError as UddError
     from udd.exponents import lyapunov as lyapunov
     from udd.film import render as render

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from udd.errors import ModelError
@@ -32,7 +33,7 @@ def text_of(what: str, expression: object) -> str:
 
 def _from_sympy(what: str, expression: Any) -> str:
     """As SymPy prints it, but for numbers in full and names as the core has them."""
-    from sympy import Derivative, Expr
+    from sympy import Derivative, Expr, Ge, Gt, Le, Lt, true
     from sympy.core.function import AppliedUndef
     from sympy.printing.str import StrPrinter
 
@@ -47,6 +48,24 @@ def _from_sympy(what: str, expression: Any) -> str:
 
         def _print_Abs(self, call: Any) -> str:
             return f"abs({self._print(call.args[0])})"
+
+        def _print_Min(self, call: Any) -> str:
+            return str(reduce(lambda a, b: f"min({a}, {b})", map(self._print, call.args)))
+
+        def _print_Max(self, call: Any) -> str:
+            return str(reduce(lambda a, b: f"max({a}, {b})", map(self._print, call.args)))
+
+        def _print_Piecewise(self, call: Any) -> str:
+            *cases, last = call.args
+            compared = all(isinstance(case.cond, (Gt, Ge, Lt, Le)) for case in cases)
+            if last.cond != true or not compared:
+                raise ModelError(
+                    f"{what}: a Piecewise needs one inequality for each case, True for the last, not {call}"
+                )
+            text = self._print(last.expr)
+            for case in reversed(cases):
+                text = f"where({self._print(case.cond)}, {self._print(case.expr)}, {text})"
+            return str(text)
 
         def _print_Exp1(self, _number: Any) -> str:
             return "exp(1)"

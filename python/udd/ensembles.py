@@ -131,6 +131,8 @@ def ensemble(
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     runs = max(len(rows), len(starts))
     stepper = method_for(model, method, rtol)
+    if stepper == "rodas":
+        raise ModelError('method="rodas" is for single runs, by udd.simulate')
     with bar(runs, "run", progress) as since:
         found = _core.ensemble(
             model, rows, starts, times, rtol, atol, stepper, thread_count(threads), since(0)

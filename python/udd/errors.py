@@ -23,6 +23,10 @@ class ConvergenceWarning(UserWarning):
     """A result's error bar does not meet the tolerance asked for."""
 
 
+class StiffnessWarning(UserWarning):
+    """A run's steps are held down by stability, not by accuracy: another method is meant for it."""
+
+
 class IncompleteWarning(UserWarning):
     """A result is returned without the parts that were not finished.
 

@@ -50,8 +50,8 @@ class Model:
     equations : mapping of str to formula, or sequence of formula
         The rate of each state: text or a SymPy expression of the states, the parameters, the time ``t``,
         numbers and ``pi``, with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``,
-        ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs`` and ``bspline``, the cardinal cubic
-        B-spline.
+        ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``, ``sign``, ``min(a, b)``,
+        ``max(a, b)``, ``where(x > c, a, b)`` and ``bspline``, the cardinal cubic B-spline.
     parameters : mapping of str to float, optional
         The parameters' values.
     angles : iterable of str
@@ -65,6 +65,11 @@ class Model:
     Notes
     -----
     The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
+
+    Where ``abs``, ``sign``, ``min``, ``max`` and ``where`` change, the equations have a kink or jump. Runs
+    land on up to four such surfaces, which are their events ``"kink"`` and ``"jump"``; power series start
+    anew there, and derivatives pass through, with a jump's saltation matrix. Any more are only compared:
+    runs go over them by small steps, and there is no power series.
 
     Examples
     --------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._validate import array, number
-from udd.errors import ModelError
+from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model, require_model
 
 __all__ = ["Event", "Events", "Stats", "Trajectory", "simulate"]
@@ -164,7 +165,7 @@ class Trajectory:
         )
 
 
-METHODS = ("auto", "dopri5", "dop853", "taylor")
+METHODS = ("auto", "dopri5", "dop853", "taylor", "rodas")
 """How steps may be taken."""
 
 
@@ -172,7 +173,8 @@ def method_for(model: Model, method: str, rtol: float) -> str:
     """The method that is meant: for ``"auto"`` the faster one at equal error, as measured.
 
     The choice follows the table that `benches/python/methods.py` prints: the series wins for every law that
-    has one. Friction with modes is left to Runge-Kutta methods, which know all its treatments.
+    has one; the core hands runs over to others where it does not serve. Friction with modes is left to
+    Runge-Kutta methods, which know all its treatments.
     """
     if method not in METHODS:
         raise ModelError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
@@ -183,7 +185,7 @@ def method_for(model: Model, method: str, rtol: float) -> str:
         return "dop853" if rtol <= 1e-8 else "dopri5"
     # A law that a user wrote may depend on comparisons.
     written = model.kind == "own" or any(effect.made for effect in effects)
-    return "dop853" if written and not _core.has_series(model) else "taylor"
+    return "dop853" if written and not _core.has_series(model) else "auto"
 
 
 def tolerances(rtol: float, atol: float) -> tuple[float, float]:
@@ -229,11 +231,14 @@ def simulate(
     rtol, atol : float
         Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
         in the state's units.
-    method : {"dopri5", "dop853", "taylor", "auto"}
+    method : {"dopri5", "dop853", "taylor", "rodas", "auto"}
         ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
         theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
         solution's power series to order 10 or 18, by the tolerance; its dense output is as accurate as its
-        steps. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured.
+        steps. ``"rodas"`` is the Rosenbrock method Rodas5P of order 5(4), with dense output of order 4, for
+        stiff laws. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured:
+        the series where there is one, with ``"dop853"`` for a run where it does not serve, as next to a pole,
+        and ``"rodas"`` for one of a model of your own that turns out to be stiff.
     dense : bool
         Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
 
@@ -241,6 +246,14 @@ def simulate(
     -------
     Trajectory
         A run that leaves the disk is cut at the edge and has the outcome "ejected".
+
+    Warns
+    -----
+    IncompleteWarning
+        The disk left the wheels.
+    StiffnessWarning
+        A model of your own that is stiff is run by a method for those that are not; the warning comes while
+        the run goes on.
 
     Raises
     ------
@@ -261,6 +274,28 @@ def simulate(
     >>> print(np.round(run.state[-1], 8))
     [0.97664031 0.9831748  0.04343309]
     """
+    found = integrated(model, t, state0, rtol=rtol, atol=atol, method=method, dense=dense)
+    if found.outcome == "ejected":
+        warnings.warn(
+            f"the disk left the wheels at t = {found.t[-1]:.6g} s, where the run ends; a disk with "
+            'edge="ignore" goes on by the equations alone, beyond where they hold',
+            IncompleteWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def integrated(
+    model: Model,
+    t: ArrayLike,
+    state0: ArrayLike,
+    *,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    method: str = "dopri5",
+    dense: bool = False,
+) -> Trajectory:
+    """The same for who looks at the outcome: a run that leaves the disk is not warned of."""
     state = initial_state(model, state0)
     rtol, atol = tolerances(rtol, atol)
     stepper = method_for(model, method, rtol)

@@ -25,8 +25,8 @@ pub(super) enum Follower<'a, M, S: Scalar<Real = f64, Mask = bool>, const D: usi
 where
     M: System<S, D>,
 {
-    /// By the law's power series: most links take one step.
-    Series(Box<Driver<&'a M, S, D, Tolerance, Taylor<'a, S, D>>>),
+    /// By the law's power series: most links take one step. Where it does not serve they are taken by the other.
+    Series(Box<Driver<&'a M, S, D, Tolerance, Taylor<'a, S, D>>>, Tolerance),
     /// By a Runge-Kutta method, where the law has no series.
     Stages(Box<Driver<&'a M, S, D>>),
 }
@@ -56,7 +56,8 @@ where
         match tape {
             Some(tape) => {
                 let method = Taylor::new(tape, law.values.clone(), order(tolerance), Isa::best());
-                Self::Series(Box::new(Driver::by(method, system, 0.0, x, Some(1.0), tolerance)))
+                let driver = Driver::by(method, system, 0.0, x, Some(1.0), tolerance);
+                Self::Series(Box::new(driver), *tolerance)
             }
             None => Self::Stages(Box::new(Driver::new(system, 0.0, x, Some(1.0), tolerance))),
         }
@@ -65,7 +66,17 @@ where
     /// Follows a link; the first trial step is all of it.
     pub fn follow(&mut self, way: Way<'_, S, D>) -> Result<End<S, D>, Failure> {
         match self {
-            Self::Series(driver) => follow(driver, way),
+            Self::Series(driver, tolerance) => {
+                let Way { start, end, x, places, met } = way;
+                match follow(driver, Way { start, end, x, places, met: &mut *met }) {
+                    Err(failure) if failure.is_of_series() => {
+                        let mut stages: Driver<_, S, D> =
+                            Driver::new(*driver.system(), start, x, Some(end - start), tolerance);
+                        follow(&mut stages, Way { start, end, x, places, met })
+                    }
+                    found => found,
+                }
+            }
             Self::Stages(driver) => follow(driver, way),
         }
     }

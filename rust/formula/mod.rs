@@ -3,13 +3,16 @@
 //! It is parsed by a whitelist of names, operators and functions to a list of operations on a stack,
 //! which can be evaluated over any [`Scalar`]; nothing else in the text means anything.
 
+mod kinks;
 mod parse;
 mod spline;
 
+pub use kinks::{Kink, Kinks};
 pub use spline::Spline;
 
 use thiserror::Error;
 
+use crate::model::{MAX_SURFACES, Sides};
 use crate::scalar::{Mask, Scalar};
 
 /// The most characters of a formula.
@@ -21,8 +24,9 @@ pub const HIGHEST: i32 = 1024;
 
 /// Whether a name means something in every formula, so that nothing else can be called so.
 pub fn is_reserved(name: &str) -> bool {
-    let function = parse::FUNCTIONS.iter().any(|(function, _)| *function == name);
-    function || name == parse::ATAN2 || parse::SPLINES.contains(&name) || name == "t" || name == "pi"
+    let unary = parse::FUNCTIONS.iter().any(|(function, _)| *function == name);
+    let binary = parse::BINARY.iter().any(|(function, _)| *function == name);
+    unary || binary || name == parse::WHERE || parse::SPLINES.contains(&name) || name == "t" || name == "pi"
 }
 
 /// The names that a formula may use, beside the time `t`, the number `pi` and the functions.
@@ -56,6 +60,8 @@ pub enum Leaf {
 pub enum Unary {
     Neg,
     Abs,
+    /// 1 above zero, -1 below.
+    Sign,
     Sqrt,
     Exp,
     Ln,
@@ -83,6 +89,8 @@ pub enum Binary {
     Power,
     /// The angle of the point with the ordinate `a` and the abscissa `b`.
     Atan2,
+    Min,
+    Max,
 }
 
 /// One operation on the stack.
@@ -93,6 +101,23 @@ pub enum Op {
     Binary(Binary),
     /// A function of one number, given by its coefficients.
     Spline(Spline),
+    /// The second of three where the first is above zero, else the third.
+    Where,
+    /// A function with a kink, taken on this side of a surface.
+    On(Kink, u8),
+}
+
+impl Op {
+    /// How many numbers it takes from the stack; it leaves one.
+    pub fn takes(self) -> usize {
+        match self {
+            Op::Push(_) => 0,
+            Op::Unary(_) | Op::Spline(_) => 1,
+            Op::Binary(_) => 2,
+            Op::Where => 3,
+            Op::On(kink, _) => kink.takes(),
+        }
+    }
 }
 
 /// Where a formula is evaluated.
@@ -128,17 +153,16 @@ impl Expression {
     /// # Errors
     /// What is wrong, in words that continue "the formula ...".
     pub fn parse(text: &str, names: Names<'_>) -> Result<Self, Mistake> {
-        let ops = parse::parse(text, names)?;
+        Ok(Self::of(parse::parse(text, names)?))
+    }
+
+    fn of(ops: Vec<Op>) -> Self {
         let (mut depth, mut height) = (0, 0_usize);
         for op in &ops {
-            match op {
-                Op::Push(_) => height += 1,
-                Op::Unary(_) | Op::Spline(_) => {}
-                Op::Binary(_) => height -= 1,
-            }
+            height = height + 1 - op.takes();
             depth = depth.max(height);
         }
-        Ok(Self { ops, depth })
+        Self { ops, depth }
     }
 
     /// Puts one operation in the place of these wherever they stand, one that pushes as much.
@@ -197,9 +221,15 @@ impl Expression {
     ///
     /// # Panics
     /// Where the stack is lower than the formula's [depth](Expression::depth).
+    #[inline(always)]
+    pub fn value_of<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, stack: &mut [S]) -> S {
+        self.value_on(leaf, &[S::mask(true); MAX_SURFACES], stack)
+    }
+
+    /// The same with its [kinks](Kinks) taken on these sides.
     // One function for each kind of number and of leaf: its loop is large.
     #[inline(never)]
-    pub fn value_of<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, stack: &mut [S]) -> S {
+    pub fn value_on<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, sides: &Sides<S>, stack: &mut [S]) -> S {
         let mut top = 0;
         for op in &self.ops {
             match *op {
@@ -215,6 +245,15 @@ impl Expression {
                     top -= 1;
                     stack[top - 1] = function.of(stack[top - 1], stack[top]);
                 }
+                Op::Where => {
+                    top -= 2;
+                    let above = S::zero().less(stack[top - 1]);
+                    stack[top - 1] = S::select(above, stack[top], stack[top + 1]);
+                }
+                Op::On(kink, side) => {
+                    top -= kink.takes() - 1;
+                    stack[top - 1] = kink.on(sides[usize::from(side)], &stack[top - 1..]);
+                }
             }
         }
         stack[0]
@@ -229,6 +268,10 @@ impl Unary {
         match self {
             Unary::Neg => -a,
             Unary::Abs => abs(a),
+            Unary::Sign => {
+                let below = S::select(a.less(S::zero()), -S::one(), S::zero());
+                S::select(S::zero().less(a), S::one(), below)
+            }
             Unary::Sqrt => a.sqrt(),
             Unary::Exp => a.exp(),
             Unary::Ln => a.ln(),
@@ -259,6 +302,8 @@ impl Binary {
             Binary::Div => a / b,
             Binary::Power => power_of(a, b),
             Binary::Atan2 => angle_of(a, b),
+            Binary::Min => S::select(a.less(b), a, b),
+            Binary::Max => S::select(b.less(a), a, b),
         }
     }
 }

@@ -7,12 +7,13 @@
 //! signed   = ("-" | "+") signed | power
 //! power    = atom [("^" | "**") signed]
 //! atom     = number | name ["'"] | function "(" sum {"," sum} ")" | "(" sum ")"
+//!          | "where" "(" sum ("<" | ">" | "<=" | ">=") sum "," sum "," sum ")"
 //! ```
 
 use super::{Binary, DEEPEST, HIGHEST, LONGEST, Leaf, Mistake, Names, Op, Spline, Unary};
 
 /// The functions by their names.
-pub(super) const FUNCTIONS: [(&str, Unary); 13] = [
+pub(super) const FUNCTIONS: [(&str, Unary); 14] = [
     ("sqrt", Unary::Sqrt),
     ("exp", Unary::Exp),
     ("ln", Unary::Ln),
@@ -25,6 +26,7 @@ pub(super) const FUNCTIONS: [(&str, Unary); 13] = [
     ("tanh", Unary::Tanh),
     ("atan", Unary::Atan),
     ("abs", Unary::Abs),
+    ("sign", Unary::Sign),
     ("bspline", Unary::Bspline),
 ];
 
@@ -77,7 +79,7 @@ impl Token<'_> {
     }
 }
 
-const SIGNS: [&str; 11] = ["**", "+", "-", "*", "/", "^", "(", ")", "=", "'", ","];
+const SIGNS: [&str; 15] = ["**", "<=", ">=", "<", ">", "+", "-", "*", "/", "^", "(", ")", "=", "'", ","];
 
 fn tokens(text: &str) -> Result<Vec<Token<'_>>, Mistake> {
     let mut list = Vec::new();
@@ -225,9 +227,9 @@ impl Parser<'_> {
         if self.takes(")") { Ok(()) } else { mistake("lacks a closing bracket") }
     }
 
-    /// What follows the name of the function of two numbers: `(y, x)`.
-    fn atan2(&mut self) -> Parsed {
-        let usage = || mistake(format!("needs two numbers after {ATAN2}, as in {ATAN2}(y, x)"));
+    /// What follows the name of a function of two numbers: `(y, x)`.
+    fn pair(&mut self, name: &str, function: Binary) -> Parsed {
+        let usage = || mistake(format!("needs two numbers after {name}, as in {name}(y, x)"));
         if !self.takes("(") {
             return usage();
         }
@@ -237,7 +239,36 @@ impl Parser<'_> {
         }
         let right = self.sum()?;
         self.close()?;
-        Ok(binary(Binary::Atan2, left, right))
+        Ok(binary(function, left, right))
+    }
+
+    /// What follows the name of the choice: `(x > 0, a, b)`.
+    fn choice(&mut self) -> Parsed {
+        let usage = || {
+            mistake(format!("needs a comparison and two numbers after {WHERE}, as in {WHERE}(x > 0, a, b)"))
+        };
+        if !self.takes("(") {
+            return usage();
+        }
+        let left = self.sum()?;
+        let above = match () {
+            () if self.takes(">") || self.takes(">=") => true,
+            () if self.takes("<") || self.takes("<=") => false,
+            () => return usage(),
+        };
+        let right = self.sum()?;
+        let (high, low) = if above { (left, right) } else { (right, left) };
+        // What is compared with zero needs no difference.
+        let mut ops = if number(&low) == Some(0.0) { high } else { binary(Binary::Sub, high, low) };
+        for _ in 0..2 {
+            if !self.takes(",") {
+                return usage();
+            }
+            ops.extend(self.sum()?);
+        }
+        self.close()?;
+        ops.push(Op::Where);
+        Ok(ops)
     }
 
     /// What follows the name of a spline: `(x, low, high, c0, c1, ...)`.
@@ -294,8 +325,10 @@ impl Parser<'_> {
             let argument = self.sum()?;
             self.close()?;
             return Ok(unary(function, argument));
-        } else if name == ATAN2 {
-            return self.atan2();
+        } else if let Some(&(_, function)) = BINARY.iter().find(|(own, _)| *own == name) {
+            return self.pair(name, function);
+        } else if name == WHERE {
+            return self.choice();
         } else if SPLINES.contains(&name) {
             return self.spline(name);
         } else {
@@ -313,8 +346,12 @@ impl Parser<'_> {
     }
 }
 
-/// The function of two numbers.
-pub(super) const ATAN2: &str = "atan2";
+/// The functions of two numbers by their names.
+pub(super) const BINARY: [(&str, Binary); 3] =
+    [("atan2", Binary::Atan2), ("min", Binary::Min), ("max", Binary::Max)];
+
+/// The choice between two numbers.
+pub(super) const WHERE: &str = "where";
 
 /// The functions that are given by coefficients.
 pub(super) const SPLINES: [&str; 2] = ["spline", "periodic"];
@@ -329,7 +366,8 @@ fn allowed(names: Names<'_>) -> String {
         ),
         false => String::new(),
     };
-    let functions = [&FUNCTIONS.map(|(name, _)| name)[..], &[ATAN2], &SPLINES].concat().join(", ");
+    let (unary, binary) = (FUNCTIONS.map(|(name, _)| name), BINARY.map(|(name, _)| name));
+    let functions = [&unary[..], &binary, &[WHERE], &SPLINES].concat().join(", ");
     let parameters = match names.parameters {
         [] => String::new(),
         list => format!(", the parameters {}", list.join(", ")),

@@ -12,6 +12,7 @@ pub struct Dop853Scheme;
 impl Scheme<16, 7> for Dop853Scheme {
     const TABLEAU: Tableau<16, 7> = Tableau {
         order: 8,
+        stable: 6.1,
         stages: 13,
         c: [
             0.0,

@@ -637,7 +637,11 @@ where
         for n in 0..D {
             finite &= self.at.x[n].real().lane(lane).is_finite() && rate[n].real().lane(lane).is_finite();
         }
-        if finite { Failure::StepUnderflow { t } } else { Failure::NotFinite { t } }
+        match finite {
+            true if K::SERIES => Failure::NoSeries { t },
+            true => Failure::StepUnderflow { t },
+            false => Failure::NotFinite { t },
+        }
     }
 }
 

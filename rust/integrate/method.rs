@@ -43,6 +43,11 @@ pub trait Method<S: Scalar, const D: usize> {
     /// Where within a step switching surfaces are looked at, so that one crossed twice is seen too.
     const PROBES: &'static [f64];
 
+    /// How large a negative eigenvalue of the law may be, times a step's size, before the steps become unstable.
+    fn stable(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Takes over changed values of the system's parameters, where it works with them itself.
     fn set_parameters(&mut self, _values: &[S]) {}
 

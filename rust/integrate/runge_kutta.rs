@@ -138,6 +138,10 @@ where
     const SERIES: bool = false;
     const PROBES: &'static [f64] = if T::TABLEAU.order > 5 { EIGHTHS } else { QUARTERS };
 
+    fn stable(&self) -> f64 {
+        T::TABLEAU.stable
+    }
+
     #[inline(always)]
     fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {
         let rate = system.rates(S::lift(at.t), &at.x, &at.sides);

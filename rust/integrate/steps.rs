@@ -18,6 +18,10 @@ pub trait Steps<const D: usize> {
     fn counts(&self) -> Counts;
     /// The last trial's polynomial, as [`Method::polynomial`].
     fn polynomial(&self, coefficients: &mut Vec<[f64; D]>) -> f64;
+    /// The rates at another time and state, on the sides that the law is taken on.
+    fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
+    /// As [`Method::stable`].
+    fn stable(&self) -> f64;
 }
 
 impl<M, E, K, const D: usize> Steps<D> for Driver<M, f64, D, E, K>
@@ -52,5 +56,11 @@ where
     }
     fn polynomial(&self, coefficients: &mut Vec<[f64; D]>) -> f64 {
         self.method().polynomial(coefficients)
+    }
+    fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D] {
+        self.system().rates(t, x, self.sides())
+    }
+    fn stable(&self) -> f64 {
+        self.method().stable()
     }
 }

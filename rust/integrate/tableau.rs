@@ -11,6 +11,8 @@ pub struct Tableau<const N: usize, const P: usize> {
     pub order: i32,
     /// How many stages a step takes.
     pub stages: usize,
+    /// The real stability interval's length.
+    pub stable: f64,
     /// The stages' times.
     pub c: [f64; N],
     /// The stages' weights.
@@ -36,6 +38,7 @@ pub struct DormandPrince;
 impl Scheme<7, 4> for DormandPrince {
     const TABLEAU: Tableau<7, 4> = Tableau {
         order: 5,
+        stable: 3.3,
         stages: 7,
         c: [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0],
         a: [

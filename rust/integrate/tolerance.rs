@@ -140,6 +140,14 @@ fn square<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: usize
     sum
 }
 
+impl Failure {
+    /// Whether a method that needs no power series may do better: from a pole of the law, or of a surface's
+    /// function, a series may lead to where there is no number.
+    pub fn is_of_series(&self) -> bool {
+        matches!(self, Failure::NoSeries { .. } | Failure::NotFinite { .. })
+    }
+}
+
 /// Why a run could not go on.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum Failure {
@@ -149,8 +157,12 @@ pub enum Failure {
         "the step size shrank to nothing at t = {t}: the tolerances are too tight or the solution blows up"
     )]
     StepUnderflow { t: f64 },
+    #[error("no power series serves at t = {t}: the law is not smooth there, or the solution blows up")]
+    NoSeries { t: f64 },
     #[error("more than {limit} steps were needed; the run stopped at t = {t}")]
     TooManySteps { t: f64, limit: u64 },
+    #[error("the model is stiff at t = {t}: its steps are held down by stability")]
+    Stiff { t: f64 },
     #[error("the disk left the wheels at t = {t}")]
     LeftDomain { t: f64 },
     #[error("the law switches without end at t = {t}: the run chatters")]

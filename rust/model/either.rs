@@ -74,6 +74,10 @@ impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
     const PACKETS: bool = A::PACKETS && B::PACKETS;
     const STARTS_IN_PACKETS: bool = A::STARTS_IN_PACKETS && B::STARTS_IN_PACKETS;
 
+    fn goes_in_packets(&self) -> bool {
+        ask!(self, family => family.goes_in_packets())
+    }
+
     fn parameters(&self) -> Vec<Parameter> {
         ask!(self, family => family.parameters())
     }

@@ -161,6 +161,11 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The same for ensembles by the Taylor method alone, where many runs are most wanted.
     const STARTS_IN_PACKETS: bool = Self::PACKETS;
 
+    /// Whether this one is run in packets where its kind is.
+    fn goes_in_packets(&self) -> bool {
+        true
+    }
+
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;
 

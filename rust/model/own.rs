@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Family, Parameter, Sides, System, parameter};
-use crate::formula::{Expression, Leaf, Mistake, Names};
+use crate::formula::{Expression, Kinks, Leaf, Mistake, Names};
 use crate::scalar::{Real, Scalar};
 use crate::unroll::vector;
 
@@ -11,10 +11,11 @@ use crate::unroll::vector;
 const DEEP: usize = 64;
 const SHALLOW: usize = 8;
 
-/// The equations `x' = f(t, x)` with their numbers.
+/// The equations `x' = f(t, x)` with their numbers. Their kinks are switching surfaces.
 #[derive(Clone, Debug)]
 pub struct Own<S, const D: usize> {
     equations: Arc<[Expression; D]>,
+    kinks: Arc<Kinks>,
     deep: bool,
     parameters: Vec<S>,
 }
@@ -40,33 +41,67 @@ impl<S: Scalar, const D: usize> Own<S, D> {
 
     // One function for each kind of number: its loop is large.
     #[inline(never)]
-    fn evaluate(&self, t: S, x: &[S; D], stack: &mut [S]) -> [S; D] {
+    fn evaluate(
+        &self,
+        formulas: &[Expression],
+        t: S,
+        x: &[S; D],
+        sides: &Sides<S>,
+        (values, stack): (&mut [S], &mut [S]),
+    ) {
         let leaf = |leaf| match leaf {
             Leaf::Number(value) => S::constant(value),
             Leaf::Time => t,
             Leaf::State(n) | Leaf::Rate(n) => x[n],
             Leaf::Parameter(i) => self.parameters[i],
         };
-        let mut rates = [S::zero(); D];
-        for n in 0..D {
-            rates[n] = self.equations[n].value_of(leaf, stack);
+        for (formula, value) in formulas.iter().zip(values) {
+            *value = formula.value_on(leaf, sides, stack);
         }
-        rates
+    }
+
+    /// The values of some of its formulas.
+    #[inline(always)]
+    fn values<const N: usize>(&self, formulas: &[Expression], t: S, x: &[S; D], sides: &Sides<S>) -> [S; N] {
+        let mut values = [S::zero(); N];
+        if self.deep {
+            self.evaluate(formulas, t, x, sides, (&mut values, &mut [S::zero(); DEEP]));
+        } else {
+            self.evaluate(formulas, t, x, sides, (&mut values, &mut [S::zero(); SHALLOW]));
+        }
+        values
     }
 }
 
 impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
-    const SMOOTH: bool = true;
+    // Laws with kinks are not run in packets, which then need not be compiled to land.
+    const SMOOTH: bool = S::Real::LANES > 1;
 
     #[inline]
-    fn rates(&self, t: S, x: &[S; D], _sides: &Sides<S>) -> [S; D] {
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
             self.lane_by_lane(t, x)
-        } else if self.deep {
-            self.evaluate(t, x, &mut [S::zero(); DEEP])
         } else {
-            self.evaluate(t, x, &mut [S::zero(); SHALLOW])
+            self.values(&self.equations[..], t, x, sides)
         }
+    }
+
+    #[inline]
+    fn surfaces(&self) -> usize {
+        self.kinks.surfaces.len()
+    }
+
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        let [value] = self.values(&self.kinks.surfaces[j..=j], t, x, sides);
+        value
+    }
+
+    fn surface_name(&self, j: usize, _side: bool) -> &'static str {
+        if self.kinks.jumps[j] { "jump" } else { "kink" }
+    }
+
+    fn jumps(&self, j: usize) -> bool {
+        self.kinks.jumps[j]
     }
 }
 
@@ -82,6 +117,7 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnFamily<const D: usize> {
     equations: Arc<[Expression; D]>,
+    kinks: Arc<Kinks>,
     deep: bool,
     parameters: Vec<String>,
     states: Vec<(String, bool)>,
@@ -104,7 +140,7 @@ impl<const D: usize> OwnFamily<D> {
         let mut parsed = Vec::with_capacity(D);
         for (n, text) in equations.iter().enumerate() {
             let wrong = |what: String| Err((n, Mistake(what)));
-            if text.contains('=') {
+            if text.replace("<=", "").replace(">=", "").contains('=') {
                 return wrong("has =, but only the right-hand side is wanted".to_owned());
             }
             let one = Expression::parse(text, Names { states, parameters, rates: false });
@@ -114,10 +150,13 @@ impl<const D: usize> OwnFamily<D> {
             }
             parsed.push(one);
         }
-        let deep = parsed.iter().any(|one| one.depth() > SHALLOW);
+        let mut kinks = Kinks::default();
+        parsed.iter_mut().for_each(|one| kinks.of(one));
+        let deep = parsed.iter().chain(&kinks.surfaces).any(|one| one.depth() > SHALLOW);
         let Ok(equations) = <[Expression; D]>::try_from(parsed) else { unreachable!("as many as states") };
         let states = states.iter().map(|name| (name.clone(), false)).collect();
-        Ok(Self { equations: Arc::new(equations), deep, parameters: parameters.to_vec(), states })
+        let (equations, kinks) = (Arc::new(equations), Arc::new(kinks));
+        Ok(Self { equations, kinks, deep, parameters: parameters.to_vec(), states })
     }
 
     /// These of its states are angles.
@@ -143,11 +182,16 @@ impl<const D: usize> Family<D> for OwnFamily<D> {
     // The usual numbers of states: every one takes its time to compile.
     const STARTS_IN_PACKETS: bool = matches!(D, 2..=4);
 
+    fn goes_in_packets(&self) -> bool {
+        self.kinks.surfaces.is_empty()
+    }
+
     fn parameters(&self) -> Vec<Parameter> {
         self.parameters.iter().map(|name| parameter(name, "")).collect()
     }
 
     fn build<S: Scalar>(&self, values: &[S]) -> Own<S, D> {
-        Own { equations: self.equations.clone(), deep: self.deep, parameters: values.to_vec() }
+        let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
+        Own { equations, kinks, deep: self.deep, parameters: values.to_vec() }
     }
 }

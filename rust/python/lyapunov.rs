@@ -162,13 +162,14 @@ fn follow<F: Family<D>, const D: usize>(
 ) -> Result<Frames<D>, Failure> {
     let wide: Vec<Dual<f64, D>> = constants(values);
     let system = family.build(&wide);
-    match &rows::tape(family, &[values.to_vec()]) {
-        Some(tape) => {
-            let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
-            frames_of(system, method, x0, span, tolerance, stop)
+    if let Some(tape) = &rows::tape(family, &[values.to_vec()]) {
+        let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
+        match frames_of(&system, method, x0, span, tolerance, stop) {
+            Err(failure) if failure.is_of_series() => {}
+            found => return found,
         }
-        None => frames_of(system, Dopri5::default(), x0, span, tolerance, stop),
     }
+    frames_of(&system, Dopri5::default(), x0, span, tolerance, stop)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -179,8 +179,24 @@ impl AnyModel {
             AnyModel::Five(Either::First(_), _) | AnyModel::BristledPendulum(..) => {
                 "friction with the treatment lugre is for udd.simulate; here take set-valued"
             }
-            _ => "a model of your own with 1, 5 or 6 states is for udd.simulate; here it needs 2 to 4",
+            _ => {
+                "a model of your own with 1, 5 or 6 states is for udd.simulate and udd.equilibria; here it needs 2 to 4"
+            }
         })
+    }
+
+    /// Whether it is the user's own.
+    pub fn is_own(&self) -> bool {
+        use AnyModel::{Five, Four, One, Six, Three, Two};
+        matches!(
+            self,
+            One(..)
+                | Two(Either::Second(_), _)
+                | Three(Either::Second(_), _)
+                | Four(Either::Second(_), _)
+                | Five(Either::Second(_), _)
+                | Six(..)
+        )
     }
 
     /// The parameter values.

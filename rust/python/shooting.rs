@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use super::errors::ModelError;
 use super::interrupt;
 use super::jobs;
-use super::model::{AnyModel, state, with_wide_model};
+use super::model::{AnyModel, state, with_model, with_wide_model};
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;
 use crate::run::{Flown, MOST_PARAMETERS, Multiplier, Piece, Stop, higher, linear, multipliers, pieces};
@@ -102,7 +102,7 @@ fn expansion<'py>(
     all: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    let (d, rate, by_state, by_parameter, surfaces, more) = with_wide_model!(tangents: &model, |family, values| {
+    let (d, rate, by_state, by_parameter, surfaces, more) = with_model!(&model, |family, values| {
         let x = state(&x)?;
         let found = linear(family, values, t, &x);
         let more = if all { higher(family, values, t, &x) } else { Default::default() };

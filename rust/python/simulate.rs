@@ -1,5 +1,8 @@
 //! `udd.simulate`.
 
+use std::cell::Cell;
+use std::ffi::CString;
+
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -7,11 +10,11 @@ use pyo3::types::PyDict;
 use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
 use super::model::{AnyModel, state, with_model};
-use crate::integrate::{Dop853, Dopri5, Taylor, Tolerance, order};
+use crate::integrate::{Dop853, Dopri5, Failure, Rodas, Taylor, Tolerance, order};
 use crate::model::{Family, System};
 use crate::observe::Record;
-use crate::run::{Output, Run, Stepper, Stop, rows, trajectory};
-use crate::scalar::Isa;
+use crate::run::{Output, Run, Stepper, Stiffness, Stop, rows, trajectory};
+use crate::scalar::{Isa, constants};
 
 /// A finished run, its dimension forgotten: states are flat.
 struct Flat {
@@ -48,29 +51,58 @@ pub fn stepper(method: &str) -> PyResult<Stepper> {
         "dopri5" => Ok(Stepper::Dopri5),
         "dop853" => Ok(Stepper::Dop853),
         "taylor" => Ok(Stepper::Taylor),
+        "auto" => Ok(Stepper::Auto),
         _ => Err(ModelError::new_err(format!("no method is called {method:?}"))),
     }
+}
+
+/// How a single run may be taken beside.
+#[derive(Clone, Copy)]
+enum By {
+    Stepper(Stepper),
+    /// For stiff laws.
+    Rodas,
 }
 
 fn run<F: Family<D>, const D: usize>(
     family: &F,
     values: &[f64],
-    stepper: Stepper,
+    by: By,
     (output, x0): (Output<'_>, [f64; D]),
     (tolerance, keep): (&Tolerance, bool),
-    stop: &Stop,
+    (stop, stiffness): (&Stop, Option<&Stiffness>),
 ) -> Result<Flat, PyErr> {
     let system = || family.build(values);
-    let Run { t, x, events, outcome, counts, record } = match stepper {
-        Stepper::Dopri5 => trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop)?,
-        Stepper::Dop853 => trajectory(system(), Dop853::default(), output, x0, tolerance, keep, stop)?,
-        Stepper::Taylor => {
-            let tape = rows::tape(family, &[values.to_vec()]);
-            let message = "the model's law depends on comparisons, which no power series follows; use method=\"dop853\"";
-            let tape = tape.ok_or_else(|| ModelError::new_err(message))?;
-            let method = Taylor::new(&tape, values.to_vec(), order(tolerance), Isa::best());
-            trajectory(system(), method, output, x0, tolerance, keep, stop)?
+    let (stiff, stop) = ((stop, None), (stop, stiffness));
+    let rodas = || {
+        let method = Rodas::new(family.build(&constants(values)), family.build(&constants(values)));
+        trajectory(system(), method, output, x0, tolerance, keep, stiff)
+    };
+    let stages = || trajectory(system(), Dop853::default(), output, x0, tolerance, keep, stop);
+    let series = || {
+        let tape = rows::tape(family, &[values.to_vec()])?;
+        let method = Taylor::new(&tape, values.to_vec(), order(tolerance), Isa::best());
+        Some(trajectory(system(), method, output, x0, tolerance, keep, stop))
+    };
+    let run = match by {
+        By::Rodas => rodas(),
+        By::Stepper(Stepper::Dopri5) => {
+            trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop)
         }
+        By::Stepper(Stepper::Dop853) => stages(),
+        By::Stepper(Stepper::Taylor) => {
+            let message = "the model's law depends on comparisons, which no power series follows; use method=\"dop853\"";
+            series().ok_or_else(|| ModelError::new_err(message))?
+        }
+        By::Stepper(Stepper::Auto) => match series() {
+            None => stages(),
+            Some(Err(failure)) if failure.is_of_series() => stages(),
+            Some(run) => run,
+        },
+    };
+    let Run { t, x, events, outcome, counts, record } = match run {
+        Err(Failure::Stiff { .. }) => rodas()?,
+        run => run?,
     };
     let system = system();
     let (mut event_kinds, mut event_t, mut event_x) = (Vec::new(), Vec::new(), Vec::new());
@@ -138,7 +170,16 @@ fn simulate<'py>(
     dense: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    let (tolerance, stepper) = (Tolerance { rtol, atol }, stepper(method)?);
+    let tolerance = Tolerance { rtol, atol };
+    let by = if method == "rodas" { By::Rodas } else { By::Stepper(stepper(method)?) };
+    // The models that are built in are not stiff; where they come to rest steps are held down, too.
+    let watched = model.is_own();
+    let stiffness = Stiffness::new(method == "auto");
+    let told = Cell::new(method == "auto");
+    let tell = || match stiffness.recognised() {
+        Some(t) if !told.replace(true) => stiff(py, method, t),
+        _ => Ok(()),
+    };
     let times: Option<Vec<f64>> = times.map(|t| t.as_slice().map(<[f64]>::to_vec)).transpose()?;
     let output = times.as_deref().map_or(Output::Steps(0.0, end), Output::At);
     let flat = with_model!(&model, |family, values| {
@@ -147,8 +188,14 @@ fn simulate<'py>(
             let message = "the initial state lies outside the disk: Y^2 + Z^2 must be below R^2 (or use edge=\"ignore\")";
             return Err(ModelError::new_err(message));
         }
-        interrupt::run(py, |stop| run(family, values, stepper, (output, x0), (&tolerance, dense), stop))?
+        let work = |stop: &Stop| {
+            run(family, values, by, (output, x0), (&tolerance, dense), (stop, watched.then_some(&stiffness)))
+        };
+        let (flat, signal) = interrupt::watch(py, &tell, work)?;
+        signal?;
+        flat?
     });
+    tell()?;
 
     let table = |values: Vec<f64>| PyArray1::from_vec(py, values);
     let rows = flat.t.len();
@@ -163,6 +210,17 @@ fn simulate<'py>(
     dict.set_item("counts", flat.counts)?;
     dict.set_item("dense", flat.record.map(Dense))?;
     Ok(dict)
+}
+
+/// Warns of a run by this method that was found stiff at this time.
+fn stiff(py: Python<'_>, method: &str, t: f64) -> PyResult<()> {
+    let message = format!(
+        "the model is stiff at t = {t}: the steps of method=\"{method}\" are held down by stability, not by accuracy; \
+         method=\"rodas\" takes longer ones"
+    );
+    let category = py.import("udd.errors")?.getattr("StiffnessWarning")?;
+    // To where the user called `udd.simulate`, two calls above this one.
+    PyErr::warn(py, &category, CString::new(message)?.as_c_str(), 3)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,7 +1,7 @@
 //! The same model from many states, or with many values of its parameters.
 
 use super::Stop;
-use super::fleet::{Crew, Fleet, Queue, Yields, sail};
+use super::fleet::{Crew, Fleet, Queue, Yields, sail, sail_again};
 use super::recipe::{ByDop853, ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
@@ -17,8 +17,11 @@ use crate::unroll::vector;
 pub enum Stepper {
     Dopri5,
     Dop853,
-    /// Where a series follows the law, else as [`Dopri5`](Stepper::Dopri5).
+    /// Where a series follows the law, else as [`Dopri5`](Stepper::Dopri5). A run fails where its series does
+    /// not serve.
     Taylor,
+    /// The same, but such a run is done again as by [`Dop853`](Stepper::Dop853).
+    Auto,
 }
 
 /// Many runs of one model.
@@ -50,15 +53,21 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     /// Runs them all. `None` stands for runs that were not finished when the work was stopped.
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Passage<D>>> {
         let (runs, isa) = (rows::count(self.values, self.starts), crew.isa);
+        let stages = Sampled { ensemble: self, recipe: ByDop853, isa };
         let tape = match self.stepper {
             Stepper::Dopri5 => None,
-            Stepper::Dop853 => return sail(&Sampled { ensemble: self, recipe: ByDop853, isa }, runs, crew),
-            Stepper::Taylor => rows::tape(self.family, self.values),
+            Stepper::Dop853 => return sail(&stages, runs, crew),
+            Stepper::Taylor | Stepper::Auto => rows::tape(self.family, self.values),
         };
         match &tape {
             Some(tape) => {
                 let recipe = ByTaylor { tape, order: order(&self.tolerance), isa };
-                sail(&Sampled { ensemble: self, recipe, isa }, runs, crew)
+                let passages = sail(&Sampled { ensemble: self, recipe, isa }, runs, crew);
+                let failed = |passage: &Passage<D>| {
+                    self.stepper == Stepper::Auto
+                        && passage.outcome.is_err_and(|failure| failure.is_of_series())
+                };
+                sail_again(&stages, passages, failed, crew)
             }
             None => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa }, runs, crew),
         }
@@ -117,6 +126,10 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
                 None => return,
             }
         }
+    }
+
+    fn goes_in_packets(&self) -> bool {
+        self.ensemble.family.goes_in_packets()
     }
 
     #[inline(always)]
@@ -187,7 +200,7 @@ fn passage<const D: usize>(
     stop: &Stop,
 ) -> Option<Passage<D>> {
     let mut samples = Samples::new(times, *run.x());
-    let outcome = match follow(run, end, stop, &mut |run, _| samples.take(run)) {
+    let outcome = match follow(run, end, (stop, None), &mut |run, _| samples.take(run)) {
         Err(Failure::Interrupted) => return None,
         Ok(Outcome::Chattering) => Err(Failure::Chattering { t: run.t() }),
         outcome => outcome,

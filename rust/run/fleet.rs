@@ -7,21 +7,23 @@ use super::Stop;
 use super::parallel::on_threads;
 use crate::scalar::{Instructions, Isa, LANES, Packet, Real, Work};
 
-/// Jobs numbered from 0, each taken once.
+/// Jobs numbered from 0, each taken once, or some of them.
 #[derive(Debug)]
 pub struct Queue<'a> {
     next: AtomicUsize,
     jobs: usize,
     /// What each thread may begin with, so that none goes without.
     share: usize,
+    only: Option<&'a [usize]>,
     stop: &'a Stop,
 }
 
 impl Queue<'_> {
     /// The next job; none once all are taken.
     pub fn take(&self) -> Option<usize> {
-        let job = self.next.fetch_add(1, Ordering::Relaxed);
-        (job < self.jobs).then_some(job)
+        let next = self.next.fetch_add(1, Ordering::Relaxed);
+        let job = self.only.map_or(Some(next), |only| only.get(next).copied());
+        job.filter(|_| next < self.jobs)
     }
 
     /// How many lanes of a packet are to be filled at the start.
@@ -87,6 +89,11 @@ pub trait Fleet: Sync {
         self.sail::<f64>(queue, yields);
     }
 
+    /// Whether this one can go in packets.
+    fn goes_in_packets(&self) -> bool {
+        true
+    }
+
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
     /// To be `#[inline(always)]`.
@@ -107,12 +114,35 @@ pub struct Crew<'a> {
 /// What the jobs yield, in their order; `None` for those that were not finished when the work was
 /// stopped.
 pub fn sail<T: Fleet>(fleet: &T, jobs: usize, crew: Crew<'_>) -> Vec<Option<T::Yield>> {
-    spread(jobs, crew, &|queue, yields| {
-        if T::PACKETS && jobs > 1 && crew.isa != Isa::Baseline {
+    let mut all = Vec::new();
+    all.resize_with(jobs, || None);
+    spread(all, None, crew, &|queue, yields| {
+        if T::PACKETS && fleet.goes_in_packets() && jobs > 1 && crew.isa != Isa::Baseline {
             return crew.isa.run(InPackets { fleet, queue, yields });
         }
         fleet.walk(queue, yields);
     })
+}
+
+/// The same yields, once the jobs whose yield `failed` have been done again, one by one, by another fleet.
+pub fn sail_again<T: Fleet>(
+    fleet: &T,
+    yields: Vec<Option<T::Yield>>,
+    failed: impl Fn(&T::Yield) -> bool,
+    crew: Crew<'_>,
+) -> Vec<Option<T::Yield>> {
+    let mut again = Vec::new();
+    for (job, yielded) in yields.iter().enumerate() {
+        if yielded.as_ref().is_some_and(&failed) {
+            again.push(job);
+        }
+    }
+    if again.is_empty() {
+        return yields;
+    }
+    // They were counted as done already.
+    let crew = Crew { done: &AtomicUsize::new(0), ..crew };
+    spread(yields, Some(&again), crew, &|queue, yields| fleet.walk(queue, yields))
 }
 
 /// The whole of the work, compiled for each instruction set.
@@ -143,14 +173,15 @@ impl<T: Fleet> Work for InPackets<'_, '_, '_, T> {
 }
 
 fn spread<Y: Send>(
-    jobs: usize,
+    all: Vec<Option<Y>>,
+    only: Option<&[usize]>,
     crew: Crew<'_>,
     work: &(dyn Fn(&Queue<'_>, &mut Yields<'_, Y>) + Sync),
 ) -> Vec<Option<Y>> {
+    let jobs = only.map_or(all.len(), <[usize]>::len);
     let threads = threads(jobs, crew.threads);
-    let queue = Queue { next: AtomicUsize::new(0), jobs, share: jobs.div_ceil(threads), stop: crew.stop };
-    let mut all: Vec<Option<Y>> = Vec::new();
-    all.resize_with(jobs, || None);
+    let share = jobs.div_ceil(threads);
+    let queue = Queue { next: AtomicUsize::new(0), jobs, share, only, stop: crew.stop };
     let all = Mutex::new(all);
     let watch = || {
         let batch = Vec::with_capacity(Yields::<Y>::BATCH.min(jobs));

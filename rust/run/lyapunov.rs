@@ -1,7 +1,7 @@
 //! Lyapunov exponents.
 
 use super::blocks::{Average, Blocks};
-use super::fleet::{Crew, Fleet, Queue, Yields, sail};
+use super::fleet::{Crew, Fleet, Queue, Yields, sail, sail_again};
 use super::frame::{Growth, tangents};
 use super::moments::Moments;
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
@@ -63,12 +63,16 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
     /// first half is dropped.
     pub fn run<const N: usize>(&self, crew: Crew<'_>) -> Vec<Option<Exponents<D, N>>> {
         let (orbits, isa) = (rows::count(self.values, self.starts), crew.isa);
+        let stages = Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5, isa };
         match &rows::tape(self.family, self.values) {
             Some(tape) => {
                 let recipe = ByTaylor { tape, order: order(&self.options.tolerance), isa };
-                sail(&Tangents::<_, D, N, _> { orbits: self, recipe, isa }, orbits, crew)
+                let found = sail(&Tangents::<_, D, N, _> { orbits: self, recipe, isa }, orbits, crew);
+                let failed =
+                    |orbit: &Exponents<D, N>| orbit.outcome.is_err_and(|failure| failure.is_of_series());
+                sail_again(&stages, found, failed, crew)
             }
-            None => sail(&Tangents::<_, D, N, _> { orbits: self, recipe: ByDopri5, isa }, orbits, crew),
+            None => sail(&stages, orbits, crew),
         }
     }
 

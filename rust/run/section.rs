@@ -1,7 +1,7 @@
 //! Poincaré sections: where trajectories cross a surface.
 
 use super::crossing::{Crossed, Scan};
-use super::fleet::{Crew, Fleet, Queue, Yields, sail};
+use super::fleet::{Crew, Fleet, Queue, Yields, sail, sail_again};
 use super::recipe::{ByDopri5, ByTaylor, Recipe};
 use super::rows;
 use super::ship::{Ship, Start};
@@ -97,12 +97,15 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
     /// Collects them all. `None` stands for trajectories that were not begun when the work was stopped.
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Crossings<D>>> {
         let (jobs, isa) = (rows::count(self.values, self.starts), crew.isa);
+        let stages = Collect { sections: self, recipe: ByDopri5, isa };
         match &rows::tape(self.family, self.values) {
             Some(tape) => {
                 let recipe = ByTaylor { tape, order: order(&self.tolerance), isa };
-                sail(&Collect { sections: self, recipe, isa }, jobs, crew)
+                let found = sail(&Collect { sections: self, recipe, isa }, jobs, crew);
+                let failed = |crossings: &Crossings<D>| matches!(crossings.ended, Ended::Failed(failure) if failure.is_of_series());
+                sail_again(&stages, found, failed, crew)
             }
-            None => sail(&Collect { sections: self, recipe: ByDopri5, isa }, jobs, crew),
+            None => sail(&stages, jobs, crew),
         }
     }
 

@@ -75,13 +75,14 @@ fn one<F: Family<D>, const D: usize>(
         values[p] = Dual::variable(piece.values[p], D + i);
     }
     let system = family.build(&values);
-    match tape {
-        Some(tape) => {
-            let method = Taylor::new(tape, values, order(tolerance), Isa::best());
-            follow(method, system, piece, tolerance, stop)
+    if let Some(tape) = tape {
+        let method = Taylor::new(tape, values, order(tolerance), Isa::best());
+        match follow(method, &system, piece, tolerance, stop) {
+            Err(failure) if failure.is_of_series() => {}
+            flown => return flown,
         }
-        None => follow(Dop853::default(), system, piece, tolerance, stop),
     }
+    follow(Dop853::default(), &system, piece, tolerance, stop)
 }
 
 fn follow<M, K, const D: usize>(

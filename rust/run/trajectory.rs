@@ -1,5 +1,6 @@
 //! One run, sampled.
 
+use super::stiffness::{Look, Stiffness};
 use crate::integrate::{Counts, Driver, Ending, Failure, Method, Steps, Tolerance};
 use crate::model::System;
 use crate::observe::{Event, Record, Samples};
@@ -50,7 +51,7 @@ pub struct Run<const D: usize> {
 }
 
 /// Runs the system from `x0` by this method, ending on its wall where it has one. A run that ends there,
-/// or where it chatters, is cut: that point is the last one.
+/// or where it chatters, is cut: that point is the last one. Where asked for, it is watched for being stiff.
 pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     system: M,
     method: K,
@@ -58,14 +59,14 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     x0: [f64; D],
     tolerance: &Tolerance,
     keep: bool,
-    stop: &Stop,
+    watched: (&Stop, Option<&Stiffness>),
 ) -> Result<Run<D>, Failure> {
     let start = match output {
         Output::At(times) => times.first().copied().unwrap_or(0.0),
         Output::Steps(start, _) => start,
     };
     let mut run = Driver::by(method, system, start, x0, None, tolerance).with_wall();
-    sampled(&mut run, output, keep, stop)
+    sampled(&mut run, output, keep, watched)
 }
 
 /// Samples a run, from where it stands.
@@ -73,7 +74,7 @@ fn sampled<const D: usize>(
     run: &mut dyn Steps<D>,
     output: Output<'_>,
     keep: bool,
-    stop: &Stop,
+    (stop, stiffness): (&Stop, Option<&Stiffness>),
 ) -> Result<Run<D>, Failure> {
     let (start, x0) = (run.t(), *run.x());
     let (times, end) = match output {
@@ -84,7 +85,7 @@ fn sampled<const D: usize>(
     let mut steps = (vec![start], vec![x0]);
     let mut events = Vec::new();
     let mut record = keep.then(|| Record::new(start, x0));
-    let outcome = follow(run, end, stop, &mut |run, ending| {
+    let outcome = follow(run, end, (stop, stiffness), &mut |run, ending| {
         if times.is_empty() {
             // Two events can share a time.
             if run.t() > steps.0[steps.0.len() - 1] {
@@ -112,13 +113,14 @@ fn sampled<const D: usize>(
     Ok(Run { t, x, events, outcome, counts: run.counts(), record })
 }
 
-/// Follows a run to `end`, showing every step.
+/// Follows a run to `end`, showing every step; where asked for, it is watched for being stiff.
 pub(super) fn follow<const D: usize>(
     run: &mut dyn Steps<D>,
     end: f64,
-    stop: &Stop,
+    (stop, stiffness): (&Stop, Option<&Stiffness>),
     see: &mut dyn FnMut(&dyn Steps<D>, Ending),
 ) -> Result<Outcome, Failure> {
+    let mut look = Look::new();
     while run.t() < end {
         stop.check()?;
         let (ending, outcome) = match run.advance(end) {
@@ -126,6 +128,9 @@ pub(super) fn follow<const D: usize>(
             Ok(Ending::Wall) => (Ending::Wall, Some(Outcome::Ejected)),
             ending => (ending?, None),
         };
+        if let Some(stiffness) = stiffness {
+            look.at(run, stiffness)?;
+        }
         see(run, ending);
         if let Some(outcome) = outcome {
             return Ok(outcome);

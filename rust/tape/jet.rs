@@ -3,10 +3,10 @@
 use super::fuse::Program;
 use super::known::Known;
 use super::node::{INVERSE, hold};
-use super::{Tape, disk, dle};
+use super::{Node, Tape, disk, dle};
 use crate::model::Sides;
-use crate::scalar::{Instructions, Isa, Real, Scalar, Work};
-use crate::unroll::unroll;
+use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
+use crate::unroll::{unroll, vector};
 
 /// The orders whose programs are unrolled, which takes long to compile.
 pub const LOW: usize = 10;
@@ -14,11 +14,14 @@ pub const HIGH: usize = 18;
 
 /// Room for the Taylor coefficients of a solution of `D` equations, of orders 0 to `N - 1`.
 #[derive(Clone, Debug)]
-pub struct Jets<S, const D: usize, const N: usize> {
+pub struct Jets<S: Scalar, const D: usize, const N: usize> {
     isa: Isa,
     order: usize,
     work: Vec<[S; N]>,
     held: Vec<S>,
+    /// The same without derivatives, for the rates alone.
+    values: Vec<[S::Real; 2]>,
+    held_values: Vec<S::Real>,
 }
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
@@ -26,8 +29,15 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// [`expand`](Jets::expand) allocates nothing.
     pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
         const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
-        let zero = [S::zero(); N];
-        Self { isa, order: N - 1, work: vec![zero; tape.slots], held: vec![S::zero(); tape.held.len()] }
+        let zero = S::Real::zero();
+        Self {
+            isa,
+            order: N - 1,
+            work: vec![[S::zero(); N]; tape.slots],
+            held: vec![S::zero(); tape.held.len()],
+            values: vec![[zero; 2]; tape.slots],
+            held_values: vec![zero; tape.held.len()],
+        }
     }
 
     /// The coefficients of the solution through the state `x` at time `t`, all laws taken on these
@@ -43,6 +53,22 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// Evaluates what does not change along a solution.
     pub fn hold(&mut self, tape: &Tape<D>, parameters: &[S], sides: &Sides<S>) {
         hold(&tape.held, parameters, sides, &mut self.held);
+        for i in 0..self.held.len() {
+            self.held_values[i] = self.held[i].real();
+        }
+    }
+
+    /// The rates at a time and a state after [`hold`](Jets::hold), without derivatives.
+    pub fn rates(
+        &mut self,
+        tape: &Tape<D>,
+        t: S::Real,
+        x: &[S::Real; D],
+        sides: &Sides<S::Real>,
+    ) -> [S::Real; D] {
+        let Self { isa, values, held_values, .. } = self;
+        let rates = Rates { program: &tape.program, values, held: held_values, t, x, sides };
+        if const { S::Real::LANES > 1 } { S::Real::work(*isa, rates) } else { rates.run::<Plain>() }
     }
 
     /// Goes up to this order only, at least 4.
@@ -66,7 +92,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
     pub fn expand_here<V: Instructions>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
-        let Self { isa, work, held, order } = self;
+        let Self { isa, work, held, order, .. } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
         if const { D == 3 }
@@ -81,6 +107,24 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let work = &mut work[..tape.slots];
         let program = &tape.program;
         S::Real::work(*isa, Interpretation { program, work, order, held, t, sides });
+    }
+
+    /// Where the law has [levelled off](Tape::levels_off) to the last bit: its series then knows nothing of what is
+    /// beyond.
+    #[inline(never)]
+    pub fn flat(&self, tape: &Tape<D>) -> S::Mask {
+        let mut flat = S::mask(false);
+        for step in &tape.steps {
+            let at = match step.node {
+                Node::Exp(_) => step.to,
+                // Its slope.
+                Node::Tanh(_) => step.to + 1,
+                _ => continue,
+            };
+            let size = self.work[usize::from(at)][0].real().abs();
+            flat = flat.or(size.less(S::Real::constant(f64::MIN_POSITIVE)));
+        }
+        flat
     }
 
     /// The coefficients of each component, order 0 first; those beyond the [`order`](Jets::order) are idle.
@@ -105,6 +149,33 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
     #[inline(always)]
     fn run<V: Instructions>(self) {
         self.jets.expand_here::<V>(self.tape, self.t, self.x, self.sides);
+    }
+}
+
+/// The rates alone, compiled once for each instruction set that packets are made of.
+struct Rates<'a, R: Real, const D: usize> {
+    program: &'a Program,
+    /// The coefficients of order 0, and the rates as those of order 1 of the state.
+    values: &'a mut [[R; 2]],
+    held: &'a [R],
+    t: R,
+    x: &'a [R; D],
+    sides: &'a Sides<R>,
+}
+
+impl<R: Real, const D: usize> Work for Rates<'_, R, D> {
+    type Output = [R; D];
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> [R; D] {
+        let Self { program, values, held, t, x, sides } = self;
+        unroll!(n in 0..D => { values[n][0] = x[n]; });
+        if const { R::LANES > 1 } {
+            program.start(values, held, t, sides);
+        } else {
+            begin(program, values, held, t, sides);
+        }
+        vector!(R, D; n => values[n][1])
     }
 }
 

@@ -62,8 +62,7 @@ impl<const D: usize> Tape<D> {
         Self { program, ..self.clone() }
     }
 
-    /// Whether the law can level off so far that the terms of its series are too small to tell how near its
-    /// poles are, as exp and tanh do.
+    /// Whether the law can level off so far that the terms of its series vanish, as exp and tanh do.
     #[inline(always)]
     pub fn levels_off(&self) -> bool {
         self.levels_off

@@ -3,8 +3,11 @@
 use super::Jets;
 use crate::integrate::ErrorNorm;
 use crate::scalar::elementary::power_rough;
-use crate::scalar::{Instructions, Packet, Real, Scalar, Work};
+use crate::scalar::{Instructions, Mask, Packet, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
+
+/// 2^-600: the square of the largest number times this, over a tolerance, is still a number.
+const SMALL: f64 = f64::from_bits((1023 - 600) << 52);
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// The solution at a distance `dt` from where it was expanded.
@@ -65,7 +68,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     }
 
     /// How far the solution may be followed by the series up to this order: the last two terms are then as small
-    /// as allowed. Not a number where one of these terms is none.
+    /// as allowed. Not a number where one of these terms is none, or infinite.
     ///
     /// À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99, section 3.2.
     #[inline(always)]
@@ -74,17 +77,42 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let (series, order) = (self.coefficients(), order.clamp(4, N - 1));
         let mut sum = S::Real::zero();
         unroll!(n in 0..D => { sum += series[n][order].real() + series[n][order - 1].real(); });
+        let (last, before) = (self.reach(order, norm, weights), self.reach(order - 1, norm, weights));
+        let mut radius = last.0.min(before.0);
+        // Near a pole the squares of norms are too large for a number long before the terms are.
+        let square = last.1 + before.1;
+        if square.finite().not().any() {
+            radius = S::Real::select(square.finite(), radius, self.short_radius(order, norm, weights));
+        }
         // Zero, or not a number.
-        let reach = self.reach(order, norm, weights).min(self.reach(order - 1, norm, weights));
-        reach + (sum - sum)
+        radius + (sum - sum)
     }
 
-    /// The distance at which term `k` is as small as allowed.
+    /// The distance at which term `k` is as small as allowed, and the square of its norm.
     #[inline(always)]
-    fn reach<E: ErrorNorm<S, D>>(&self, k: usize, norm: &E, weights: &E::Weights) -> S::Real {
+    fn reach<E: ErrorNorm<S, D>>(&self, k: usize, norm: &E, weights: &E::Weights) -> (S::Real, S::Real) {
         let series = self.coefficients();
         let term = vector!(S, D; n => series[n][k]);
-        power_rough(norm.of_term(&term, weights), -0.5 / k as f64)
+        let square = norm.of_term(&term, weights);
+        (power_rough(square, -0.5 / k as f64), square)
+    }
+
+    /// The [`radius`](Jets::radius) where the terms are large: their norms are those of terms made small. Not a
+    /// number where they carry derivatives, which may have become infinite first.
+    #[cold]
+    #[inline(never)]
+    fn short_radius<E: ErrorNorm<S, D>>(&self, order: usize, norm: &E, weights: &E::Weights) -> S::Real {
+        let series = self.coefficients();
+        if const { size_of::<S>() > size_of::<S::Real>() } {
+            return S::Real::constant(f64::NAN);
+        }
+        let reach = |k: usize| {
+            let term = vector!(S, D; n => series[n][k].scale(SMALL));
+            let square = norm.of_term(&term, weights);
+            power_rough(square, -0.5 / k as f64).scale(SMALL.powf(1.0 / k as f64)) + (square - square)
+        };
+        let (last, before) = (reach(order), reach(order - 1));
+        last.min(before) + (last + before).scale(0.0)
     }
 }
 

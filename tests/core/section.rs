@@ -82,7 +82,7 @@ fn elsewhere<const D: usize>(
         x0,
         &TIGHT,
         false,
-        &Stop::new(),
+        (&Stop::new(), None),
     );
     run.unwrap().x[1..].to_vec()
 }

@@ -23,7 +23,8 @@ fn oscillator(mu: f64, treatment: Treatment, eps: f64) -> Pendulum<f64> {
 }
 
 fn run<M: System<f64, D>, const D: usize>(system: &M, end: f64, x0: [f64; D]) -> Run<D> {
-    trajectory(system, Dopri5::default(), Output::Steps(0.0, end), x0, &TIGHT, false, &Stop::new()).unwrap()
+    trajectory(system, Dopri5::default(), Output::Steps(0.0, end), x0, &TIGHT, false, (&Stop::new(), None))
+        .unwrap()
 }
 
 fn named<'a, const D: usize>(
@@ -461,9 +462,16 @@ impl System<f64, 2> for Ball {
 fn chattering_is_an_outcome() {
     let tolerance = Tolerance::default();
     let times = [0.0, 1.0, 10.0, 40.0, 50.0];
-    let run =
-        trajectory(&Ball, Dopri5::default(), Output::At(&times), [1.0, 0.0], &tolerance, true, &Stop::new())
-            .unwrap();
+    let run = trajectory(
+        &Ball,
+        Dopri5::default(),
+        Output::At(&times),
+        [1.0, 0.0],
+        &tolerance,
+        true,
+        (&Stop::new(), None),
+    )
+    .unwrap();
     assert_eq!(run.outcome, Outcome::Chattering);
     // It falls for sqrt 2, then flies for 2 sqrt 2 (0.9 + 0.9^2 + ...) = 18 sqrt 2.
     let end = run.t[run.t.len() - 1];
@@ -522,7 +530,7 @@ proptest! {
         let system = PendulumFamily { effects }.build(&values);
         let rtol = 10f64.powf(-digits);
         let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
-        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, &Stop::new());
+        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, (&Stop::new(), None));
         let run = run.unwrap();
         prop_assert_eq!(run.outcome, Outcome::Finished);
         // At 1e-12 ten seconds take up to 3000 steps.

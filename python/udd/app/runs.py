@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from udd.energy import Books, angular_momentum, energy_books
 from udd.errors import ModelError
 from udd.models import DLE, Disk, Model
-from udd.trajectory import Trajectory, simulate
+from udd.trajectory import Trajectory, integrated
 
 from . import limits
 from .spec import Start, key_of
@@ -62,7 +62,7 @@ class Run:
     def _grow(self, count: int) -> None:
         """Run over twice so many states as will be told."""
         model = self.start.model
-        run = simulate(model, times_of(model, count), self.start.state)
+        run = integrated(model, times_of(model, count), self.start.state)
         told = count // 2
         most = int(limits.MODEL_SECONDS * RATE)
         self._asked = count

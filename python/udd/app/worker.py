@@ -153,7 +153,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """A film of a run of the page."""
     from udd.film import render
-    from udd.trajectory import simulate
+    from udd.trajectory import integrated
 
     from .runs import RATE, times_of
     from .spec import start_of
@@ -161,7 +161,7 @@ def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     start, seconds = start_of(asked["start"]), float(asked["seconds"])
     tell({"say": "filming the run"})
     times = times_of(start.model, round(seconds * RATE) + 1)
-    run = simulate(start.model, times, start.state)
+    run = integrated(start.model, times, start.state)
     render(run, OUT / "run.mp4")
     return {"parts": [{"name": "run.mp4", "title": "Film of the run"}]}
 

@@ -90,9 +90,10 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
     bounds = (args.first, args.last)
     starts: list[Equilibrium | PeriodicOrbit] = []
     if args.of == "equilibria":
-        starts += equilibria(model)
-        if not starts:
-            raise UddError("there is no equilibrium to follow")
+        found = equilibria(model)
+        if not found:
+            raise UddError(f"no equilibrium to follow was found by {found.search}")
+        starts += found
     else:
         guess = None if args.state is None else numbers([args.state], "--state")
         try:

@@ -87,14 +87,14 @@ def run_model(
     import numpy as np
 
     from udd._validate import number
-    from udd.trajectory import simulate
+    from udd.trajectory import integrated
 
     length, step = number("--t", args.t, above=0.0), number("--dt", dt, above=0.0)
     rows = int(length / step + 1e-9) + 1
     if rows > _MOST:
         raise UddError(f"{rows} rows are too many (at most {_MOST}): a longer --dt would do")
     start = _START[model.kind] if args.state is None else numbers(args.state, "--state")
-    return simulate(model, step * np.arange(rows), start, rtol=rtol, atol=atol, dense=dense)
+    return integrated(model, step * np.arange(rows), start, rtol=rtol, atol=atol, dense=dense)
 
 
 def _model(args: argparse.Namespace) -> Model:

@@ -14,7 +14,7 @@ import numpy as np
 from udd.effects import Effect, library
 from udd.film import render
 from udd.models import Disk
-from udd.trajectory import Trajectory, simulate
+from udd.trajectory import Trajectory, integrated
 
 DURATION = 60.0  # s
 DRIVE = 0.042  # m/s
@@ -47,7 +47,7 @@ def between_wheels(effects: tuple[Effect, ...], seed: int) -> Trajectory:
     while True:
         radius, angle = random.uniform(0.01, 0.05), random.uniform(0, 2 * np.pi)
         start = [random.normal(0, 2), radius * np.sin(angle), radius * np.cos(angle), random.uniform(0, 6)]
-        run = simulate(model, times, start, dense=True)
+        run = integrated(model, times, start, dense=True)
         if run.outcome == "finished":
             return run
 

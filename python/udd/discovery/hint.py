@@ -17,7 +17,7 @@ from udd.fitting import Fit, Record
 from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
 from udd.models import Disk, Model, Pendulum
-from udd.trajectory import simulate
+from udd.trajectory import integrated
 
 from .candidates import Candidate, renamed
 from .together import together
@@ -189,7 +189,7 @@ def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
     longest: Array = np.zeros((0, fit.states.shape[1]))
     for start in film.start:
         try:
-            run = simulate(film.model, t + (times[-1] if film.again else 0.0), start, rtol=1e-7, atol=1e-9)
+            run = integrated(film.model, t + (times[-1] if film.again else 0.0), start, rtol=1e-7, atol=1e-9)
         except UddError:
             continue
         # What leaves is cut at the edge, where the last time is no frame's.

@@ -194,7 +194,10 @@ def formula(
         friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
         numbers, ``pi``, and the effect's own parameters; with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``,
         ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``,
-        ``bspline`` (the cardinal cubic B-spline) and the splines of :func:`curve`.
+        ``sign``, ``min(a, b)``, ``max(a, b)``, ``where(x > c, a, b)``, ``bspline`` (the cardinal cubic
+        B-spline) and the splines of :func:`curve`. Runs of disk and pendulum land where ``abs(Omega)``
+        changes, those of a model of your own on all kinks (see :class:`udd.Model`); other kinks of an effect
+        on disk or pendulum are only compared: runs go over them by small steps, without a power series.
     momentum : {"consistent", "constraint"}, optional
         How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
     name : str

@@ -78,10 +78,10 @@ def measured(name: str, folder: Path, tell: Callable[[str], None]) -> Measuremen
 def _make(recipe: Recipe, name: str, film: Path, table: Path, tell: Callable[[str], None]) -> None:
     from udd.film import render
     from udd.tracking import track
-    from udd.trajectory import simulate
+    from udd.trajectory import integrated
 
     t = np.arange(0.0, recipe.duration, _STEP)
-    run = simulate(device.disk(recipe.W), t, recipe.start, dense=True)
+    run = integrated(device.disk(recipe.W), t, recipe.start, dense=True)
     tell(f"filming W = {name} cm/s")
     render(run, film, quality=recipe.quality, seed=recipe.seed)
     tell(f"tracking the film of W = {name} cm/s")

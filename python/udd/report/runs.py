@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from udd.errors import IntegrationError
 from udd.fitting import predicted
-from udd.trajectory import Trajectory, simulate
+from udd.trajectory import Trajectory, integrated
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def free_run(fit: Any) -> Trajectory | None:
     t = fit.record.t
     times = np.arange(t[0], t[-1], _STEP)
     try:
-        return simulate(fit.model, times, fit.states[0])
+        return integrated(fit.model, times, fit.states[0])
     except IntegrationError:
         return None
 

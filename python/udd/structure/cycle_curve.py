@@ -10,7 +10,10 @@ from .condensing import CyclicEquations
 from .flow import Flight, Floats, Flow
 from .path import _DENSE
 
-__all__ = ["CycleCurve"]
+__all__ = ["HELD", "CycleCurve"]
+
+HELD = -1
+"""The index of a parameter that the model does not have: a cycle alone needs none."""
 
 
 def _planes(rates: Floats) -> Floats:
@@ -34,7 +37,8 @@ class CycleCurve:
     ----------
     flow : Flow
     values : ndarray
-        The model's parameters, of which the one with the index `parameter` is varied.
+        The model's parameters, of which the one with the index `parameter` is varied: `HELD` where there are
+        none.
     scale : float
         The unit of the parameter in the unknowns.
     clock : float
@@ -97,7 +101,8 @@ class CycleCurve:
     def values_at(self, u: Floats) -> Floats:
         """All parameters."""
         values = self.values.copy()
-        values[self.parameter] = self.value(u)
+        if self.parameter != HELD:
+            values[self.parameter] = self.value(u)
         return values
 
     def fix_phase(self, u: Floats) -> None:
@@ -115,9 +120,8 @@ class CycleCurve:
         """Where the pieces end, with derivatives by the parameter."""
         if self.seen is None or not np.array_equal(self.seen[0], u):
             spans = np.full(self.pieces, self.span(u) / self.pieces)
-            found = self.flow.fly(
-                self.values_at(u), self.nodes(u), spans, (self.parameter,), loose=self.loose
-            )
+            wanted = () if self.parameter == HELD else (self.parameter,)
+            found = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, loose=self.loose)
             self.seen = u.copy(), found
         return self.seen[1]
 

@@ -17,7 +17,7 @@ from udd.models import Model, beyond_the_edge, require_model
 from udd.orbits import default_start
 from udd.trajectory import simulate
 
-from .cycle_curve import CycleCurve
+from .cycle_curve import HELD, CycleCurve
 from .flow import Floats, Flow, flow_of
 from .multipliers import multipliers_at
 from .path import Lost, along_parameter, correct, nearest_of_family
@@ -172,13 +172,14 @@ def closed(
     flow: Flow, nodes: Floats, span: float, mirror: Floats, shift: Floats
 ) -> tuple[CycleCurve, Floats]:
     """The curve at whose present parameters the orbit closes, and the unknowns there."""
-    # The parameter is held: any that does not vanish will do.
-    held = int(np.argmax(flow.values != 0.0))
-    scale = abs(float(flow.values[held])) or 1.0
+    # The parameter is held: any that does not vanish will do, and none where the model has none.
+    held = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
+    value = 0.0 if held == HELD else float(flow.values[held])
+    scale = abs(value) or 1.0
     curve = CycleCurve(
         flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes[0], np.zeros(flow.dim)
     )
-    guess = curve.pack(nodes, span, float(flow.values[held]))
+    guess = curve.pack(nodes, span, value)
     curve.fix_phase(guess)
     tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
     row = along_parameter(guess)

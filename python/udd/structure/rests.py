@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize
@@ -16,14 +18,31 @@ from .normal_forms import first_lyapunov_coefficient
 from .rest_curve import expansion
 from .solutions import Equilibrium, kind_of_rest
 
-__all__ = ["equilibria", "refined", "rest_at"]
+__all__ = ["Equilibria", "equilibria", "refined", "rest_at"]
 
 _SAME = 1e-7  # two within this part of the typical sizes are one
 _REST = 1e-9  # rates, in typical sizes per typical time, that are as good as none
 _REACHES = (0.3, 1.0, 3.0, 10.0)  # boxes in which the search starts, in typical sizes
 
 
-def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128) -> list[Equilibrium]:
+class Equilibria(list[Equilibrium]):
+    """The equilibria that a search found.
+
+    Attributes
+    ----------
+    search : str
+        Where it searched and how, in a sentence: what it did not find may still exist.
+    """
+
+    def __init__(self, found: Iterable[Equilibrium], search: str) -> None:
+        super().__init__(found)
+        self.search = search
+
+    def __repr__(self) -> str:
+        return f"<{super().__repr__()}; {self.search}>"
+
+
+def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128) -> Equilibria:
     """The equilibria of a model.
 
     Parameters
@@ -37,8 +56,9 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
 
     Returns
     -------
-    list of Equilibrium
-        The most stable first. Those of a model with a symmetry come in mirror images, or are their own;
+    Equilibria
+        A list of :class:`Equilibrium`, the most stable first; its ``search`` says where and how they were
+        searched for. Those of a model with a symmetry come in mirror images, or are their own;
         those that differ by whole turns of an angle come once, within half a turn of 0.
 
     Raises
@@ -49,10 +69,10 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     Notes
     -----
     Each start is refined by Powell's hybrid method with exact derivatives (`scipy.optimize.root`); what
-    comes out is kept where nothing moves. An equilibrium with a small basin of that method, or far outside
-    the boxes, can be missed: give a state `near` it. For the DLE the rotating states are
-    ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk ``Omega^2 = g W/k(Omega)``, ``Y = W/Omega``, where
-    angles that nothing depends on go on turning.
+    comes out is kept where nothing moves. The search is not exhaustive: an equilibrium with a small basin of
+    that method, or far outside the boxes, can be missed: give a state `near` it. For the DLE the rotating
+    states are ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk ``Omega^2 = g W/k(Omega)``, ``Y = W/Omega``,
+    where angles that nothing depends on go on turning.
 
     Examples
     --------
@@ -62,6 +82,11 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
     [-1.732051 -1.732051  0.      ] saddle-focus
     [1.732051 1.732051 0.      ] saddle-focus
     [0. 0. 5.] saddle
+
+    A search that finds nothing says where it was:
+
+    >>> print(udd.equilibria(udd.Model(["x", "v"], ["v", "1 + x^2"])).search)
+    Powell's method from 128 states within |x| <= 10, |v| <= 10: others may exist
     """
     require_model(model)
     dim = len(model.state_names)
@@ -83,7 +108,12 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
             if all(_apart(flow, image, known) for known in found):
                 found.append(image + 0.0)
     rests = [rest_at(flow, flow.values, x) for x in found]
-    return sorted(rests, key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
+    rests.sort(key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
+    names = [model.state_names[k] for k in flow.kept]
+    within = (f"|{n}| <= {_REACHES[-1] * s:.4g}" for n, s in zip(names, flow.size, strict=True))
+    given_too = f" and {len(given)} given" if len(given) else ""
+    search = f"Powell's method from {len(box)} states within {', '.join(within)}{given_too}: others may exist"
+    return Equilibria(rests, search)
 
 
 def _apart(flow: Flow, a: Floats, b: Floats) -> bool:

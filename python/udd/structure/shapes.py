@@ -30,7 +30,7 @@ def orbit_states(curve: CycleCurve, u: Floats) -> Floats:
     starts = flow.full(curve.nodes(u))
     model = flow.with_values(curve.values_at(u))
     rows = curve.values_at(u)[np.newaxis]
-    method = "taylor" if _core.has_series(model) else "dop853"
+    method = "auto" if _core.has_series(model) else "dop853"
     found = _core.ensemble(model, rows, starts, times, 1e-10, 1e-13, method, 1)
     states: Floats = found["states"][:, :-1].reshape(m * _BETWEEN, -1)
     if curve.symmetric:

@@ -21,7 +21,7 @@ from udd.exponents import span
 from udd.models import DLE, Model
 from udd.orbits import off_wheels
 from udd.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED, OUTCOMES
-from udd.trajectory import method_for, simulate, tolerances
+from udd.trajectory import integrated, method_for, tolerances
 
 NOT_RUN = -1
 """In the array ``outcome`` before the work is done; the other values are those of `udd.outcomes`."""
@@ -170,7 +170,7 @@ def _ended_one_by_one(
     for k, (row, state) in enumerate(zip(rows, states, strict=True)):
         one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
         try:
-            run = simulate(one, times, state, rtol=rtol, atol=atol, method="auto")
+            run = integrated(one, times, state, rtol=rtol, atol=atol, method="auto")
         except IntegrationError:
             continue
         t_end[k], ends[k], outcome[k] = run.t[-1], run.state[-1], OUTCOMES.index(run.outcome)

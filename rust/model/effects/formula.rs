@@ -55,7 +55,7 @@ impl Formula {
                 return wrong(format!("cannot have a parameter called {own}, which means something else"));
             }
         }
-        if text.contains('=') {
+        if text.replace("<=", "").replace(">=", "").contains('=') {
             return wrong("has =, but what is wanted is only what adds to its slot".to_owned());
         }
         let states = QUANTITIES.map(str::to_owned);
@@ -198,6 +198,13 @@ fn degree(function: &Expression, is_amplitude: &[bool]) -> Degree {
                 (Some(Zero), own) if !own.contains(&true) => Zero,
                 _ => Other,
             },
+            Op::Where | Op::On(..) => {
+                let mut any = false;
+                for _ in 0..op.takes() {
+                    any |= stack.pop() != Some(Zero);
+                }
+                if any { Other } else { Zero }
+            }
             Op::Binary(function) => {
                 let right = stack.pop().unwrap_or(Zero);
                 let left = stack.pop().unwrap_or(Zero);

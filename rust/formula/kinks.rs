@@ -1,0 +1,107 @@
+//! Where formulas have kinks: the surfaces that runs land on.
+
+use super::{Binary, Expression, Op, Unary};
+use crate::model::MAX_SURFACES;
+use crate::scalar::Scalar;
+
+/// A function that is smooth on each side of the zeros of a surface's function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kink {
+    Abs,
+    Sign,
+    Min,
+    Max,
+    Where,
+}
+
+impl Kink {
+    /// That of an operation, if it has one.
+    fn of(op: Op) -> Option<Self> {
+        match op {
+            Op::Unary(Unary::Abs) => Some(Kink::Abs),
+            Op::Unary(Unary::Sign) => Some(Kink::Sign),
+            Op::Binary(Binary::Min) => Some(Kink::Min),
+            Op::Binary(Binary::Max) => Some(Kink::Max),
+            Op::Where => Some(Kink::Where),
+            _ => None,
+        }
+    }
+
+    /// How many numbers it is a function of.
+    pub fn takes(self) -> usize {
+        match self {
+            Kink::Abs | Kink::Sign => 1,
+            Kink::Min | Kink::Max => 2,
+            Kink::Where => 3,
+        }
+    }
+
+    /// Whether its value jumps at the surface.
+    fn jumps(self) -> bool {
+        matches!(self, Kink::Sign | Kink::Where)
+    }
+
+    /// Its value on the positive side of the surface where `side` is true, else on the other.
+    #[inline(always)]
+    pub fn on<S: Scalar>(self, side: S::Mask, of: &[S]) -> S {
+        match self {
+            Kink::Abs => S::select(side, of[0], -of[0]),
+            Kink::Sign => S::select(side, S::one(), -S::one()),
+            // The surface is where the first number is the second.
+            Kink::Min => S::select(side, of[1], of[0]),
+            Kink::Max => S::select(side, of[0], of[1]),
+            Kink::Where => S::select(side, of[1], of[2]),
+        }
+    }
+}
+
+/// The surfaces on which formulas have kinks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Kinks {
+    /// Their functions. One may depend on the sides of those before it.
+    pub surfaces: Vec<Expression>,
+    /// Whether a formula jumps there.
+    pub jumps: Vec<bool>,
+}
+
+impl Kinks {
+    /// Finds the kinks of a formula and writes it on the sides of their surfaces. Kinks beyond the most surfaces
+    /// that a model can have stay comparisons.
+    pub fn of(&mut self, formula: &mut Expression) {
+        // Where each number on the stack begins.
+        let mut starts: Vec<usize> = Vec::new();
+        for i in 0..formula.ops.len() {
+            let op = formula.ops[i];
+            let at = starts.len() - op.takes();
+            if let Some(kink) = Kink::of(op) {
+                let own = match kink {
+                    Kink::Abs | Kink::Sign => formula.ops[starts[at]..i].to_vec(),
+                    Kink::Min | Kink::Max => {
+                        [&formula.ops[starts[at]..i], &[Op::Binary(Binary::Sub)]].concat()
+                    }
+                    Kink::Where => formula.ops[starts[at]..starts[at + 1]].to_vec(),
+                };
+                if let Some(j) = self.surface(own) {
+                    self.jumps[j] |= kink.jumps();
+                    formula.ops[i] = Op::On(kink, j as u8);
+                }
+            }
+            let start = starts.get(at).copied().unwrap_or(i);
+            starts.truncate(at);
+            starts.push(start);
+        }
+    }
+
+    /// The number of the surface with this function, if there is room for it.
+    fn surface(&mut self, ops: Vec<Op>) -> Option<usize> {
+        if let Some(j) = self.surfaces.iter().position(|known| known.ops == ops) {
+            return Some(j);
+        }
+        if self.surfaces.len() == MAX_SURFACES {
+            return None;
+        }
+        self.surfaces.push(Expression::of(ops));
+        self.jumps.push(false);
+        Some(self.surfaces.len() - 1)
+    }
+}
