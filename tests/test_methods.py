@@ -199,8 +199,8 @@ def told(seeds: range) -> dict[int, str]:
     return {seed: what for seed in seeds if (what := differing(seed))}
 
 
-# Through a point where y/x or sqrt(x) is singular at x = 0: beyond it the solution is not unique, and a series
-# that is smooth there (y = C x of y' = y/x) goes on where stages stop.
+# Through a point where y/x or sqrt(x) is singular at x = 0: beyond it the solution is not unique, and
+# a series that is smooth there, as y = C x of y' = y/x, goes on where stages stop.
 SINGULAR = {4471, 4616, 5546, 6490, 7512, 8951}
 
 

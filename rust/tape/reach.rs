@@ -109,7 +109,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let reach = |k: usize| {
             let term = vector!(S, D; n => series[n][k].scale(SMALL));
             let square = norm.of_term(&term, weights);
-            power_rough(square, -0.5 / k as f64).scale(SMALL.powf(1.0 / k as f64)) + (square - square)
+            power_rough(square, -0.5 / k as f64).scale(SMALL.powf(1.0 / k as f64)) + square.scale(0.0)
         };
         let (last, before) = (reach(order), reach(order - 1));
         last.min(before) + (last + before).scale(0.0)
