@@ -109,12 +109,17 @@ def pendulum(lacks: tuple[str, ...], encoder: bool, rng: np.random.Generator) ->
 
     t = np.arange(0, duration, 1 / rate)
     theta = one_degree(smooth, c.get("dry", 0.0), swing, 0.0, t)
-    sensor = Sensor(step=2 * np.pi / rng.choice([4096, 14400])) if encoder else Sensor(rng.uniform(3e-4, 2e-3))
+    sensor = Sensor(step=2 * np.pi / rng.choice([4096, 14400])) if encoder else _film(rng)
     zero = rng.normal(0, 0.01)
     measured = udd.Measurement(t, {"theta": sensor.read(theta + zero, rng)})
     stated = length * (1 + rng.normal(0, 0.01))
     known = udd.Pendulum(stated, k0=k0 * length**2)
     return Machine(known, measured, lacks, encoder, {"theta": sensor.sigma})
+
+
+def _film(rng: np.random.Generator) -> Sensor:
+    """A phone that looks at a pendulum somewhat from the side."""
+    return Sensor(rng.uniform(3e-4, 2e-3), bend=rng.normal(0, 0.01))
 
 
 def resting(_lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Machine:
@@ -186,8 +191,8 @@ def double(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> 
     sensor = Sensor(noise=3e-3)
     values = {"a": sensor.read(run[0], rng), "b": sensor.read(run[1], rng)}
     d, det = "(a - b)", "(l1*l2*(1 - m*cos(a - b)^2))"
-    f = f"(-m*l2*sin{d}*q^2 - g*sin(a))"  # of the first equation over l1
-    h = f"(l1*sin{d}*p^2 - g*sin(b))"  # of the second over m l2
+    f = f"(-m*l2*sin{d}*q^2 - {G}*sin(a))"  # of the first equation over l1
+    h = f"(l1*sin{d}*p^2 - {G}*sin(b))"  # of the second over m l2
     equations = {
         "a": "p",
         "b": "q",
@@ -195,7 +200,7 @@ def double(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> 
         "q": f"({h}*l1 - l1*cos{d}*{f})/{det}",
     }
     known = udd.Model(
-        ["a", "b", "p", "q"], equations, {"l1": l1, "l2": l2, "m": m, "g": G}, angles=["a", "b"]
+        ["a", "b", "p", "q"], equations, {"l1": l1, "l2": l2, "m": m}, angles=["a", "b"]
     )
     return Machine(known, udd.Measurement(t, values), lacks, False, dict.fromkeys(values, sensor.sigma))
 

@@ -10,6 +10,7 @@ import numpy as np
 from udd import _chi2
 from udd.errors import FitError
 from udd.fitting import Fit, extend
+from udd.own_models import OwnModel
 
 from .bearing import ALPHA
 from .candidates import Candidate
@@ -74,7 +75,9 @@ class Trial:
     @property
     def handicap(self) -> float:
         """By how much chi2 must be better than that of an effect of the library."""
-        return 0.0 if self.curve is None else 3 * NATS if self.formula is None else 2 * NATS
+        if self.curve is None:
+            return NATS * sum(not c.usual for c in self.candidates)
+        return 3 * NATS if self.formula is None else 2 * NATS
 
     @property
     def needed(self) -> bool:
@@ -126,9 +129,23 @@ def of_curve(current: Fit, curve: Curve) -> Trial | None:
     if not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)
-    return Trial(
-        [candidate], located.fit, located.fit, [], 2 * located.price, located.curve.df, located.curve
-    )
+    price = 2 * located.price + _excess(current, located.curve)
+    return Trial([candidate], located.fit, located.fit, [], price, located.curve.df, located.curve)
+
+
+def _excess(current: Fit, curve: Curve) -> float:
+    """What a curve pays, in chi2, for values beyond what the motion can show: all rates there are.
+
+    Its prior is as wide as these; wider by a factor costs that factor's logarithm for each number found.
+    """
+    if not isinstance(current.model, OwnModel):
+        return 0.0  # whose curves the disk's own tests keep within bounds
+    k = current.model.state_names.index(curve.slot.equation)
+    linked = current.record.linked
+    shown = np.diff(current.states[:, k])[linked] / np.diff(current.record.t)[linked]
+    most = float(np.abs(curve.values(*curve.places)).max())
+    ratio = most / max(float(np.abs(shown).max()), 1e-300)
+    return 2 * curve.df * math.log(max(ratio, 1.0))
 
 
 def of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
@@ -151,11 +168,11 @@ def fitted_ones(trials: list[Trial | None]) -> list[Trial]:
 
 
 def one_of_each(trials: list[Trial]) -> list[Trial]:
-    """The best of those that tried one effect with several values of a shape that a fit then found."""
+    """The best of those that tried one effect with several values of a shape that a fit then found, or widths."""
     found: dict[object, Trial] = {}
     for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
         effect = trial.candidates[0].effect
-        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
+        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not (p.sought or p.role == "width")]
         found.setdefault((effect.name, effect.momentum, *fixed), trial)
     return [trial for trial in trials if trial in found.values()]
 

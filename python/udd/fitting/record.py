@@ -18,6 +18,7 @@ from udd.models import Model
 from udd.own_models import OwnModel
 
 from .own import guessed, slope, typical_noise
+from .sensor import is_encoder, lattice, reads
 
 Array = NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def record_of(
     sigma = np.full((len(t), len(names)), np.inf)
     rho = np.tile(np.eye(len(names)), (len(t), 1, 1))
     if measurement.sigma is None:
-        known_sigma = typical_noise(values[row[there]]) if own else np.array(_SIGMA[measurement.kind])
+        known_sigma = _noise_of(measurement, values[row[there]])
         sigma[np.ix_(there, places)] = known_sigma
     else:
         own_sigma = measurement.sigma[row[there]]
@@ -188,6 +189,16 @@ def record_of(
     else:
         states = _states(t, guess, linked)
     return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
+
+
+def _noise_of(measurement: Measurement, values: Array) -> Array:
+    """What is taken for the noise of each column where a measurement does not say."""
+    if measurement.kind == "own":
+        steps = np.array([lattice(column) for column in values.T])
+        return np.maximum(typical_noise(values), steps / np.sqrt(12.0))
+    if measurement.kind == "pendulum" and is_encoder(measurement):
+        return np.array([reads(values[:, 0])[0]])
+    return np.array(_SIGMA[measurement.kind])
 
 
 def _joined(records: Sequence[Record]) -> Record:
