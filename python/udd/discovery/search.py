@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -43,6 +44,8 @@ _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
+_PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
+_EQUALS = 6  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,13 @@ def _cheaper(found: tuple[Step, State], steps: Sequence[Step], start: State, end
     several, one = same_level(end.part, state.part)
     unit = one.inflation(at_level(start.part, one.level))
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
+
+
+def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tuple[Candidate, Candidate]]:
+    """Which effects of one list stand in the place of which of another, those in both left out."""
+    left = [c for c in mine if c.effect not in [o.effect for o in others]]
+    right = [o for o in others if o.effect not in [c.effect for c in mine]]
+    return list(zip(left, right, strict=False))
 
 
 def _chance(pair: Pair, trial: Trial, look: Look) -> tuple[float, float]:
@@ -269,6 +279,8 @@ class Search:
             known = max(look.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - NATS]
             singles += self._written(current, curve, rivals)
+        if singles and (current.part.model.kind != "disk" or any(t.formula for t in singles)):
+            singles += self._pairs(current, look)
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
@@ -303,6 +315,24 @@ class Search:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
         found = together(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
+
+    def _pairs(self, current: State, look: Look) -> list[Trial]:
+        """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
+
+        One that drives where it should brake may do so because another one brakes too much.
+        """
+        scored = sorted((s for s in look.library.scored if not s.absorbed), key=lambda s: -s.chi2)
+        first: dict[str, Candidate] = {}
+        for one in scored:
+            if one.candidate.usual:
+                first.setdefault(one.candidate.effect.name, one.candidate)
+        pairs = [list(pair) for pair in itertools.combinations(list(first.values())[:_PAIRED], 2)]
+        self._trying([" with ".join(c.title for c in pair) for pair in pairs])
+
+        def tried(pair: list[Candidate]) -> Trial | None:
+            return of_library(current.part, pair, [0.0] * sum(len(c.amplitude_names) for c in pair))
+
+        return fitted_ones(together(tried, pairs))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
         """Several effects at once that pass only together."""
@@ -364,7 +394,7 @@ class Search:
 
     def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
-        trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
+        trials = [t for t in trials if t.fit.level >= current.part.level]
         if not trials:
             return None
         # chi2 compares only where the models are held equally tightly.
@@ -374,15 +404,19 @@ class Search:
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
-        least = trials[0].criterion(unit) + trials[0].handicap
-        # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in trials if t.criterion(unit) + t.handicap - least <= 2 * NATS):
+        # Where the best form fails a test, a clearly worse one is not named instead. Whether one of several
+        # is needed the rest may tell.
+        least = min(t.criterion(unit) + t.oddness for t in trials)
+        near = [t for t in trials if t.criterion(unit) + t.oddness - least <= 2 * NATS]
+        costs = self._costs(current, near[:_EQUALS], unit)
+        near = [t for t in near if id(t) in costs]
+        for trial in sorted(near, key=lambda t: round(costs[id(t)], 3)):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
                 continue
             errors = self._errors_or_none(trial.fit)
             if errors is not None and not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, look.library, unit)
+                others = self._alternatives(trial, trials, look.library, costs)
                 step = Step(
                     candidates=trial.candidates,
                     curve=trial.curve,
@@ -395,6 +429,32 @@ class Search:
                 )
                 return step, State(trial.fit, judged.whole, errors)
         return None
+
+    def _costs(self, current: State, near: list[Trial], unit: float) -> dict[int, float]:
+        """What each of several forms costs that explain the first part about as well: by all data.
+
+        Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
+        of all data is, but for a constant, the cost of predicting each stretch from those before it.
+        """
+        if len(near) < 2:
+            return {id(t): t.criterion(unit) + t.handicap for t in near if t.needed}
+
+        def again(trial: Trial) -> Trial | None:
+            try:
+                return self._again(current.whole, trial)
+            except FitError:
+                return None
+
+        pairs = zip(near, together(again, near), strict=True)
+        wholes = [(t, w) for t, w in pairs if w is not None and w.needed]
+        level = min((w.fit.level for _t, w in wholes), default=0)
+        result = {}
+        for trial, whole in wholes:
+            try:
+                result[id(trial)] = at_level(whole.fit, level).chi2 / unit + trial.price + trial.handicap
+            except FitError:
+                continue
+        return result
 
     def _judged(self, current: State, trial: Trial, look: Look) -> Judged | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
@@ -441,13 +501,17 @@ class Search:
         )
 
     def _alternatives(
-        self, chosen: Trial, trials: list[Trial], scanned: Scan, unit: float
+        self, chosen: Trial, trials: list[Trial], scanned: Scan, costs: dict[int, float]
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
-        best = chosen.criterion(unit)
-        result = []
-        for trial in trials:
-            nats = (trial.criterion(unit) - best) / 2
+        result: dict[tuple[str, str, str | None], Alternative] = {}
+
+        def cost(trial: Trial) -> float:
+            return costs[id(trial)] - trial.handicap
+
+        best = cost(chosen)
+        for trial in (t for t in trials if id(t) in costs):
+            nats = (cost(trial) - best) / 2
             if (
                 trial is chosen
                 or nats > NATS
@@ -456,9 +520,7 @@ class Search:
                 or (trial.formula is not None and self._says_less(trial, chosen, nats))
             ):
                 continue
-            for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
-                if mine.effect == other.effect:
-                    continue
+            for mine, other in _beside(chosen.candidates, trial.candidates):
                 known = mine in listed and other in listed
                 likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
                 if likeness > _SUPERSET and other.parameters > mine.parameters:
@@ -466,7 +528,11 @@ class Search:
                 named = {p: f"{other.effect.name}.{p}" for p in other.effect.parameters}
                 fitted = trial.fit.parameters
                 effect = other.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
-                result.append(
-                    Alternative(mine.effect.name, effect, other.title, other.effect.equation, nats, likeness)
+                one = Alternative(
+                    mine.effect.name, effect, other.title, other.effect.equation, nats, likeness
                 )
-        return result
+                # The same may stand beside several partners; the best is told.
+                key = (mine.effect.name, other.title, other.effect.momentum)
+                if key not in result or nats < result[key].nats:
+                    result[key] = one
+        return list(result.values())

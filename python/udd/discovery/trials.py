@@ -74,7 +74,15 @@ class Trial:
 
     @property
     def handicap(self) -> float:
-        """By how much chi2 must be better than that of an effect of the library."""
+        """By how much chi2 must be better than that of an effect of the library.
+
+        Of several at once as much as a further one has to bring beyond its price.
+        """
+        return self.oddness + 2 * NATS * (len(self.candidates) - 1)
+
+    @property
+    def oddness(self) -> float:
+        """The same for what is no effect of the library, or a mere product of states."""
         if self.curve is None:
             return NATS * sum(not c.usual for c in self.candidates)
         return 3 * NATS if self.formula is None else 2 * NATS
