@@ -45,7 +45,7 @@ _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
-_EQUALS = 6  # forms between which all data decide
+_EQUALS = 7  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -404,13 +404,19 @@ class Search:
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
-        # Where the best form fails a test, a clearly worse one is not named instead. Whether one of several
-        # is needed the rest may tell.
-        least = min(t.criterion(unit) + t.oddness for t in trials)
-        near = [t for t in trials if t.criterion(unit) + t.oddness - least <= 2 * NATS]
+        # Whether one of several is needed the rest may tell; of the disk that takes long.
+        chaotic = current.part.model.kind == "disk"
+        least = min(t.criterion(unit) for t in trials)
+        near = [
+            t
+            for t in trials
+            if t.criterion(unit) + (t.handicap if t.is_curve else 0.0) - least <= 2 * NATS
+            and (t.needed or not chaotic)
+        ]
         costs = self._costs(current, near[:_EQUALS], unit)
-        near = [t for t in near if id(t) in costs]
-        for trial in sorted(near, key=lambda t: round(costs[id(t)], 3)):
+        near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
+        # Where the best form fails a test, a clearly worse one is not named instead.
+        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
                 continue
@@ -451,7 +457,8 @@ class Search:
         result = {}
         for trial, whole in wholes:
             try:
-                result[id(trial)] = at_level(whole.fit, level).chi2 / unit + trial.price + trial.handicap
+                paid = trial.price + trial.handicap
+                result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
             except FitError:
                 continue
         return result

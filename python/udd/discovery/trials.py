@@ -78,13 +78,8 @@ class Trial:
 
         Of several at once as much as a further one has to bring beyond its price.
         """
-        return self.oddness + 2 * NATS * (len(self.candidates) - 1)
-
-    @property
-    def oddness(self) -> float:
-        """The same for what is no effect of the library, or a mere product of states."""
         if self.curve is None:
-            return NATS * sum(not c.usual for c in self.candidates)
+            return NATS * (sum(not c.usual for c in self.candidates) + 2 * (len(self.candidates) - 1))
         return 3 * NATS if self.formula is None else 2 * NATS
 
     @property
