@@ -17,7 +17,7 @@ from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released
 from udd.fitting.parameters import Free
 
-from .bearing import ALPHA, Pair, borne_out, same_level
+from .bearing import ALPHA, Pair, borne_out, held_ratio, same_level
 from .candidates import Candidate
 from .curves import NATS, Curve
 from .formulas import Formula, formulas_for
@@ -400,7 +400,8 @@ class Search:
         # chi2 compares only where the models are held equally tightly.
         level = min(t.fit.level for t in trials)
         trials = [replace(t, compared=at_level(t.fit, level)) for t in trials]
-        unit = min(trials, key=lambda t: t.compared.chi2).compared.inflation(at_level(current.part, level))
+        first, before = min(trials, key=lambda t: t.compared.chi2).compared, at_level(current.part, level)
+        unit = first.inflation(before)
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
@@ -413,10 +414,11 @@ class Search:
             if t.criterion(unit) + (t.handicap if t.is_curve else 0.0) - least <= 2 * NATS
             and (t.needed or not chaotic)
         ]
-        costs = self._costs(current, near[:_EQUALS], unit)
+        costs = self._costs(current, near[:_EQUALS], first.unit(before))
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
+        near = self._foretelling(near, costs)
         # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
+        for trial in (t for t in near if costs[id(t)] - min(costs.values()) <= 2 * NATS):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
                 continue
@@ -435,6 +437,21 @@ class Search:
                 )
                 return step, State(trial.fit, judged.whole, errors)
         return None
+
+    def _foretelling(self, near: list[Trial], costs: dict[int, float]) -> list[Trial]:
+        """The forms of about equal cost in order of it, but for one that foretells the rest better for sure."""
+        best = near[0] if near else None
+        for other in near[1:]:
+            if best and costs[id(other)] - costs[id(near[0])] <= 2 * NATS and self._foretold(best, other)[2] < 1.0:
+                best = other
+        return [best, *(t for t in near if t is not best)] if best else near
+
+    def _foretold(self, one: Trial, other: Trial) -> Ratio:
+        """Cost of the held-out frames by another form over that by one, all parameters held."""
+        try:
+            return held_ratio(one.fit, other.fit, self.record.part(self.held), self.unit)
+        except FitError:
+            return math.nan, math.nan, math.nan
 
     def _costs(self, current: State, near: list[Trial], unit: float) -> dict[int, float]:
         """What each of several forms costs that explain the first part about as well: by all data.
@@ -525,6 +542,7 @@ class Search:
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
                 or (trial.formula is not None and self._says_less(trial, chosen, nats))
+                or self._foretold(chosen, trial)[1] > 1.0
             ):
                 continue
             for mine, other in _beside(chosen.candidates, trial.candidates):
