@@ -45,6 +45,7 @@ _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
+_TIED = 4 * NATS  # in chi2: forms that differ by less are compared by all data and by what they foretell
 _EQUALS = 7  # forms between which all data decide
 
 
@@ -394,7 +395,7 @@ class Search:
 
     def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
-        trials = [t for t in trials if t.fit.level >= current.part.level]
+        trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         if not trials:
             return None
         # chi2 compares only where the models are held equally tightly.
@@ -405,20 +406,14 @@ class Search:
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
-        # Whether one of several is needed the rest may tell; of the disk that takes long.
-        chaotic = current.part.model.kind == "disk"
-        least = min(t.criterion(unit) for t in trials)
-        near = [
-            t
-            for t in trials
-            if t.criterion(unit) + (t.handicap if t.is_curve else 0.0) - least <= 2 * NATS
-            and (t.needed or not chaotic)
-        ]
+        paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
+        near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
         costs = self._costs(current, near[:_EQUALS], first.unit(before))
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
         near = self._foretelling(near, costs)
         # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in near if costs[id(t)] - min(costs.values()) <= 2 * NATS):
+        # Where the best form fails a test, a clearly worse one is not named instead.
+        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
                 continue
@@ -442,7 +437,8 @@ class Search:
         """The forms of about equal cost in order of it, but for one that foretells the rest better for sure."""
         best = near[0] if near else None
         for other in near[1:]:
-            if best and costs[id(other)] - costs[id(near[0])] <= 2 * NATS and self._foretold(best, other)[2] < 1.0:
+            tied = costs[id(other)] - costs[id(near[0])] <= _TIED
+            if best and tied and self._foretold(best, other)[2] < 1.0:
                 best = other
         return [best, *(t for t in near if t is not best)] if best else near
 
