@@ -408,7 +408,7 @@ class Search:
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
         paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
         near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
-        costs = self._costs(current, near[:_EQUALS], first.unit(before))
+        costs = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
         near = self._foretelling(near, costs)
         # Where the best form fails a test, a clearly worse one is not named instead.
@@ -449,7 +449,9 @@ class Search:
         except FitError:
             return math.nan, math.nan, math.nan
 
-    def _costs(self, current: State, near: list[Trial], unit: float) -> dict[int, float]:
+    def _costs(
+        self, current: State, near: list[Trial], unit: float, most: float
+    ) -> dict[int, float]:
         """What each of several forms costs that explain the first part about as well: by all data.
 
         Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
@@ -470,7 +472,8 @@ class Search:
         result = {}
         for trial, whole in wholes:
             try:
-                paid = trial.price + trial.handicap
+                # What no library has is not chosen for fitting what the noise is not sure to show.
+                paid = trial.price + trial.handicap * (most / unit if trial.curve else 1.0)
                 result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
             except FitError:
                 continue
@@ -542,6 +545,8 @@ class Search:
             ):
                 continue
             for mine, other in _beside(chosen.candidates, trial.candidates):
+                if other.title == mine.title:
+                    continue  # but for the width that its sign is smoothed over
                 known = mine in listed and other in listed
                 likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
                 if likeness > _SUPERSET and other.parameters > mine.parameters:

@@ -171,11 +171,11 @@ def fitted_ones(trials: list[Trial | None]) -> list[Trial]:
 
 
 def one_of_each(trials: list[Trial]) -> list[Trial]:
-    """The best of those that tried one effect with several values of a shape that a fit then found, or widths."""
+    """The best of those that tried one effect with several values of a shape that a fit then found."""
     found: dict[object, Trial] = {}
     for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
         effect = trial.candidates[0].effect
-        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not (p.sought or p.role == "width")]
+        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
         found.setdefault((effect.name, effect.momentum, *fixed), trial)
     return [trial for trial in trials if trial in found.values()]
 
