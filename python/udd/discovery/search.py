@@ -178,7 +178,7 @@ class Search:
         accepted: list[Step] = []
         looks: list[Look] = []
         states = [begin]
-        while len(accepted) < _MOST:
+        while sum(len(step.candidates) for step in accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             look = look_around(states[-1].part, self.given)
             found = self._known(states[-1], look)

@@ -18,7 +18,7 @@ from udd.models import Model
 from udd.own_models import OwnModel
 
 from .own import guessed, slope, typical_noise
-from .sensor import is_encoder, lattice, reads
+from .sensor import frame_noise, is_encoder, lattice
 
 Array = NDArray[np.float64]
 
@@ -192,12 +192,14 @@ def record_of(
 
 
 def _noise_of(measurement: Measurement, values: Array) -> Array:
-    """What is taken for the noise of each column where a measurement does not say."""
+    """What is taken for the noise where a measurement does not say, of each column or of each frame too."""
     if measurement.kind == "own":
-        steps = np.array([lattice(column) for column in values.T])
-        return np.maximum(typical_noise(values), steps / np.sqrt(12.0))
+        typical = typical_noise(values)
+        if not any(lattice(column) for column in values.T):
+            return typical
+        return np.maximum(typical, np.column_stack([frame_noise(column) for column in values.T]))
     if measurement.kind == "pendulum" and is_encoder(measurement):
-        return np.array([reads(values[:, 0])[0]])
+        return frame_noise(values[:, 0])[:, None]
     return np.array(_SIGMA[measurement.kind])
 
 

@@ -70,6 +70,21 @@ def reads(values: Array) -> tuple[float, float]:
     return max(float(roughness(values[:, None])[0]), step / math.sqrt(12.0)), step
 
 
+def frame_noise(values: Array) -> Array:
+    """The noise of each frame of one channel, (n,), of which the steps' errors repeat where readings do.
+
+    As long as a motion stays within a step its frames share one error: together they tell what one would.
+    """
+    noise, step = reads(values)
+    if not step:
+        return np.full(len(values), noise)
+    changes = np.flatnonzero(np.abs(np.diff(values)) > step / 2) + 1
+    lengths = np.diff(np.concatenate([[0], changes, [len(values)]]))
+    own = step**2 / 12.0
+    result: Array = np.sqrt(noise**2 - own + np.repeat(lengths, lengths) * own)
+    return result
+
+
 def is_encoder(measurement: Measurement) -> bool:
     """Whether a pendulum's angle was read by an encoder: it says so, or it comes in steps that drown all else.
 
