@@ -46,6 +46,7 @@ _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
 _TIED = 4 * NATS  # in chi2: forms that differ by less are compared by all data and by what they foretell
+_FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
 _EQUALS = 7  # forms between which all data decide
 
 
@@ -94,6 +95,11 @@ def _cheaper(found: tuple[Step, State], steps: Sequence[Step], start: State, end
     several, one = same_level(end.part, state.part)
     unit = one.inflation(at_level(start.part, one.level))
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
+
+
+def _clearly(ratio: Ratio) -> bool:
+    """Whether one form foretells at less cost than another, beyond doubt and by an amount that matters."""
+    return ratio[0] < _FORETOLD and ratio[2] < 1.0
 
 
 def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tuple[Candidate, Candidate]]:
@@ -438,7 +444,7 @@ class Search:
         best = near[0] if near else None
         for other in near[1:]:
             tied = costs[id(other)] - costs[id(near[0])] <= _TIED
-            if best and tied and self._foretold(best, other)[2] < 1.0:
+            if best and tied and _clearly(self._foretold(best, other)):
                 best = other
         return [best, *(t for t in near if t is not best)] if best else near
 
@@ -541,7 +547,7 @@ class Search:
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
                 or (trial.formula is not None and self._says_less(trial, chosen, nats))
-                or self._foretold(chosen, trial)[1] > 1.0
+                or _clearly(self._foretold(trial, chosen))
             ):
                 continue
             for mine, other in _beside(chosen.candidates, trial.candidates):
