@@ -6,10 +6,10 @@ Batches: "three" (each effect of the library at three times its detection limit)
 times), "foreign" (laws in no library, 3 to 10 times), "strong" (each of these, 0.3 to 3 times gravity's pull
 on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.), "pairs" (two at once, 3 to
 10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "films" (no
-effect, by way of a film and the tracker), "machines" (simulated twins of real pendulums, sliders and the like,
-each under three sets of options). The detection limit is the amplitude at which chi2 is expected to
-fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn from
-the seed, which was fixed before the first run. The generator shares no code with udd.
+effect, by way of a film and the tracker), "machines" (simulated twins of real pendulums, sliders and the
+like, each under three sets of options). The detection limit is the amplitude at which chi2 is expected to fall
+by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn from the
+seed, which was fixed before the first run. The generator shares no code with udd.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="discovery", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, MACHINES))}")
+    parser.add_argument(
+        "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, MACHINES))}"
+    )
     parser.add_argument("--records", type=int, default=1, help="of each kind in each batch")
     parser.add_argument("--only", default="", help="words of which a case's title must hold one")
     parser.add_argument("--seed", type=int, default=SEED)

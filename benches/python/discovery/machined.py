@@ -151,5 +151,7 @@ def machine_report(scores: Iterable[MachineScore]) -> str:
     for one in everything:
         by_record.setdefault((one.title, one.number), set()).add((one.verdict, *sorted(one.found)))
     same = sum(len(said) == 1 for said in by_record.values())
-    lines.append(f"  one verdict and one list of effects under all options: {same} of {len(by_record)} records")
+    lines.append(
+        f"  one verdict and one list of effects under all options: {same} of {len(by_record)} records"
+    )
     return "\n".join(lines)

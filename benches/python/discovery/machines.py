@@ -66,7 +66,7 @@ class Machine:
     Attributes
     ----------
     lacks : tuple of str
-        Kinds of the missing terms: ``"dry"``, ``"viscous"``, ``"quadratic"``, ``"cubic"``, ``"cubic spring"``.
+        Kinds of the missing terms: "dry", "viscous", "joints", "quadratic", "cubic", "cubic spring".
     """
 
     known: Any
@@ -84,7 +84,9 @@ class Machine:
             return given, {"camera": False}
         if options == "sigma":
             sigma = np.tile([self.sigma[name] for name in given.names], (len(given), 1))
-            return udd.Measurement(given.t, dict(zip(given.names, given.values.T, strict=True)), sigma=sigma), {}
+            return udd.Measurement(
+                given.t, dict(zip(given.names, given.values.T, strict=True)), sigma=sigma
+            ), {}
         return given, {}
 
 
@@ -127,12 +129,12 @@ def resting(_lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -
     length = rng.uniform(0.2, 0.5)
     w, fall = np.sqrt(G / length), rng.uniform(0.25, 0.5)
     t = np.arange(0, 60, 0.02)
-    theta = one_degree(lambda _t, x, v: -(w**2) * np.sin(x) - 2 * fall * v, 0.0, rng.uniform(0.3, 1.0), 0.0, t)
+    theta = one_degree(
+        lambda _t, x, v: -(w**2) * np.sin(x) - 2 * fall * v, 0.0, rng.uniform(0.3, 1.0), 0.0, t
+    )
     sensor = Sensor(noise=2e-4, step=2 * np.pi / 4096)
     measured = udd.Measurement(t, {"theta": sensor.read(theta, rng)})
-    return Machine(
-        udd.Pendulum(length, k0=fall * length**2), measured, (), True, {"theta": sensor.sigma}
-    )
+    return Machine(udd.Pendulum(length, k0=fall * length**2), measured, (), True, {"theta": sensor.sigma})
 
 
 def slider(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Machine:
@@ -199,9 +201,7 @@ def double(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> 
         "p": f"({f}*l2 - m*l2*cos{d}*{h})/{det}",
         "q": f"({h}*l1 - l1*cos{d}*{f})/{det}",
     }
-    known = udd.Model(
-        ["a", "b", "p", "q"], equations, {"l1": l1, "l2": l2, "m": m}, angles=["a", "b"]
-    )
+    known = udd.Model(["a", "b", "p", "q"], equations, {"l1": l1, "l2": l2, "m": m}, angles=["a", "b"])
     return Machine(known, udd.Measurement(t, values), lacks, False, dict.fromkeys(values, sensor.sigma))
 
 
@@ -216,7 +216,9 @@ def track(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> M
         return [v, w, force[0] - damping * v, force[1] - damping * w]
 
     t = np.arange(0, 20, 1 / 30)
-    run = solve_ivp(rates, (0, t[-1]), [0.1, rng.uniform(-0.05, 0.05), 0, 0], t_eval=t, rtol=RTOL, atol=1e-10).y
+    run = solve_ivp(
+        rates, (0, t[-1]), [0.1, rng.uniform(-0.05, 0.05), 0, 0], t_eval=t, rtol=RTOL, atol=1e-10
+    ).y
     sensor = Sensor(noise=rng.uniform(3e-4, 1e-3), bend=rng.uniform(-0.02, 0.02))
     equations = {"x": "v", "y": "w", "v": "-k1*x - k2*(x - y)", "w": "-k3*y - k2*(y - x)"}
     known = udd.Model(["x", "y", "v", "w"], equations, {"k1": 1.03 * k1, "k2": 0.98 * k2, "k3": k3})
@@ -244,13 +246,18 @@ def ball(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Ma
     ).y
     sensor = Sensor(noise=rng.uniform(1e-3, 3e-3))
     known = udd.Model(["x", "v"], {"x": "v", "v": "g"}, {"g": G})
-    return Machine(known, udd.Measurement(t, {"x": sensor.read(run[0], rng)}), lacks, False, {"x": sensor.sigma})
+    return Machine(
+        known, udd.Measurement(t, {"x": sensor.read(run[0], rng)}), lacks, False, {"x": sensor.sigma}
+    )
 
 
 def one_degree(
     smooth: Callable[[float, float, float], float], dry: float, x: float, v: float, t: np.ndarray
 ) -> np.ndarray:
-    """The coordinate of ``x'' = smooth(t, x, x') - dry sign(x')`` at times t; smooth at rest knows no time."""
+    """The coordinate of ``x'' = smooth(t, x, x') - dry sign(x')`` at times t.
+
+    A body that dry friction holds once is held for good: with it `smooth` must not depend on the time.
+    """
     result, now = np.empty(len(t)), float(t[0])
     while True:
         pull = smooth(now, x, v)
@@ -280,7 +287,14 @@ def one_degree(
         now, x, v = float(run.t[-1]), float(run.y[0, -1]), 0.0
 
 
-_FRICTIONS = (("dry",), ("quadratic",), ("cubic",), ("dry", "quadratic"), ("dry", "cubic"), ("quadratic", "cubic"))
+_FRICTIONS = (
+    ("dry",),
+    ("quadratic",),
+    ("cubic",),
+    ("dry", "quadratic"),
+    ("dry", "cubic"),
+    ("quadratic", "cubic"),
+)
 _PENDULUMS = {
     f"{' + '.join(lacks) or 'nothing'}: {'encoder' if encoder else 'camera'}": (pendulum, lacks, encoder)
     for lacks in (*_FRICTIONS, ())

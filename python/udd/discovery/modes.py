@@ -1,4 +1,4 @@
-"""The frequencies at which a system swings by itself, and those of the mains: no drive is told from either."""
+"""Frequencies at which a system swings by itself, and the mains': no drive is told from either."""
 
 from __future__ import annotations
 

@@ -440,7 +440,7 @@ class Search:
         return None
 
     def _foretelling(self, near: list[Trial], costs: dict[int, float]) -> list[Trial]:
-        """The forms of about equal cost in order of it, but for one that foretells the rest better for sure."""
+        """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
         best = near[0] if near else None
         for other in near[1:]:
             tied = costs[id(other)] - costs[id(near[0])] <= _TIED
@@ -455,9 +455,7 @@ class Search:
         except FitError:
             return math.nan, math.nan, math.nan
 
-    def _costs(
-        self, current: State, near: list[Trial], unit: float, most: float
-    ) -> dict[int, float]:
+    def _costs(self, current: State, near: list[Trial], unit: float, most: float) -> dict[int, float]:
         """What each of several forms costs that explain the first part about as well: by all data.
 
         Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion

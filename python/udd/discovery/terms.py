@@ -84,7 +84,10 @@ def dry(model: OwnModel, states: NDArray[np.float64]) -> list[Candidate]:
     moving = {name: text for name, text in model.equations.items() if name in own or name in model.angles}
     size = model.rates(0.0, states) if moving else states
     columns = {name: size[:, model.state_names.index(name)] for name in moving}
-    speeds = [(text, _said(own, name), values) for (name, text), values in zip(moving.items(), columns.values(), strict=True)]
+    speeds = [
+        (text, _said(own, name), values)
+        for (name, text), values in zip(moving.items(), columns.values(), strict=True)
+    ]
     for a, b in itertools.combinations(own, 2):
         if (a in model.angles) == (b in model.angles):
             text = f"{own[a]} - {own[b]}"
@@ -114,7 +117,9 @@ def _dry(
     name = f"dry_{_name(said)}_in_{state}"
     title = f"dry friction of {said} in {state}'"
     inner = text if text.isidentifier() else f"({text})"
-    spec = written(f"{state}'", f"{c}*tanh({inner}/{eps})", name, title, [c], {c: limits, eps: (0.0, np.inf)}, (c, eps))
+    spec = written(
+        f"{state}'", f"{c}*tanh({inner}/{eps})", name, title, [c], {c: limits, eps: (0.0, np.inf)}, (c, eps)
+    )
     listed = tuple(replace(p, role="width") if p.name == eps else p for p in spec.parameters)
     return Candidate(effects.Effect(name, (0.0, width), made=replace(spec, parameters=listed)), title)
 

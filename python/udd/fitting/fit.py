@@ -71,8 +71,9 @@ def fit(
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
-        ``clock``), or which of them. Of a pendulum whose measurement says ``sensor = encoder`` (in its
-        `meta`, or a line of its file) only the zero ``theta0`` is.
+        ``clock``), or which of them. Of a pendulum that an encoder read only the zero ``theta0`` is:
+        the measurement says ``sensor = encoder`` (in its `meta`, or a line of its file), or its angles come
+        in steps that drown all other noise.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional
