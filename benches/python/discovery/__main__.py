@@ -7,8 +7,8 @@ times), "foreign" (laws in no library, 3 to 10 times), "strong" (each of these, 
 on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.), "pairs" (two at once, 3 to
 10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "films" (no
 effect, by way of a film and the tracker), "machines" (simulated twins of real pendulums, sliders and the
-like, each under three sets of options). The detection limit is the amplitude at which chi2 is expected to fall
-by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn from the
+like, each under three sets of options). The detection limit is the amplitude at which chi2 is expected to
+fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn from the
 seed, which was fixed before the first run. The generator shares no code with udd.
 """
 

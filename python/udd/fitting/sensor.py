@@ -88,7 +88,8 @@ def frame_noise(values: Array) -> Array:
 def is_encoder(measurement: Measurement) -> bool:
     """Whether a pendulum's angle was read by an encoder.
 
-    It says so, or it comes in steps that drown all other noise. Not where the steps are round numbers of rad or degrees: those come from writing the table.
+    It says so, or it comes in steps that drown all other noise. Not where the steps are round numbers of rad
+    or degrees: those come from writing the table.
     """
     if measurement.meta.get("sensor") == "encoder":
         return True
