@@ -8,8 +8,8 @@ on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.
 10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "films" (no
 effect, by way of a film and the tracker), "machines" (simulated twins of real pendulums, sliders and the
 like, each under three sets of options). The detection limit is the amplitude at which chi2 is expected to
-fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn from the
-seed, which was fixed before the first run. The generator shares no code with udd.
+fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn
+from the seed, which was fixed before the first run. The generator shares no code with udd.
 """
 
 from __future__ import annotations

@@ -418,7 +418,6 @@ class Search:
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
         near = self._foretelling(near, costs)
         # Where the best form fails a test, a clearly worse one is not named instead.
-        # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
@@ -533,7 +532,7 @@ class Search:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
 
-        def cost(trial: Trial) -> float:
+        def cost(trial: Trial) -> float:  # a formula may be it as well as what was chosen
             return costs[id(trial)] - trial.handicap
 
         best = cost(chosen)
