@@ -102,7 +102,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     ],
 )
 def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, found):
-    monkeypatch.setattr(bearing, "_held_ratio", lambda *_: ratio)
+    monkeypatch.setattr(bearing, "held_ratio", lambda *_: ratio)
     monkeypatch.setattr(bearing, "_expected", lambda *_: expected)
     assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0).effects) == found
 

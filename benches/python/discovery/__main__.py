@@ -6,9 +6,10 @@ Batches: "three" (each effect of the library at three times its detection limit)
 times), "foreign" (laws in no library, 3 to 10 times), "strong" (each of these, 0.3 to 3 times gravity's pull
 on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.), "pairs" (two at once, 3 to
 10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "films" (no
-effect, by way of a film and the tracker). The detection limit is the amplitude at which chi2 is expected to
-fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn from
-the seed, which was fixed before the first run. The generator shares no code with udd.
+effect, by way of a film and the tracker), "machines" (simulated twins of real pendulums, sliders and the
+like, each under three sets of options). The detection limit is the amplitude at which chi2 is expected to
+fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn
+from the seed, which was fixed before the first run. The generator shares no code with udd.
 """
 
 from __future__ import annotations
@@ -17,15 +18,20 @@ import argparse
 import json
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # the jobs are what runs in parallel
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import table
 from cases import BATCHES, cases
+from machined import MachineScore, machine_line, machine_report, machine_score
+from machines import machine_cases
 from scoring import Score, score
+
+MACHINES = "machines"
 
 SEED = 20261204
 
@@ -35,7 +41,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="discovery", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join(BATCHES)}")
+    parser.add_argument(
+        "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, MACHINES))}"
+    )
     parser.add_argument("--records", type=int, default=1, help="of each kind in each batch")
     parser.add_argument("--only", default="", help="words of which a case's title must hold one")
     parser.add_argument("--seed", type=int, default=SEED)
@@ -46,28 +54,45 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, help="write every record's score there too")
     given = parser.parse_args()
-    unknown = set(given.batches.split(",")) - set(BATCHES)
+    batches = given.batches.split(",")
+    unknown = set(batches) - {*BATCHES, MACHINES}
     if unknown:
-        parser.error(f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join(BATCHES)}")
+        parser.error(
+            f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join((*BATCHES, MACHINES))}"
+        )
     words = [word for word in given.only.split(",") if word]
-    wanted = [case for batch in given.batches.split(",") for case in cases(batch, given.records)]
+    wanted = [case for batch in batches if batch != MACHINES for case in cases(batch, given.records)]
     wanted = [case for case in wanted if not words or any(word in case.title for word in words)]
+    twins = list(machine_cases(given.records)) if MACHINES in batches else []
+    twins = [case for case in twins if not words or any(word in case.label for word in words)]
 
     scores: list[Score] = []
+    twin_scores: list[MachineScore] = []
     with ProcessPoolExecutor(given.jobs) as pool:
-        jobs = [pool.submit(score, case, given.seed, given.duration, given.precise) for case in wanted]
+        jobs: list[Future[Any]] = [
+            pool.submit(score, case, given.seed, given.duration, given.precise) for case in wanted
+        ]
+        jobs += [pool.submit(machine_score, case, given.seed) for case in twins]
         for job in as_completed(jobs):
-            scores.append(job.result())
-            print(table.line(scores[-1]), file=sys.stderr, flush=True)
+            one = job.result()
+            if isinstance(one, Score):
+                scores.append(one)
+            else:
+                twin_scores.append(one)
+            said = table.line(one) if isinstance(one, Score) else machine_line(one)
+            print(said, file=sys.stderr, flush=True)
             if given.json:
-                rows = [one.to_dict() for one in scores]
+                rows = [one.to_dict() for one in (*scores, *twin_scores)]
                 part = given.json.with_suffix(".part")
                 part.write_text(
                     json.dumps({"seed": given.seed, "duration_s": given.duration, "records": rows})
                 )
                 part.replace(given.json)
-    print(table.report(scores))
-    return int(any(one.error for one in scores))
+    if scores:
+        print(table.report(scores))
+    if twin_scores:
+        print(machine_report(twin_scores))
+    return int(any(one.error for one in (*scores, *twin_scores)))
 
 
 if __name__ == "__main__":

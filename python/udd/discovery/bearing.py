@@ -56,7 +56,7 @@ def borne_out(
         What bears it out, the first that does: the cost of the frames that were ``"held"``, these
         ``"fitted"`` too, or the ``"halves"`` of the record.
     """
-    ratio = _held_ratio(*part, rest, unit)
+    ratio = held_ratio(*part, rest, unit)
     if ratio[2] < 1.0:
         return ratio, "held"
     if ratio[0] < 1.0 and _falls_further(part, whole):
@@ -71,7 +71,7 @@ def same_level(one: Fit, other: Fit) -> Pair:
     return at_level(one, level), at_level(other, level)
 
 
-def _held_ratio(before: Fit, after: Fit, rest: Record, unit: float) -> Ratio:
+def held_ratio(before: Fit, after: Fit, rest: Record, unit: float) -> Ratio:
     """Cost of frames that were not fitted after over before, all parameters held."""
     level = min(before.level, after.level)
     costs = same_level(held(before, rest, level), held(after, rest, level))

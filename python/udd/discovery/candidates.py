@@ -24,10 +24,13 @@ class Candidate:
         With the shape parameters that it is tried with.
     title : str
         What a reader calls it.
+    usual : bool
+        Whether machines have such a term; a product of states that merely could be must explain more.
     """
 
     effect: effects.Effect
     title: str
+    usual: bool = True
 
     def added_to(self, model: Model) -> Model:
         """The model with this effect added, all its amplitudes zero."""
@@ -63,18 +66,22 @@ def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
     return replace(effect, name=name, made=replace(effect.made, name=name))
 
 
-def library(model: Model, given: Sequence[Candidate] = ()) -> list[Candidate]:
+def library(
+    model: Model, given: Sequence[Candidate] = (), states: NDArray[np.float64] | None = None
+) -> list[Candidate]:
     """Every effect that can be added to a model, in each of its variants, but for scanned frequencies.
 
-    Those of a user's own model are made of its states, see :func:`udd.discovery.terms.terms`; those given
-    come first. Terms that the free parameters absorb are not sorted out here: that shows in the data.
+    Those of a user's own model are made of its states, see :func:`udd.discovery.terms.terms`, and dry
+    friction where a motion, (n, d), says how wide its turn may be; those given come first. Terms that the
+    free parameters absorb are not sorted out here: that shows in the data.
     """
     if isinstance(model, OwnModel):
-        from .terms import terms
+        from .terms import dry, terms
 
         there = {effect.name for effect in model.effects}
-        own = {c.effect.name: c for c in (*given, *terms(model)) if c.effect.name not in there}
-        return list(own.values())
+        sticking = [] if states is None else dry(model, states)
+        listed = [c for c in (*given, *terms(model), *sticking) if c.effect.name not in there]
+        return list({(c.effect.name, c.effect.values): c for c in listed}.values())
     result = []
     for spec in effects.library():
         if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:

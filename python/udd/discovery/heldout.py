@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from udd.errors import FitError
 from udd.fitting import Fit, Record, filtered, predicted
+from udd.fitting.sensor import reads
 
 Array = NDArray[np.float64]
 #: A ratio and its 95 % interval.
@@ -307,7 +308,7 @@ def _floor(
     film = record.film[windows[:, 1]]
     frames = np.hstack([begins[:, None] + np.arange(length), ends])
     made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
-    sd = fit.noise.sd(record, record.states[:, 0])[frames]
+    sd = np.minimum(fit.noise.sd(record, record.states[:, 0]), _shown(fit, record))[frames]
     made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
 
     # Windows overlap: each is laid out as frames of its own, linked to no other.
@@ -331,6 +332,14 @@ def _floor(
     errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
     result: Array = np.nanmedian(errors, axis=0)
     return result
+
+
+def _shown(fit: Fit, record: Record) -> Array | float:
+    """The noise of a pendulum's frames as they show it themselves, (n, 1): a search may assume more."""
+    if fit.model.kind != "pendulum":
+        return np.inf
+    seen = [record.seen[(record.film == k) & record.observed[:, 0], 0] for k in range(len(record.origins))]
+    return np.array([reads(own)[0] if len(own) else np.inf for own in seen])[record.film][:, None]
 
 
 def _there(record: Record) -> NDArray[np.bool_]:

@@ -68,7 +68,7 @@ def look_around(fitted: Fit, given: Sequence[Candidate] = ()) -> Look:
     def look(current: Fit) -> Look:
         ripple, frequencies = strongest_ripple(current)
         best = [ripple.candidate] if ripple else []
-        scanned = scan(current, [*library(current.model, given), *best])
+        scanned = scan(current, [*library(current.model, given, current.states), *best])
         curves = scan_curves(current)
         looks = len(scanned.scored) + frequencies + curves.looks
         return Look(current, scanned, curves.curves, looks)

@@ -17,6 +17,7 @@ from .candidates import Candidate, ripples
 from .coordinates import slots
 from .forcing import responses, score_forcings
 from .heldout import pace
+from .modes import belongs
 from .terms import waves
 
 #: A candidate is absorbed when the free parameters take this share of its information.
@@ -171,6 +172,7 @@ def _scan_waves(fit: Fit, model: OwnModel) -> list[Scored]:
     # As of the drive's ripple on the disk: what is much faster than the motion does nothing to it.
     fastest = min(0.25 / float(np.median(np.diff(t)[fit.record.linked])), 6.0 / pace(fit))
     frequencies = np.arange(2.0 / np.ptp(t), fastest, 0.5 / np.ptp(t))
+    frequencies = frequencies[~belongs(frequencies, fit)]
     there = {effect.name for effect in model.effects}
     candidates = [c for c in waves(model, frequencies) if c.effect.name not in there]
     by_state = {slot.equation: slot for slot in slots(model)}

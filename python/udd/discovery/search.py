@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +17,7 @@ from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released
 from udd.fitting.parameters import Free
 
-from .bearing import ALPHA, Pair, borne_out, same_level
+from .bearing import ALPHA, Pair, borne_out, held_ratio, same_level
 from .candidates import Candidate
 from .curves import NATS, Curve
 from .formulas import Formula, formulas_for
@@ -43,6 +44,10 @@ _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
+_PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
+_TIED = 4 * NATS  # in chi2: forms that differ by less are compared by all data and by what they foretell
+_FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
+_EQUALS = 7  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,18 @@ def _cheaper(found: tuple[Step, State], steps: Sequence[Step], start: State, end
     several, one = same_level(end.part, state.part)
     unit = one.inflation(at_level(start.part, one.level))
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
+
+
+def _clearly(ratio: Ratio) -> bool:
+    """Whether one form foretells at less cost than another, beyond doubt and by an amount that matters."""
+    return ratio[0] < _FORETOLD and ratio[2] < 1.0
+
+
+def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tuple[Candidate, Candidate]]:
+    """Which effects of one list stand in the place of which of another, those in both left out."""
+    left = [c for c in mine if c.effect not in [o.effect for o in others]]
+    right = [o for o in others if o.effect not in [c.effect for c in mine]]
+    return list(zip(left, right, strict=False))
 
 
 def _chance(pair: Pair, trial: Trial, look: Look) -> tuple[float, float]:
@@ -167,7 +184,7 @@ class Search:
         accepted: list[Step] = []
         looks: list[Look] = []
         states = [begin]
-        while len(accepted) < _MOST:
+        while sum(len(step.candidates) for step in accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             look = look_around(states[-1].part, self.given)
             found = self._known(states[-1], look)
@@ -269,6 +286,8 @@ class Search:
             known = max(look.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - NATS]
             singles += self._written(current, curve, rivals)
+        if singles and (current.part.model.kind != "disk" or any(t.formula for t in singles)):
+            singles += self._pairs(current, look)
         return (
             self._accept(current, singles, look)
             or self._group(current, look, 2)
@@ -303,6 +322,24 @@ class Search:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
         found = together(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
+
+    def _pairs(self, current: State, look: Look) -> list[Trial]:
+        """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
+
+        One that drives where it should brake may do so because another one brakes too much.
+        """
+        scored = sorted((s for s in look.library.scored if not s.absorbed), key=lambda s: -s.chi2)
+        first: dict[str, Candidate] = {}
+        for one in scored:
+            if one.candidate.usual:
+                first.setdefault(one.candidate.effect.name, one.candidate)
+        pairs = [list(pair) for pair in itertools.combinations(list(first.values())[:_PAIRED], 2)]
+        self._trying([" with ".join(c.title for c in pair) for pair in pairs])
+
+        def tried(pair: list[Candidate]) -> Trial | None:
+            return of_library(current.part, pair, [0.0] * sum(len(c.amplitude_names) for c in pair))
+
+        return fitted_ones(together(tried, pairs))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
         """Several effects at once that pass only together."""
@@ -370,19 +407,24 @@ class Search:
         # chi2 compares only where the models are held equally tightly.
         level = min(t.fit.level for t in trials)
         trials = [replace(t, compared=at_level(t.fit, level)) for t in trials]
-        unit = min(trials, key=lambda t: t.compared.chi2).compared.inflation(at_level(current.part, level))
+        first, before = min(trials, key=lambda t: t.compared.chi2).compared, at_level(current.part, level)
+        unit = first.inflation(before)
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
-        least = trials[0].criterion(unit) + trials[0].handicap
+        paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
+        near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
+        costs = self._costs(current, near[:_EQUALS], first.unit(before), unit)
+        near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
+        near = self._foretelling(near, costs)
         # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in trials if t.criterion(unit) + t.handicap - least <= 2 * NATS):
+        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
                 continue
             errors = self._errors_or_none(trial.fit)
             if errors is not None and not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, look.library, unit)
+                others = self._alternatives(trial, trials, look.library, costs)
                 step = Step(
                     candidates=trial.candidates,
                     curve=trial.curve,
@@ -395,6 +437,50 @@ class Search:
                 )
                 return step, State(trial.fit, judged.whole, errors)
         return None
+
+    def _foretelling(self, near: list[Trial], costs: dict[int, float]) -> list[Trial]:
+        """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
+        best = near[0] if near else None
+        for other in near[1:]:
+            tied = costs[id(other)] - costs[id(near[0])] <= _TIED
+            if best and tied and _clearly(self._foretold(best, other)):
+                best = other
+        return [best, *(t for t in near if t is not best)] if best else near
+
+    def _foretold(self, one: Trial, other: Trial) -> Ratio:
+        """Cost of the held-out frames by another form over that by one, all parameters held."""
+        try:
+            return held_ratio(one.fit, other.fit, self.record.part(self.held), self.unit)
+        except FitError:
+            return math.nan, math.nan, math.nan
+
+    def _costs(self, current: State, near: list[Trial], unit: float, most: float) -> dict[int, float]:
+        """What each of several forms costs that explain the first part about as well: by all data.
+
+        Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
+        of all data is, but for a constant, the cost of predicting each stretch from those before it.
+        """
+        if len(near) < 2:
+            return {id(t): t.criterion(unit) + t.handicap for t in near if t.needed}
+
+        def again(trial: Trial) -> Trial | None:
+            try:
+                return self._again(current.whole, trial)
+            except FitError:
+                return None
+
+        pairs = zip(near, together(again, near), strict=True)
+        wholes = [(t, w) for t, w in pairs if w is not None and w.needed]
+        level = min((w.fit.level for _t, w in wholes), default=0)
+        result = {}
+        for trial, whole in wholes:
+            try:
+                # What no library has is not chosen for fitting what the noise is not sure to show.
+                paid = trial.price + trial.handicap * (most / unit if trial.curve else 1.0)
+                result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
+            except FitError:
+                continue
+        return result
 
     def _judged(self, current: State, trial: Trial, look: Look) -> Judged | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
@@ -441,24 +527,29 @@ class Search:
         )
 
     def _alternatives(
-        self, chosen: Trial, trials: list[Trial], scanned: Scan, unit: float
+        self, chosen: Trial, trials: list[Trial], scanned: Scan, costs: dict[int, float]
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
-        best = chosen.criterion(unit)
-        result = []
-        for trial in trials:
-            nats = (trial.criterion(unit) - best) / 2
+        result: dict[tuple[str, str, str | None], Alternative] = {}
+
+        def cost(trial: Trial) -> float:  # a formula may be it as well as what was chosen
+            return costs[id(trial)] - trial.handicap
+
+        best = cost(chosen)
+        for trial in (t for t in trials if id(t) in costs):
+            nats = (cost(trial) - best) / 2
             if (
                 trial is chosen
                 or nats > NATS
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
                 or (trial.formula is not None and self._says_less(trial, chosen, nats))
+                or _clearly(self._foretold(trial, chosen))
             ):
                 continue
-            for mine, other in zip(chosen.candidates, trial.candidates, strict=True):
-                if mine.effect == other.effect:
-                    continue
+            for mine, other in _beside(chosen.candidates, trial.candidates):
+                if other.title == mine.title:
+                    continue  # but for the width that its sign is smoothed over
                 known = mine in listed and other in listed
                 likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
                 if likeness > _SUPERSET and other.parameters > mine.parameters:
@@ -466,7 +557,11 @@ class Search:
                 named = {p: f"{other.effect.name}.{p}" for p in other.effect.parameters}
                 fitted = trial.fit.parameters
                 effect = other.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
-                result.append(
-                    Alternative(mine.effect.name, effect, other.title, other.effect.equation, nats, likeness)
+                one = Alternative(
+                    mine.effect.name, effect, other.title, other.effect.equation, nats, likeness
                 )
-        return result
+                # The same may stand beside several partners; the best is told.
+                key = (mine.effect.name, other.title, other.effect.momentum)
+                if key not in result or nats < result[key].nats:
+                    result[key] = one
+        return list(result.values())

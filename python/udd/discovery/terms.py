@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from udd import effects
 from udd._expressions import Expression, text_of
 from udd.effects.own import written
@@ -18,15 +21,19 @@ from .candidates import Candidate
 
 _DEGREE = 3
 _FEW = 4  # states of which all products up to that degree are tried; of more, up to the second
+#: Widths over which dry friction turns, in units of the speed's root mean square. As narrow as the last it
+#: holds a body at rest for hundreds of swings.
+_WIDTHS = (0.3, 0.03, 0.002)
 
 
 def terms(model: OwnModel) -> list[Candidate]:
-    """Every term that is tried in the equations of a user's own model.
+    """Every term that is tried in the equations of a user's own model, but for dry friction.
 
     Of the states that are no angles: a constant, all products up to the third degree, and each times its own
     size; of each angle and of every two angles' difference sine and cosine, also times each other state; of
     every angle the rate, where that is no state itself. An equation that only says that one state is the rate
-    of another gets none.
+    of another gets none. Of a mechanical model, where a state is another one's rate, those come first by a
+    handicap that are forces as machines have them: springs, drags, gravity.
     """
     plain = [(text, _name(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}
@@ -35,9 +42,86 @@ def terms(model: OwnModel) -> list[Candidate]:
     for state in model.state_names:
         if state in model.kinematic:
             continue
+        usual = _forces(model, state)
         moving = [(f"({text})", f"rate_of_{k}", f"{k}'") for k, text in rates.items() if k != state]
-        result += [_candidate(model, state, *one) for one in plain + moving]
+        for one in plain + moving:
+            candidate = _candidate(model, state, *one)
+            result.append(replace(candidate, usual=not usual or one[2] in usual or one in moving))
     return result
+
+
+def _forces(model: OwnModel, state: str) -> set[str]:
+    """The terms of an equation that are forces as machines have them; none where it is of no speed."""
+    rates = _speeds(model)
+    if state not in rates.values():
+        return set()
+    speeds = list(dict.fromkeys(rates.values()))
+    places = [name for name in rates if name not in model.angles]
+    turning = [*model.angles, *(f"{a} - {b}" for a, b in itertools.combinations(model.angles, 2))]
+    drags = [text for v in speeds for text in (v, f"abs({v})*{v}", f"{v}^3")]
+    springs = [text for x in places for text in (x, f"{x}^3")]
+    return {"1", *drags, *springs, *(f"{wave}({a})" for a in turning for wave in ("sin", "cos"))}
+
+
+def _speeds(model: OwnModel) -> dict[str, str]:
+    """The states whose rate is a state, with that one."""
+    return {name: model.equations[name].strip() for name in model.kinematic}
+
+
+def dry(model: OwnModel, states: NDArray[np.float64]) -> list[Candidate]:
+    """Dry friction of every speed and of every two bodies' relative speed, in every equation of a speed.
+
+    Where an angle's rate is no state, of that rate in every equation that there is. The sign is smoothed over
+    a width, of which a few are tried.
+
+    Parameters
+    ----------
+    model : OwnModel
+    states : ndarray (n, d)
+        A motion, which says how wide.
+    """
+    own = _speeds(model)
+    moving = {name: text for name, text in model.equations.items() if name in own or name in model.angles}
+    size = model.rates(0.0, states) if moving else states
+    columns = {name: size[:, model.state_names.index(name)] for name in moving}
+    speeds = [
+        (text, _said(own, name), values)
+        for (name, text), values in zip(moving.items(), columns.values(), strict=True)
+    ]
+    for a, b in itertools.combinations(own, 2):
+        if (a in model.angles) == (b in model.angles):
+            text = f"{own[a]} - {own[b]}"
+            speeds.append((text, text, columns[a] - columns[b]))
+    result = []
+    for state in model.state_names:
+        if state in model.kinematic:
+            continue
+        for text, said, values in speeds:
+            typical = float(np.sqrt((values**2).mean()))
+            # What is another body's may drive this one.
+            low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
+            if typical > 0:
+                result += [_dry(model, state, text, said, w * typical, low_high) for w in _WIDTHS]
+    return result
+
+
+def _said(own: dict[str, str], name: str) -> str:
+    """What a reader calls a state's rate."""
+    return own.get(name, f"{name}'")
+
+
+def _dry(
+    model: OwnModel, state: str, text: str, said: str, width: float, limits: tuple[float, float]
+) -> Candidate:
+    c, eps = _unused(model, "c", "eps")
+    name = f"dry_{_name(said)}_in_{state}"
+    title = f"dry friction of {said} in {state}'"
+    inner = text if text.isidentifier() else f"({text})"
+    spec = written(
+        f"{state}'", f"{c}*tanh({inner}/{eps})", name, title, [c], {c: limits, eps: (0.0, np.inf)}, (c, eps)
+    )
+    listed = tuple(replace(p, role="width") if p.name == eps else p for p in spec.parameters)
+    return Candidate(effects.Effect(name, (0.0, width), made=replace(spec, parameters=listed)), title)
 
 
 def given_terms(model: OwnModel, given: Iterable[tuple[str, Expression]]) -> list[Candidate]:

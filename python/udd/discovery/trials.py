@@ -10,6 +10,7 @@ import numpy as np
 from udd import _chi2
 from udd.errors import FitError
 from udd.fitting import Fit, extend
+from udd.own_models import OwnModel
 
 from .bearing import ALPHA
 from .candidates import Candidate
@@ -73,8 +74,13 @@ class Trial:
 
     @property
     def handicap(self) -> float:
-        """By how much chi2 must be better than that of an effect of the library."""
-        return 0.0 if self.curve is None else 3 * NATS if self.formula is None else 2 * NATS
+        """By how much chi2 must be better than that of an effect of the library.
+
+        Of several at once as much as a further one has to bring beyond its price.
+        """
+        if self.curve is None:
+            return NATS * (sum(not c.usual for c in self.candidates) + 2 * (len(self.candidates) - 1))
+        return 3 * NATS if self.formula is None else 2 * NATS
 
     @property
     def needed(self) -> bool:
@@ -126,9 +132,23 @@ def of_curve(current: Fit, curve: Curve) -> Trial | None:
     if not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)
-    return Trial(
-        [candidate], located.fit, located.fit, [], 2 * located.price, located.curve.df, located.curve
-    )
+    price = 2 * located.price + _excess(current, located.curve)
+    return Trial([candidate], located.fit, located.fit, [], price, located.curve.df, located.curve)
+
+
+def _excess(current: Fit, curve: Curve) -> float:
+    """What a curve pays, in chi2, for values beyond what the motion can show: all rates there are.
+
+    Its prior is as wide as these; wider by a factor costs that factor's logarithm for each number found.
+    """
+    if not isinstance(current.model, OwnModel):
+        return 0.0  # whose curves the disk's own tests keep within bounds
+    k = current.model.state_names.index(curve.slot.equation)
+    linked = current.record.linked
+    shown = np.diff(current.states[:, k])[linked] / np.diff(current.record.t)[linked]
+    most = float(np.abs(curve.values(*curve.places)).max())
+    ratio = most / max(float(np.abs(shown).max()), 1e-300)
+    return 2 * curve.df * math.log(max(ratio, 1.0))
 
 
 def of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:

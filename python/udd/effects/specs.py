@@ -36,7 +36,8 @@ class Parameter:
         The physically sensible range.
     role : str
         ``"amplitude"`` (the effect is proportional to it and absent where all amplitudes are zero),
-        ``"shape"`` or ``"frequency"``.
+        ``"shape"``, ``"frequency"``, or ``"width"``: over which a smoothed jump goes, of which a search keeps
+        the best and tells none apart.
     grid : tuple of float
         Values that a scan of candidates tries, for a shape.
     """
@@ -51,6 +52,8 @@ class Parameter:
     @property
     def sought(self) -> bool:
         """Whether a fit that adds the effect finds it; not a shape that is one of a few whole numbers."""
+        if self.role == "width":
+            return False
         if self.role == "shape":
             return len(self.grid) > 1 and any(value % 1 for value in self.grid)
         return True

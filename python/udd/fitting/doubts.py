@@ -11,6 +11,7 @@ from udd import _core
 from udd.own_models import OwnModel
 
 from .parameters import Free
+from .sensor import lattice
 
 if TYPE_CHECKING:
     from .problem import Fit
@@ -68,6 +69,39 @@ class RanOff:
 
 
 @dataclass(frozen=True)
+class Reading:
+    """What a channel's frames are good to.
+
+    Attributes
+    ----------
+    name, unit : str
+    noise : float
+        Standard deviation that the fit assumed of a typical frame.
+    step : float
+        That the channel was read in; 0 where its values lie on no lattice.
+    memory : float
+        How much of the noise is still there in the next frame.
+    """
+
+    name: str
+    unit: str
+    noise: float
+    step: float
+    memory: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        unit = f" {self.unit}" if self.unit else ""
+        said = f"{self.name} {self.noise:.3g}{unit}"
+        if self.step:
+            said += f", read in steps of {self.step:.3g}{unit}"
+        if self.memory:
+            said += f", of which {self.memory:.2f} is still there in the next frame"
+        return said
+
+
+@dataclass(frozen=True)
 class Doubts:
     """What a fit shows of its own faults.
 
@@ -83,6 +117,8 @@ class Doubts:
     ran_off : list of RanOff
     factor : float
         By what the standard errors are multiplied: 1 where nothing is missing.
+    sensor : list of Reading
+        The noise of each channel and the steps that it was read in.
     """
 
     missed: list[Missed]
@@ -90,6 +126,7 @@ class Doubts:
     white: dict[str, float]
     ran_off: list[RanOff]
     factor: float
+    sensor: list[Reading]
 
     @property
     def coloured(self) -> list[str]:
@@ -128,6 +165,8 @@ class Doubts:
                 f"{self.white[least]:.1g} in {least})"
             )
         said += [f"warning: {one.text}" for one in self.ran_off]
+        if self.sensor:
+            said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
         if self.factor > 1:
             said.append(
                 f"standard errors are {self.factor:.0f} times those of a right model: what is missing may "
@@ -143,6 +182,7 @@ class Doubts:
             "model_error": [vars(one) for one in self.missed],
             "white": dict(self.white),
             "ran_off": [vars(one) for one in self.ran_off],
+            "noise": [vars(one) for one in self.sensor],
             "errors_times": self.factor,
         }
 
@@ -156,7 +196,22 @@ def doubts(fit: Fit) -> Doubts:
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if missing and not tight else 1.0
-    return Doubts(_missed(fit), tight, white, ran_off(fit), factor)
+    return Doubts(_missed(fit), tight, white, ran_off(fit), factor, readings(fit))
+
+
+def readings(fit: Fit) -> list[Reading]:
+    """The noise of each channel that was seen, and the steps that it was read in."""
+    known = {"disk": ("m", "m", "rad"), "pendulum": ("rad",)}.get(fit.model.kind)
+    sd = fit.noise.sd(fit.record, fit.blurring)
+    result = []
+    for k, name in enumerate(fit.channels):
+        own = fit.record.observed[:, k]
+        if own.any():
+            first = own & (fit.record.film == 0)
+            step = lattice(fit.record.seen[first, k])
+            noise, memory = float(np.median(sd[own, k])), float(fit.noise.memory[k])
+            result.append(Reading(name, known[k] if known else "", noise, step, memory))
+    return result
 
 
 def units(fit: Fit) -> dict[str, str]:

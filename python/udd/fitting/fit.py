@@ -20,13 +20,14 @@ from .own import levels_of
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
 from .record import Record, record_of
+from .sensor import is_encoder
 from .solve import SolveError, solve
 from .units import ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
 #: In a search a pendulum's angle that states no error is not taken for better than this part of what is
 #: typical: frames may scatter less, but perspective bends the angle by as much.
-_FAITHFUL = {"pendulum": 0.5}
+_FAITHFUL = 0.5
 _FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
 #: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
 UNEXPLAINED = 2.5
@@ -70,8 +71,9 @@ def fit(
     camera : bool or iterable of str
         Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
-        ``clock``), or which of them. Of a pendulum whose measurement says ``sensor = encoder`` (in its
-        `meta`, or a line of its file) only the zero ``theta0`` is.
+        ``clock``), or which of them. Of a pendulum that an encoder read only the zero ``theta0`` is:
+        the measurement says ``sensor = encoder`` (in its `meta`, or a line of its file), or its angles come
+        in steps that drown all other noise.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional
@@ -131,8 +133,8 @@ def fit_record(
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
     kind = models[0].kind
-    if camera is True and all(own.meta.get("sensor") == "encoder" for own in measurements):
-        camera = _PIVOT.get(kind, ())[:1] if kind == "pendulum" else camera  # its zero, and no perspective
+    if camera is True and kind == "pendulum" and all(is_encoder(own) for own in measurements):
+        camera = _PIVOT[kind][:1]  # its zero, and no perspective
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], OwnModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
@@ -336,7 +338,7 @@ def refit(fitted: Fit) -> Fit:
     own = isinstance(fitted.model, OwnModel)
     schedule = fitted.problem.schedule if own else levels(fitted.model.kind)
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
-    shown, point = fitted.model.kind not in _FAITHFUL, fitted.point
+    shown, point = not _least(fitted.measurements) > 0, fitted.point
     if shown:
         shown, problem, point = _estimate_noise(fitted.measurements, problem, point)
     if not shown:
@@ -378,6 +380,19 @@ def _afresh(fitted: Fit) -> Point:
     return Point(fitted.states, tuple(sets))
 
 
+def _is_known(measurement: Measurement) -> bool:
+    """Whether the noise is known beforehand: stated, or as the frames of a sensor show it."""
+    return measurement.sigma is not None or measurement.kind == "own" or is_encoder(measurement)
+
+
+def _least(measurements: Sequence[Measurement]) -> float:
+    """What the noise of a search is at least, in units of what is known beforehand."""
+    first = measurements[0]
+    if first.kind != "pendulum" or first.sigma is not None:
+        return 0.0
+    return 1.0 if is_encoder(first) else _FAITHFUL
+
+
 def _estimate_noise(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point
 ) -> tuple[bool, Problem, Point]:
@@ -388,11 +403,10 @@ def _estimate_noise(
         if result.leverage > FOLLOWS:
             return False, problem, point
         noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
-        if measurements[0].sigma is not None and noise.beyond(problem.record, result.blurring, _BELIEVED):
+        if _is_known(measurements[0]) and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return False, problem, point
-        kind = problem.models[0].kind
-        if not problem.likeliest and measurements[0].sigma is None and kind in _FAITHFUL:
-            noise = replace(noise, factor=np.maximum(noise.factor, _FAITHFUL[kind]))
+        if not problem.likeliest:
+            noise = replace(noise, factor=np.maximum(noise.factor, _least(measurements)))
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, result.blurring):
             break

@@ -263,9 +263,19 @@ class Fit:
         The scatter that remains, times how much stronger the misfits are at the frequencies where the two
         differ.
         """
+        return max(self.scatter, 1.0) * self._colour(before)
+
+    def unit(self, before: Fit) -> float:
+        """The same for choosing between forms: the scatter counts as it is where the noise was not known.
+
+        A pendulum's film is not taken for better than its geometry, which many are.
+        """
+        assumed = self.model.kind == "pendulum" and self.measurement.sigma is None
+        return (self.scatter if assumed else max(self.scatter, 1.0)) * self._colour(before)
+
+    def _colour(self, before: Fit) -> float:
         sd = self.noise.sd(self.record, self.states[:, 0])
-        misfit, signature = self.misfit / sd, (before.misfit - self.misfit) / sd
-        return max(self.scatter, 1.0) * colour(misfit, signature)
+        return colour(self.misfit / sd, (before.misfit - self.misfit) / sd)
 
     @cached_property
     def doubts(self) -> Doubts:

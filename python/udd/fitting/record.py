@@ -18,6 +18,7 @@ from udd.models import Model
 from udd.own_models import OwnModel
 
 from .own import guessed, slope, typical_noise
+from .sensor import frame_noise, is_encoder, lattice
 
 Array = NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def record_of(
     sigma = np.full((len(t), len(names)), np.inf)
     rho = np.tile(np.eye(len(names)), (len(t), 1, 1))
     if measurement.sigma is None:
-        known_sigma = typical_noise(values[row[there]]) if own else np.array(_SIGMA[measurement.kind])
+        known_sigma = _noise_of(measurement, values[row[there]])
         sigma[np.ix_(there, places)] = known_sigma
     else:
         own_sigma = measurement.sigma[row[there]]
@@ -188,6 +189,18 @@ def record_of(
     else:
         states = _states(t, guess, linked)
     return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
+
+
+def _noise_of(measurement: Measurement, values: Array) -> Array:
+    """What is taken for the noise where a measurement does not say, of each column or of each frame too."""
+    if measurement.kind == "own":
+        typical = typical_noise(values)
+        if not any(lattice(column) for column in values.T):
+            return typical
+        return np.maximum(typical, np.column_stack([frame_noise(column) for column in values.T]))
+    if measurement.kind == "pendulum" and is_encoder(measurement):
+        return frame_noise(values[:, 0])[:, None]
+    return np.array(_SIGMA[measurement.kind])
 
 
 def _joined(records: Sequence[Record]) -> Record:

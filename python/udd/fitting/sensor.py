@@ -1,0 +1,105 @@
+"""What a record shows of its sensor: the steps that it reads in, and its noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.measurement import Measurement
+
+Array = NDArray[np.float64]
+
+_FEW = 8  # gaps between values that tell a lattice
+_SAME = 1e-7  # of the range, below which two values are one
+_OFF, _MOST = 0.02, 0.98  # how far gaps may be from multiples of the step, and how many are not farther
+_ORDERS = (3, 4, 5, 6)  # of the differences that tell noise from motion
+_ROUND = (1.0, 2.0, 5.0, 10.0)
+_CLOSE = 1e-3  # relative, within which a number is a round one
+
+
+def lattice(values: Array) -> float:
+    """The step in which a sensor reads, from the gaps between its values; 0 where they lie on no lattice.
+
+    Parameters
+    ----------
+    values : ndarray (n,)
+        In any order; NaN where nothing was read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from udd.fitting.sensor import lattice
+    >>> angle = np.random.default_rng(0).normal(0, 0.1, 500)
+    >>> round(lattice(0.25 * np.round(angle / 0.02)), 6), lattice(angle)
+    (0.25, 0.0)
+    """
+    ordered = np.sort(values[np.isfinite(values)])
+    gaps = np.diff(ordered)
+    gaps = gaps[gaps > _SAME * max(float(np.ptp(ordered)), 1e-300)] if len(ordered) else gaps
+    if len(gaps) < _FEW:
+        return 0.0
+    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    times = np.rint(gaps / step)
+    step = float(gaps @ times / (times @ times))
+    off = np.abs(gaps / step - np.rint(gaps / step))
+    return step if float((off < _OFF).mean()) > _MOST else 0.0
+
+
+def roughness(values: Array) -> Array:
+    """The noise of evenly spaced columns (n, c), from the least of what differences of several orders show.
+
+    Those of a smooth motion are the smaller the higher their order, those of noise are as many times its
+    variance as the middle binomial coefficient says.
+    """
+    shown = []
+    for order in _ORDERS:
+        scale = math.sqrt(math.comb(2 * order, order))
+        shown.append(np.median(np.abs(np.diff(values, order, axis=0)), axis=0) / 0.6745 / scale)
+    result: Array = np.min(shown, axis=0)
+    return result
+
+
+def reads(values: Array) -> tuple[float, float]:
+    """``(noise, step)`` of one channel (n,): the step's own noise, step/sqrt(12), is contained.
+
+    A sensor that reads in steps coarser than its noise mostly repeats itself: there the step's is all.
+    """
+    step = lattice(values)
+    return max(float(roughness(values[:, None])[0]), step / math.sqrt(12.0)), step
+
+
+def frame_noise(values: Array) -> Array:
+    """The noise of each frame of one channel, (n,), of which the steps' errors repeat where readings do.
+
+    As long as a motion stays within a step its frames share one error: together they tell what one would.
+    """
+    noise, step = reads(values)
+    if not step:
+        return np.full(len(values), noise)
+    changes = np.flatnonzero(np.abs(np.diff(values)) > step / 2) + 1
+    lengths = np.diff(np.concatenate([[0], changes, [len(values)]]))
+    own = step**2 / 12.0
+    result: Array = np.sqrt(noise**2 - own + np.repeat(lengths, lengths) * own)
+    return result
+
+
+def is_encoder(measurement: Measurement) -> bool:
+    """Whether a pendulum's angle was read by an encoder.
+
+    It says so, or it comes in steps that drown all other noise. Not where the steps are round numbers of rad
+    or degrees: those come from writing the table.
+    """
+    if measurement.meta.get("sensor") == "encoder":
+        return True
+    if measurement.kind != "pendulum":
+        return False
+    noise, step = reads(measurement.values[measurement.seen, 0])
+    return step > 0 and noise <= step and not (_is_round(step) or _is_round(math.degrees(step)))
+
+
+def _is_round(value: float) -> bool:
+    """Whether a number is 1, 2 or 5 times a power of ten."""
+    mantissa = value / 10.0 ** math.floor(math.log10(value))
+    return any(abs(mantissa / one - 1.0) < _CLOSE for one in _ROUND)

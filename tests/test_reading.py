@@ -1,0 +1,79 @@
+"""What a record shows of its sensor: steps, noise, and whether it was an encoder."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+from udd.fitting.sensor import frame_noise, is_encoder, lattice, reads, roughness
+
+
+def swing(step: float, noise: float = 0.0, seed: int = 0, duration: float = 20.0) -> udd.Measurement:
+    """A pendulum's angle, read in steps (0 for none), without a word about the sensor."""
+    t = np.arange(0, duration, 0.02)
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]
+    theta = theta + noise * np.random.default_rng(seed).standard_normal(len(t))
+    return udd.Measurement(t, {"theta": np.round(theta / step) * step if step else theta})
+
+
+@pytest.mark.parametrize("step", [2 * np.pi / 4096, 4.4e-4, 0.25])
+@pytest.mark.parametrize("offset", [0.0, 0.1234])
+def test_steps_are_found_from_the_values_alone(step, offset):
+    values = np.round(np.random.default_rng(0).normal(0, 30 * step, 400) / step) * step + offset
+    assert lattice(values) == pytest.approx(step, rel=1e-6)
+    assert lattice(values + 0.1 * step * np.random.default_rng(1).standard_normal(400)) == 0.0
+
+
+def test_the_noise_is_that_of_the_step_or_of_the_frames():
+    step = 2 * np.pi / 4096
+    assert reads(swing(step).values[:, 0]) == pytest.approx((step / np.sqrt(12), step), rel=0.3)
+    # Differences of many orders tell noise from motion: 1000 frames say it to some 5 %.
+    assert roughness(swing(0.0, 1e-4).values)[0] == pytest.approx(1e-4, rel=0.2)
+    # At rest an encoder repeats itself; its step's noise is still there.
+    still = np.where(np.arange(500) < 480, 0.0, step * np.arange(-479, 21))
+    assert reads(still)[0] == pytest.approx(step / np.sqrt(12))
+
+
+@pytest.mark.parametrize(
+    ("step", "noise", "encoder"),
+    [
+        (2 * np.pi / 14400, 0.0, True),
+        (2 * np.pi / 14400, 1e-4, True),
+        (2 * np.pi / 14400, 2e-3, False),  # the steps are not what it is good to
+        (1e-3, 0.0, False),  # a table of three decimals
+        (np.radians(0.1), 0.0, False),
+        (0.0, 1e-3, False),
+    ],
+)
+def test_an_encoder_is_told_by_steps_that_drown_all_else(step, noise, encoder):
+    assert is_encoder(swing(step, noise)) == encoder
+
+
+def test_an_encoder_has_no_camera_and_is_as_good_as_its_steps():
+    step = 2 * np.pi / 14400
+    found = udd.fit(swing(step), udd.Pendulum(0.79))
+    assert "theta0" in found.parameters and not {"aside", "above"} & set(found.parameters)
+    sd = float(np.median(found.noise.sd(found.record, found.states[:, 0])))
+    assert sd == pytest.approx(step / np.sqrt(12), rel=0.3)
+    assert f"read in steps of {step:.3g} rad" in found.summary()
+    (said,) = found.to_dict()["doubts"]["noise"]
+    assert said["name"] == "theta" and said["step"] == pytest.approx(step, rel=1e-6)
+
+
+def test_quantised_columns_of_own_models_are_good_to_their_step():
+    t = np.arange(0, 20, 0.02)
+    model = udd.Model(["x", "v"], ["v", "-k*x"], {"k": 4.0})
+    x = udd.simulate(model, t, [1.0, 0.0]).state[:, 0]
+    # So coarse that most frames repeat the one before: differences alone would say there is no noise.
+    step = 0.2
+    found = udd.fit(udd.Measurement(t, {"x": np.round(x / step) * step}), model)
+    assert found.record.sigma[:, 0].min() >= 0.99 * step / np.sqrt(12)
+
+
+def test_readings_that_repeat_tell_what_one_would():
+    step = 0.1
+    values = step * np.concatenate([np.arange(20), np.full(400, 20), 20 + np.arange(20)])
+    noise = frame_noise(values)
+    assert noise[5] == pytest.approx(step / np.sqrt(12), rel=0.01)
+    assert (1 / noise[20:420] ** 2).sum() == pytest.approx(12 / step**2, rel=0.02)
