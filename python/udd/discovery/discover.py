@@ -14,10 +14,13 @@ from udd.effects.own import is_spline
 from udd.errors import FitError
 from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
 from udd.measurement import Measurement
+from udd.measurement.table import ANGLES
+from udd.measurement.thinning import Thinned, thinned
 from udd.models import Model
 from udd.own_models import OwnModel
 
 from .candidates import Candidate
+from .clock import Clock, TimeUpError
 from .heldout import misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
@@ -41,6 +44,7 @@ def discover(
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
     candidates: Iterable[tuple[str, Expression]] = (),
+    budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Discovery:
     """Find the effect that a model lacks.
@@ -70,6 +74,9 @@ def discover(
     candidates : iterable of (str, formula)
         Terms to try in a user's own model beside those made of its states: the state in whose equation it
         stands and the term, as in ``("v", "abs(v)*v")``.
+    budget : float, optional
+        Seconds after which the search ends with what it has, which the verdict then says. The known model's
+        fit, which comes first, and the last one are made in any case.
     progress : callable, optional
         Told in a few words what is being done.
 
@@ -95,8 +102,11 @@ def discover(
     >>> [effect.title for effect in found.effects]
     ['quadratic drag']
     """
-    tell = progress or (lambda _text: None)
+    clock = Clock(budget, progress or (lambda _text: None))
     free = free if free is None or isinstance(free, str) else list(free)
+    thin = _thinned(measurement, model)
+    measurement = [own.measurement for own in thin]
+    measurement = measurement[0] if len(measurement) == 1 else measurement
     record = record_of(measurement, model)
     one = model if isinstance(model, Model) else next(iter(model))
     given = _given(one, candidates)
@@ -106,7 +116,7 @@ def discover(
     train = record.first(TRAIN)
     options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
 
-    tell("fitting the known model")
+    clock.finish("fitting the known model")
     _beside.importing("scipy.stats", "pyoperon.sklearn")
 
     def fits() -> tuple[Fit, ...]:
@@ -116,12 +126,12 @@ def discover(
         )
 
     base, baseline = checked_units(measurement, model, options, fits)
-    search = Search(record, ~train, tell, pace(base), given, base.problem.free)
+    search = Search(record, ~train, clock, pace(base), given, base.problem.free)
     before = search.errors(base)
     known = State(base, baseline, before)
     begin = _begin(search, known)
     end = search.run(begin, known)
-    tell("fitting the model as found")
+    clock.finish("fitting the model as found")
     final = refit(end.whole)
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
@@ -129,15 +139,21 @@ def discover(
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed
-    if unexplained and not refused:
-        tell("trying what comes nearest")
-        refused = search.refused(begin, end.looks[-1])
+    stopped = end.stopped
+    if unexplained and not refused and end.looks:
+        try:
+            clock.tell("trying what comes nearest")
+            refused = search.refused(begin, end.looks[-1])
+        except TimeUpError as up:
+            stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
     elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
+    elif found:
+        verdict = "effect identified"
     else:
-        verdict = "effect identified" if found else "nothing missing"
+        verdict = "search not finished" if stopped else "nothing missing"
     return Discovery(
         verdict=verdict,
         baseline=(baseline if found else final).put_away(),
@@ -153,7 +169,22 @@ def discover(
         split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=end.part.put_away(),
         refused=refused,
+        thinned=thin if any(own.every > 1 for own in thin) else [],
+        budget=clock.budget if stopped else None,
+        stopped=stopped,
     )
+
+
+def _thinned(
+    measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
+) -> list[Thinned]:
+    """The measurements, those that were sampled more often than their motion needs by block averages."""
+    some = [measurement] if isinstance(measurement, Measurement) else list(measurement)
+    if not all(isinstance(own, Measurement) for own in some):
+        record_of(measurement, model)  # which says what is wrong
+    one = model if isinstance(model, Model) else next(iter(model))
+    angles = one.angles if isinstance(one, OwnModel) else ANGLES
+    return [thinned(own, angles) for own in some]
 
 
 def _begin(search: Search, known: State) -> State:

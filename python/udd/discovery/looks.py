@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from udd.fitting import Fit, loosened
@@ -57,12 +57,16 @@ class Look:
         return max([c.evidence for c in self.curves] + singles, default=0.0)
 
 
-def look_around(fitted: Fit, given: Sequence[Candidate] = ()) -> Look:
+def look_around(
+    fitted: Fit,
+    given: Sequence[Candidate] = (),
+    watched: Callable[[Callable[[Fit], Look]], Callable[[Fit], Look]] = lambda work: work,
+) -> Look:
     """Score every candidate and curve around the fit and, where it explains little, around a looser one.
 
     A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
     where it is held tightly. The scores with the stronger explanation count. `given` are the user's own
-    candidates.
+    candidates; `watched` makes work that does not begin once a search's time is up.
     """
 
     def look(current: Fit) -> Look:
@@ -73,7 +77,7 @@ def look_around(fitted: Fit, given: Sequence[Candidate] = ()) -> Look:
         looks = len(scanned.scored) + frequencies + curves.looks
         return Look(current, scanned, curves.curves, looks)
 
-    found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
+    found = together(watched(look), dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
     return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
 
 

@@ -11,6 +11,7 @@ from udd.effects import Effect
 from udd.fitting import Fit
 from udd.fitting.doubts import ran_off
 from udd.measurement import Measurement
+from udd.measurement.thinning import Thinned
 from udd.models import Model
 
 from .curves import Curve
@@ -178,7 +179,8 @@ class Discovery:
     verdict : str
         ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or
         ``"fits the first part, not confirmed"`` where free runs over the held-out data do not bear it out:
-        what that is stands in `refused`.
+        what that is stands in `refused`. ``"search not finished"`` where its time was up before anything
+        was found.
     baseline, fit : Fit
         The model without and with the added effects, each fitted to all data; the same where none was added.
     effects : list of Found
@@ -201,6 +203,13 @@ class Discovery:
     refused : list of Refused
         Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
         was not confirmed.
+    thinned : list of Thinned
+        What became of measurements with more frames than their motion needs: block averages, which the
+        measurements of `fit` are then. Empty where all frames were taken as they were.
+    budget : float or None
+        The seconds that ended the search before it was done, where they did.
+    stopped : str or None
+        What it was at then.
     """
 
     verdict: str
@@ -217,6 +226,9 @@ class Discovery:
     split: float
     trained: Fit = field(repr=False)
     refused: list[Refused] = field(default_factory=list)
+    thinned: list[Thinned] = field(default_factory=list)
+    budget: float | None = None
+    stopped: str | None = None
 
     @property
     def measurement(self) -> Measurement:
@@ -243,6 +255,12 @@ class Discovery:
                 f"Held as stated, because they run away where they are free: {', '.join(held)}. What was "
                 "found may make up for errors in these."
             )
+        said += [
+            f"The record's {own.frames} frames were averaged over {own.every} at a time, to "
+            f"{len(own.measurement)}: the motion changes so slowly that nothing is lost by it."
+            for own in self.thinned
+            if own.every > 1
+        ]
         return said
 
     @cached_property
@@ -259,6 +277,7 @@ class Discovery:
         """What a machine reads."""
         return {
             "verdict": self.verdict,
+            "stopped": self.stopped,
             "remarks": self.remarks,
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from udd.fitting.parameters import Free
 
 from .bearing import ALPHA, Pair, borne_out, same_level
 from .candidates import Candidate
+from .clock import Clock, TimeUpError
 from .curves import NATS, Curve
 from .formulas import Formula, formulas_for
 from .heldout import (
@@ -34,6 +36,9 @@ from .results import Alternative, Failing, Refused, Witness
 from .scan import Scan, Scored
 from .together import together
 from .trials import Trial, fitted_ones, of_curve, of_formula, of_library, one_of_each, same_law
+
+From = TypeVar("From")
+To = TypeVar("To")
 
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
@@ -124,7 +129,10 @@ class Judged:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where a search ended: fits of the first part and of all data, errors, what was seen and done."""
+    """Where a search ended: fits of the first part and of all data, errors, what was seen and done.
+
+    `stopped` is what it was at when its time was up.
+    """
 
     part: Fit
     whole: Fit
@@ -132,6 +140,7 @@ class Outcome:
     accepted: list[Step]
     looks: list[Look]
     unconfirmed: list[Refused]
+    stopped: str | None = None
 
 
 class Search:
@@ -141,13 +150,17 @@ class Search:
         self,
         record: Record,
         held: NDArray[np.bool_],
-        tell: Callable[[str], None],
+        clock: Clock,
         unit: float = 1.0,
         given: Sequence[Candidate] = (),
         free: Sequence[Free] = (),
     ) -> None:
-        self.record, self.held, self.tell = record, held, tell
+        self.record, self.held, self.clock, self.tell = record, held, clock, clock.tell
         self.unit, self.given, self.free = unit, given, free
+
+    def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
+        """Independent pieces of work side by side, as long as there is time."""
+        return together(self.clock.watched(work), pieces)
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -167,14 +180,27 @@ class Search:
         accepted: list[Step] = []
         looks: list[Look] = []
         states = [begin]
+        stopped = None
+        try:
+            self._grow(accepted, states, looks)
+        except TimeUpError as up:
+            stopped = str(up)
+        number = self._confirmed(known or states[0], states)
+        unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
+        end = states[number] if number else known or states[0]
+        return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed, stopped)
+
+    def _grow(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+        """Add effects to the lists as they pass."""
         while len(accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = look_around(states[-1].part, self.given)
+            look = look_around(states[-1].part, self.given, self.clock.watched)
+            looks.append(look)
             found = self._known(states[-1], look)
             if found is None:
-                look = wider(look)
+                self.tell("scoring surfaces over two coordinates")
+                looks[-1] = look = wider(look)
                 found = self._located(states[-1], look)
-            looks.append(look)
             if found is None:
                 break
             accepted.append(found[0])
@@ -183,10 +209,6 @@ class Search:
             states[-1] = self._released(states[-1])
         self._simplify(accepted, states, looks)
         states[-1] = self._released(states[-1])
-        number = self._confirmed(known or states[0], states)
-        unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
-        end = states[number] if number else known or states[0]
-        return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed)
 
     def _confirmed(self, known: State, states: list[State]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
@@ -284,7 +306,7 @@ class Search:
     def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
         """Formulas for a curve, fitted."""
         self._trying([f.text for f in formulas])
-        return fitted_ones(together(lambda written: of_formula(current.part, curve, written), formulas))
+        return fitted_ones(self._each(lambda written: of_formula(current.part, curve, written), formulas))
 
     def _trying(self, titles: list[str]) -> None:
         if titles:
@@ -301,7 +323,7 @@ class Search:
 
     def _tried(self, current: State, some: list[Scored]) -> list[Trial]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
-        found = together(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
+        found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
@@ -319,13 +341,13 @@ class Search:
         def tried(group: list[Candidate]) -> Trial | None:
             return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
 
-        return self._accept(current, fitted_ones(together(tried, likely)), replace(look, looks=len(best)))
+        return self._accept(current, fitted_ones(self._each(tried, likely)), replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
         trials: list[Trial] = []
         self._trying([curve.title for curve in likely])
-        for located in fitted_ones(together(lambda curve: of_curve(current.part, curve), likely)):
+        for located in fitted_ones(self._each(lambda curve: of_curve(current.part, curve), likely)):
             trials.append(located)
             if located.curve is not None:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))
