@@ -32,7 +32,7 @@ TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
 #: one drive.
 SAME = 0.9999
-_SHORTEST = 60  # frames
+_SHORTEST = 20  # frames: of fewer the first part determines no model and the rest tests none
 
 
 def discover(
