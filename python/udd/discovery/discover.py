@@ -43,6 +43,7 @@ def discover(
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
+    state0: Mapping[str, float] | Sequence[Mapping[str, float]] | None = None,
     candidates: Iterable[tuple[str, Expression]] = (),
     budget: float | None = None,
     progress: Callable[[str], None] | None = None,
@@ -69,7 +70,7 @@ def discover(
     measurement : Measurement or sequence of Measurement
     model : Disk, Pendulum or a user's own Model, or a sequence of them
         The known model; its parameters are the start and the priors' means.
-    free, camera, priors, each
+    free, camera, priors, each, state0
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
         Terms to try in a user's own model beside those made of its states: the state in whose equation it
@@ -107,7 +108,7 @@ def discover(
     thin = _thinned(measurement, model)
     measurement = [own.measurement for own in thin]
     measurement = measurement[0] if len(measurement) == 1 else measurement
-    record = record_of(measurement, model)
+    record = record_of(measurement, model, state0)
     one = model if isinstance(model, Model) else next(iter(model))
     given = _given(one, candidates)
     n = len(record.t)

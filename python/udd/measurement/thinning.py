@@ -17,7 +17,7 @@ _MANY, _LEFT = 8000, 4000
 #: Blocks in the time in which the motion changes (its spread over its fast rates), at least.
 _BLOCKS = 2
 _SHORTER = 0.8  # times the block, tried next where the motion bends too much within it
-_FAST = 0.98  # quantile of the rates
+_FAST = 0.9  # quantile of the rates: of frames one in fifty may be odd
 _BIAS = 0.3  # of a mean's noise that the bends of the motion within a block may move it by
 _FULL = 0.8  # of a block's frames, from which on its mean is corrected; below half of them there is none
 _ODD = 6.0  # standard deviations from which on a frame is left out
