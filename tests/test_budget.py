@@ -10,7 +10,7 @@ from test_confirmed import in_air
 from udd.cli.discover import describe
 from udd.discovery import clock
 from udd.errors import FitError
-from udd.measurement.thinning import thinned
+from udd.fitting.thinning import thinned
 
 
 def test_a_search_without_time_says_so_and_claims_nothing(tmp_path):

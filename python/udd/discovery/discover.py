@@ -13,9 +13,9 @@ from udd.effects import Effect
 from udd.effects.own import is_spline
 from udd.errors import FitError
 from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
+from udd.fitting.thinning import Thinned, thinned
 from udd.measurement import Measurement
 from udd.measurement.table import ANGLES
-from udd.measurement.thinning import Thinned, thinned
 from udd.models import Model
 from udd.own_models import OwnModel
 

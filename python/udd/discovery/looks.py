@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,6 +16,7 @@ from .scan import Scan, Scored, scan, strongest_ripple
 from .together import together
 from .trials import price_of
 
+_LEADS = 2.0  # times the gain of the library's best
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
 
 
@@ -53,8 +55,16 @@ class Look:
 
     def strongest(self) -> float:
         """The gain of the best explanation."""
-        singles = [self.nats(s) for s in self.library.scored if s.physical]
-        return max([c.evidence for c in self.curves] + singles, default=0.0)
+        return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
+
+    def curve_leads(self) -> bool:
+        """Whether a curve over one coordinate gains far more than every effect of the library."""
+        best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
+        return best > _LEADS * max(self._known(), 0.0) + 3 * NATS
+
+    def _known(self) -> float:
+        """The gain of the library's best."""
+        return max((self.nats(s) for s in self.library.scored if s.physical), default=-math.inf)
 
 
 def look_around(

@@ -10,8 +10,8 @@ from typing import Any, Literal
 from udd.effects import Effect
 from udd.fitting import Fit
 from udd.fitting.doubts import ran_off
+from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
-from udd.measurement.thinning import Thinned
 from udd.models import Model
 
 from .curves import Curve

@@ -196,7 +196,9 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             look = look_around(states[-1].part, self.given, self.clock.watched)
             looks.append(look)
-            found = self._known(states[-1], look)
+            # A curve that says far more than anything in the library is no bent view of something known.
+            found = self._located(states[-1], look) if look.curve_leads() else None
+            found = found or self._known(states[-1], look)
             if found is None:
                 self.tell("scoring surfaces over two coordinates")
                 looks[-1] = look = wider(look)

@@ -186,7 +186,7 @@ def record_of(
         if np.ptp(known[:, k]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
             known[:, k] = np.unwrap(known[:, k])
     guess = np.column_stack([np.interp(t, t[there], column) for column in known.T])
-    odd = _odd(guess, np.median(sigma[np.ix_(there, places)], axis=0), linked)
+    odd = odd_frames(guess, np.median(sigma[np.ix_(there, places)], axis=0), linked)
     for channel in guess.T:
         channel[odd] = _between(odd, channel)
     film = np.zeros(len(t), dtype=np.int64)
@@ -231,7 +231,7 @@ def _fill(
     return np.append(t[:1], times), np.append(rows[:1], origin), gap[before] <= longest
 
 
-def _odd(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Frames far from the cubic through the two before and the two after, in any channel (noise `sigma`)."""
     n = len(guess)
     odd = np.zeros(n, dtype=bool)

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .table import ANGLES, Measurement
+from udd.measurement import Measurement
+from udd.measurement.table import ANGLES
+
+from .record import odd_frames
 
 Array = NDArray[np.float64]
 
@@ -20,7 +23,7 @@ _SHORTER = 0.8  # times the block, tried next where the motion bends too much wi
 _FAST = 0.9  # quantile of the rates: of frames one in fifty may be odd
 _BIAS = 0.3  # of a mean's noise that the bends of the motion within a block may move it by
 _FULL = 0.8  # of a block's frames, from which on its mean is corrected; below half of them there is none
-_ODD = 6.0  # standard deviations from which on a frame is left out
+_NEXT = 1.5  # steps within which a frame follows another
 _PARTS = 4  # of a block, whose means show the noise
 
 
@@ -103,7 +106,7 @@ def _averaged(measurement: Measurement, t: Array, values: Array, step: float, ev
     length = every * step
     part = np.floor((t - t[0]) / length * _PARTS + 1e-9).astype(np.int64)
     block = part // _PARTS
-    good = _without_odd(block, values)
+    good = ~odd_frames(values, np.array([_noise(x) for x in values.T]), np.diff(t) < _NEXT * step)
     number = int(block[-1]) + 1
     count = np.bincount(block[good], minlength=number)
     kept, full = count >= every / 2, count >= _FULL * every
@@ -155,21 +158,6 @@ def _averaged(measurement: Measurement, t: Array, values: Array, step: float, ev
         meta,
         measurement.names,
     )
-
-
-def _without_odd(block: NDArray[np.int64], values: Array) -> NDArray[np.bool_]:
-    """Frames that lie near the parabola through those of their block, in every column."""
-    edges = np.flatnonzero(np.diff(block)) + 1
-    good = np.ones(len(block), dtype=bool)
-    left = np.empty(values.shape)
-    for own in np.split(np.arange(len(block)), edges):
-        u = np.linspace(-1.0, 1.0, len(own))
-        design = np.stack([np.ones(len(own)), u, u * u], axis=1)[:, : len(own)]
-        left[own] = values[own] - design @ np.linalg.lstsq(design, values[own], rcond=None)[0]
-    for column in left.T:
-        typical = float(np.median(np.abs(column))) / 0.6745
-        good &= np.abs(column) <= _ODD * typical if typical > 0 else True
-    return good
 
 
 def _part_noise(part: NDArray[np.int64], x: Array) -> float:
