@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import udd
-from udd.errors import FitError
 from udd.cli import main
+from udd.errors import FitError
 from udd.fitting import record_of
 
 EQUATIONS = ["s*(y - x)", "x*(r - z) - y", "x*y - b*z"]

@@ -41,7 +41,6 @@ class Case:
             return f"{self.names[0]}, {self.defect}"
         return " + ".join(self.names) or f"null ({self.defect})"
 
-
     def generator(self, seed: int) -> np.random.Generator:
         """What everything of it is drawn from."""
         return np.random.default_rng([seed, zlib.crc32(f"{self.batch} {self.title}".encode()), self.number])

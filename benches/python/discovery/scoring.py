@@ -105,12 +105,23 @@ def _judge(result: Score, drawn: Record, found: udd.Discovery) -> None:
     entered = {_EQUATIONS[slot] for effect in named for slot in effect.slots}
     laws = drawn.world.laws
     result.equations = [bool(set(law.kind.equations) & entered) for law in laws]
-    result.forms = [law.kind.name in {e.name for e in named} for law in laws]
-    result.named = [law.kind.name in result.found for law in laws]
-    result.false = len(_unexplained(found, {law.kind.name for law in laws}))
+    same = [{law.kind.name} | _otherwise(found, law) for law in laws]
+    result.forms = [bool(own & {e.name for e in named}) for own in same]
+    result.named = [bool(own & set(result.found)) for own in same]
+    result.false = len(_unexplained(found, set().union(*same)))
     _measure(result, drawn, found)
     best = oracle(drawn)
     result.oracle_error = [best[h] for h in result.horizons]
+
+
+def _otherwise(found: udd.Discovery, law: Law) -> set[str]:
+    """What else the law may be called: the wheel's ripple is one of the drive at that frequency."""
+    if law.kind.name != "wheel_ripple":
+        return set()
+    turns = found.fit.parameters["W"] / (2 * np.pi * law.shape["r"])
+    line = 0.5 / float(np.ptp(found.measurement.t))
+    ripples = [f.effect for f in found.effects if f.effect.name == "drive_ripple"]
+    return {"drive_ripple"} if any(abs(r.parameters["f"] - turns) < line for r in ripples) else set()
 
 
 def _unexplained(found: udd.Discovery, true: set[str]) -> list[str]:

@@ -29,7 +29,9 @@ def sensed(
     body: str, fault: str, duration: float, rng: np.random.Generator
 ) -> tuple[udd.Measurement, udd.Disk | udd.Pendulum | udd.Model]:
     """A record and the model that is all there is to it."""
-    rate = 1000.0 if fault == "1 kHz" else float(rng.choice([25.0, 50.0] if body == "disk" else [50.0, 100.0]))
+    rate = (
+        1000.0 if fault == "1 kHz" else float(rng.choice([25.0, 50.0] if body == "disk" else [50.0, 100.0]))
+    )
     length = duration / 2 if fault == "1 kHz" else duration
     shake = _support(length, rng) if fault == "support" else None
     motion, known = {"disk": _disk, "pendulum": _pendulum, "cart": _cart}[body](length, shake, rng)
@@ -113,7 +115,14 @@ def _cart(length: float, shake: Motion | None, rng: np.random.Generator) -> tupl
 
 def _solved(rates: Callable[[float, np.ndarray], list[float]], start: list[float], length: float) -> Motion:
     found = solve_ivp(
-        rates, (-0.1, length + 0.1), start, method="DOP853", rtol=1e-9, atol=1e-11, max_step=0.05, dense_output=True
+        rates,
+        (-0.1, length + 0.1),
+        start,
+        method="DOP853",
+        rtol=1e-9,
+        atol=1e-11,
+        max_step=0.05,
+        dense_output=True,
     )
     return lambda t: found.sol(t)[:1].T
 
@@ -125,4 +134,3 @@ def _slow(motion: Motion, t: np.ndarray, length: float, constant: float) -> np.n
     x = motion(fine)
     slow = lfilter([1 - share], [1.0, -share], x, axis=0, zi=share * x[:1])[0]
     return np.column_stack([np.interp(t, fine, column) for column in slow.T])
-

@@ -31,7 +31,10 @@ def add(commands: Any) -> None:
     )
     add_input(parser, several=True)
     parser.add_argument(
-        "--budget", type=float, metavar="SECONDS", help="end the search after so long, with what it has by then"
+        "--budget",
+        type=float,
+        metavar="SECONDS",
+        help="end the search after so long, with what it has by then",
     )
     parser.add_argument("--report", type=Path, metavar="HTML", help="page to write, pictures first")
 

@@ -36,7 +36,8 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         type=Path,
         metavar="JSON",
         help='a model of your own: {"states": ["x", "v"], "equations": {"x": "v", "v": "-k*x"}, '
-        '"parameters": {"k": 1.0}, "angles": []}; "state0": {"v": 0.1} says where states start that are not seen',
+        '"parameters": {"k": 1.0}, "angles": []}; "state0": {"v": 0.1} beside '
+        "them says where a state starts that is not seen",
     )
     add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
     add_pendulum(parser)

@@ -21,10 +21,10 @@ from .scan import Scored
 
 #: What bears an effect out, of data that were not fitted.
 Witness = Literal["held", "fitted", "halves"]
-#: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; the
-#: held-out data do not bear it out; another form that fits better fails; or it passed all tests but free runs
-#: over the held-out data do not get better beyond doubt.
-Failing = Literal["chance", "part", "held", "form", "unconfirmed"]
+#: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; a
+#: slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that fits
+#: better fails; or it passed all tests but free runs over the held-out data do not get better beyond doubt.
+Failing = Literal["chance", "drift", "part", "held", "form", "unconfirmed"]
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
@@ -141,10 +141,11 @@ class Refused:
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
-    why : {"chance", "part", "held", "form", "unconfirmed"}
-        Why it is not added: chance does as much, in all data or in the part that effects are sought in; the
-        held-out data do not bear it out; another form that fits clearly better does not pass; or it passed,
-        but free runs over the held-out data do not get better beyond doubt.
+    why : {"chance", "drift", "part", "held", "form", "unconfirmed"}
+        Why it is not added: chance does as much, in all data or in the part that effects are sought in; a
+        slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that fits
+        clearly better does not pass; or it passed, but free runs over the held-out data do not get better
+        beyond doubt.
     """
 
     effect: Effect

@@ -21,6 +21,7 @@ from .bearing import ALPHA, Pair, borne_out, same_level
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
 from .curves import NATS, Curve
+from .drift import drift_gain
 from .formulas import Formula, formulas_for
 from .heldout import (
     Errors,
@@ -43,6 +44,7 @@ To = TypeVar("To")
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
+_DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion held, may be all there is
 _TRIED = 6  # of the best candidates, fitted in full
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
@@ -118,6 +120,8 @@ class Judged:
         Of all data.
     chi2, p, ratio, witness
         As of a :class:`Step`; a trial that chance explains is not asked for a witness.
+    drifts : bool
+        Whether a slow drift of the sensor's zero would explain more.
     """
 
     whole: Fit
@@ -125,6 +129,7 @@ class Judged:
     p: float
     ratio: Ratio
     witness: Witness | None
+    drifts: bool = False
 
 
 @dataclass(frozen=True)
@@ -268,6 +273,8 @@ class Search:
             why: Failing = "form"
             if judged.p >= ALPHA:
                 why = "chance"
+            elif judged.drifts:
+                why = "drift"
             elif trial.candidates[0] not in shown:
                 why = "part"
             elif judged.witness is None or self._worse(base.errors, errors):
@@ -430,12 +437,14 @@ class Search:
             fall, p = _chance(pair, trial, look)
             ratio: Ratio = (math.nan, math.nan, math.nan)
             witness: Witness | None = None
-            if p < ALPHA:
+            before, after = pair
+            drifts = _DRIFT * (before.chi2 - after.chi2) / max(before.scatter, 1.0) < drift_gain(before)
+            if p < ALPHA and not drifts:
                 part, rest = (current.part, trial.fit), self.record.part(self.held)
                 ratio, witness = borne_out(part, pair, rest, trial.names, self.unit)
         except FitError:
             return None
-        return Judged(whole.fit, fall, p, ratio, witness)
+        return Judged(whole.fit, fall, p, ratio, witness, drifts)
 
     def _errors_or_none(self, fitted: Fit) -> Errors | None:
         """None where the model cannot be run over the held-out frames."""

@@ -82,13 +82,17 @@ def checked_start(model: OwnModel | None, state0: object) -> dict[str, float]:
         They are no numbers of states of a model of the user's own.
     """
     if model is None:
-        raise FitError("starts can be given for a model of your own; a disk's and a pendulum's show themselves")
+        raise FitError(
+            "starts can be given for a model of your own; a disk's and a pendulum's show themselves"
+        )
     if not isinstance(state0, Mapping):
         raise FitError(f"state0 must be a table of states and their starts, not {state0!r}")
     result = {}
     for name, value in state0.items():
         if name not in model.state_names:
-            raise FitError(f"a start is given for {name!r}, but the states are {', '.join(model.state_names)}")
+            raise FitError(
+                f"a start is given for {name!r}, but the states are {', '.join(model.state_names)}"
+            )
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
             raise FitError(f"the start of {name} must be a finite number, not {value!r}")
         result[str(name)] = float(value)

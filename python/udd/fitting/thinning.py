@@ -101,7 +101,9 @@ def _noise(x: Array) -> float:
     return float(np.median(np.abs(np.diff(x, 5)))) / 0.6745 / np.sqrt(252.0)
 
 
-def _averaged(measurement: Measurement, t: Array, values: Array, step: float, every: int) -> Measurement | None:
+def _averaged(
+    measurement: Measurement, t: Array, values: Array, step: float, every: int
+) -> Measurement | None:
     """Means over blocks of so many frames; None where blocks are too long for how the motion bends."""
     length = every * step
     part = np.floor((t - t[0]) / length * _PARTS + 1e-9).astype(np.int64)

@@ -76,8 +76,8 @@ def verdict(discovery: Any) -> str:
     if discovery.stopped is None:
         return said
     return (
-        f"{said} The search ended after {discovery.budget:.3g} s, as asked, while it was {discovery.stopped}: "
-        "what else may be missing was not tried."
+        f"{said} The search ended after {discovery.budget:.3g} s, as asked, while "
+        f"{discovery.stopped}; what else may be missing was not tried."
     )
 
 
@@ -126,6 +126,7 @@ def refused(discovery: Any) -> list[str]:
         why = {
             "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
             f"as by chance with a probability of {probability(near.p)}",
+            "drift": "a slow drift of the sensor's zero would explain more",
             "part": "the part in which effects are sought does not show it beyond chance",
             "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
             "held": "the frames that were held back do not bear it out",
