@@ -143,9 +143,9 @@ class Refused:
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
     why : {"chance", "drift", "part", "held", "form", "unconfirmed"}
         Why it is not added: chance does as much, in all data or in the part that effects are sought in; a
-        slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that fits
-        clearly better does not pass; or it passed, but free runs over the held-out data do not get better
-        beyond doubt.
+        slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that
+        fits clearly better does not pass; or it passed, but free runs over the held-out data do not get
+        better beyond doubt.
     """
 
     effect: Effect
