@@ -202,12 +202,13 @@ class Search:
             look = look_around(states[-1].part, self.given, self.clock.watched)
             looks.append(look)
             # A curve that says far more than anything in the library is no bent view of something known.
-            found = self._located(states[-1], look) if look.curve_leads() else None
+            tried = look.curves if look.curve_leads() else []
+            found = self._located(states[-1], look) if tried else None
             found = found or self._known(states[-1], look)
             if found is None:
                 self.tell("scoring surfaces over two coordinates")
                 looks[-1] = look = wider(look)
-                found = self._located(states[-1], look)
+                found = self._located(states[-1], look, tried)
             if found is None:
                 break
             accepted.append(found[0])
@@ -306,11 +307,17 @@ class Search:
             or self._group(current, look, 3)
         )
 
-    def _located(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best curve or surface that passes."""
+    def _located(self, current: State, look: Look, tried: Sequence[Curve] = ()) -> tuple[Step, State] | None:
+        """The best curve or surface that passes; of some those that would have been chosen were tried."""
         faults = look.fit.faults
-        shown = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
-        return self._accept(current, self._curves(current, states_first(shown)[:_CURVES]), look)
+
+        def best(curves: Sequence[Curve]) -> list[Curve]:
+            shown = [c for c in curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+            return states_first(shown)[:_CURVES]
+
+        known = [c.name for c in best(tried)]
+        likely = [c for c in best(look.curves) if c.name not in known]
+        return self._accept(current, self._curves(current, likely), look)
 
     def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
         """Formulas for a curve, fitted."""

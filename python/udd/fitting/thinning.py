@@ -98,7 +98,7 @@ def _change(t: Array, values: Array, step: float) -> float:
 
 def _noise(x: Array) -> float:
     """Standard deviation of a column's noise, from fifth differences: those of a motion are small."""
-    return float(np.median(np.abs(np.diff(x, 5)))) / 0.6745 / np.sqrt(252.0)
+    return float(np.median(np.abs(np.diff(x, 5))) / 0.6745 / np.sqrt(252.0))
 
 
 def _averaged(
