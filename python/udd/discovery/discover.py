@@ -182,8 +182,8 @@ def _thinned(
     measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
 ) -> list[Thinned]:
     """The measurements, those that were sampled more often than their motion needs by block averages."""
-    some = [measurement] if isinstance(measurement, Measurement) else list(measurement)
-    if not all(isinstance(own, Measurement) for own in some):
+    some = measurement if isinstance(measurement, (list, tuple)) else [measurement]
+    if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
     one = model if isinstance(model, Model) else next(iter(model))
     angles = one.angles if isinstance(one, OwnModel) else ANGLES

@@ -258,7 +258,7 @@ class Discovery:
             )
         said += [
             f"The record's {own.frames} frames were averaged over {own.every} at a time, to "
-            f"{len(own.measurement)}: the motion changes so slowly that nothing is lost by it."
+            f"{int(own.measurement.seen.sum())}: the motion changes so slowly that nothing is lost by it."
             for own in self.thinned
             if own.every > 1
         ]

@@ -143,17 +143,25 @@ def _averaged(
     bent = np.zeros(number, dtype=bool)
     bent[inside] = True
     kept &= bent
+    # The model's time counts from the first row, which stays where it was, with nothing seen in it.
+    rest = np.flatnonzero(kept)
+    if not len(rest):
+        return None
+    rows = np.concatenate([rest[:1], rest])
     rho = measurement.rho
     if rho is not None:
-        rho = np.column_stack([means(own) for own in rho[measurement.seen].T])[kept]
+        rho = np.column_stack([means(own) for own in rho[measurement.seen].T])[rows]
     meta = dict(measurement.meta)
     if isinstance(meta.get("fps"), (int, float)):
         meta["fps"] = meta["fps"] / every
+    times = np.concatenate([measurement.t[:1], times[rest]])
+    mean = np.column_stack(columns)[rows]
+    mean[0] = np.nan
     # What a disk's or a pendulum's record does not state is known of such records.
-    sigma = np.column_stack(sigmas)[kept]
+    sigma = np.column_stack(sigmas)[rows]
     return Measurement(
-        times[kept],
-        np.column_stack(columns)[kept],
+        times,
+        mean,
         None if measurement.sigma is None and measurement.kind != "own" else sigma,
         rho,
         None,
