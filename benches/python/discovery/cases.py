@@ -22,6 +22,7 @@ _ROUNDS = 8  # of bringing a law to its multiple of the limit, from another star
 _CLOSE = 0.1  # how near the multiple must come where it is prescribed
 _NEAR = 0.3  # and where it was drawn: what it came to is kept beside it
 _DRAWS = 40
+_EASED = 8  # draws after which strong laws are drawn weaker, within their range
 
 
 @dataclass(frozen=True)
@@ -95,14 +96,17 @@ def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
     rng = case.generator(seed)
     t = np.arange(0, TRAIN * duration, 1 / FPS)
     kinds = [(LIBRARY | FOREIGN | ASTRAY)[name] for name in case.names]
-    for _ in range(_DRAWS):
+    for number in range(_DRAWS):
         drive = rng.uniform(*DRIVES)
         known = udd.Disk(drive)
         spread = 1 + rng.normal(0, [0.02, 0.1, 0.1, 0.1])
         plain = known.parameters
         device = Device(*(f * plain[name] for f, name in zip(spread, ("W", "k0", "k1", "k2"), strict=True)))
         camera = _camera(case, rng, precise)
-        wanted = np.exp(rng.uniform(*np.log(case.multiples), len(kinds)))
+        low, high = case.multiples
+        if case.batch == "strong":  # where the disk always leaves or rests, weaker laws of the range
+            high = low * (high / low) ** (1 - max(number - _EASED, 0) / _DRAWS)
+        wanted = np.exp(rng.uniform(np.log(low), np.log(high), len(kinds)))
         close = _CLOSE if case.multiples[0] == case.multiples[1] else _NEAR
         if case.batch == "strong":
             made = _at_strength(World(device), kinds[0], float(wanted[0]), t, duration, rng)
