@@ -58,14 +58,15 @@ def discover(
     falls further by more than chance would once they are fitted too; where they hold too little of the motion
     that shows it, chi2 must so fall further with each half of the record, in alternate stretches, than with
     the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
-    goes on; effects that do not pass alone are tried in twos and threes; a curve that gains far more than the
-    whole library comes before it. What a slow drift of the sensor's zero explains about as well is no effect.
-    Records of more than 8000 frames are averaged in blocks as far as their motion and noise allow. Forms that
-    the data cannot tell apart are named. Where no effect passes but the model does not explain the data (chi2
-    per degree of freedom above 2.5, or free runs that miss by the size of the motion), an effect is present
-    that these data do not name; what comes nearest is listed with its held-out error, but not added. Nor is
-    what passes all this while free runs over the last 40 % do not get better beyond doubt, where they are not
-    as good as noise allows already: that fits the first part, and is not confirmed.
+    goes on; effects that do not pass alone are tried in twos and threes; after a first effect a curve that
+    gains far more than the whole library comes before it. What a slow drift of the sensor's zero explains
+    about as well is no effect. Records of more than 8000 frames are averaged in blocks as far as their motion
+    and noise allow. Forms that the data cannot tell apart are named. Where no effect passes but the model
+    does not explain the data (chi2 per degree of freedom above 2.5, or free runs that miss by the size of the
+    motion), an effect is present that these data do not name; what comes nearest is listed with its held-out
+    error, but not added. Nor is what passes all this while free runs over the last 40 % do not get better
+    beyond doubt, where they are not as good as noise allows already: that fits the first part, and is not
+    confirmed.
 
     Parameters
     ----------

@@ -201,8 +201,9 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             look = look_around(states[-1].part, self.given, self.clock.watched)
             looks.append(look)
-            # A curve that says far more than anything in the library is no bent view of something known.
-            tried = look.curves if look.curve_leads() else []
+            # What the library has been asked for already, and what a curve still says far more of than
+            # anything in it, is no bent view of something known.
+            tried = look.curves if accepted and look.curve_leads() else []
             found = self._located(states[-1], look) if tried else None
             found = found or self._known(states[-1], look)
             if found is None:
