@@ -183,7 +183,9 @@ def _thinned(
     measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
 ) -> list[Thinned]:
     """The measurements, those that were sampled more often than their motion needs by block averages."""
-    some = measurement if isinstance(measurement, (list, tuple)) else [measurement]
+    some: list[Measurement] = [measurement] if isinstance(measurement, Measurement) else []
+    if isinstance(measurement, (list, tuple)):
+        some = list(measurement)
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
     one = model if isinstance(model, Model) else next(iter(model))
