@@ -43,13 +43,15 @@ def test_a_search_takes_a_fit_that_is_near_its_minimum():
     measured = drifting(0.0)
     done = fit_record(measured, record_of(measured), KNOWN, search=True)
     unfinished = replace(done, converged=False)
-    assert annealing._nearly(unfinished).converged
+    assert annealing._nearly(unfinished, annealing.STEPS).converged
     # Of a fit that is asked for itself nothing less than the minimum will do.
     alone = replace(unfinished, problem=replace(done.problem, likeliest=True))
-    assert annealing._nearly(alone) is alone
+    assert annealing._nearly(alone, annealing.STEPS) is alone
+    # Nor of a formula, whose constants may trade for each other for ever.
+    assert annealing._nearly(unfinished, annealing.FEW) is unfinished
     far = replace(done.point.bare(), states=done.states + np.array([0.0, 0.3]))
     away = replace(unfinished, point=far)
-    assert annealing._nearly(away).chi2 < 1.01 * done.chi2  # or a few steps bring it there
+    assert annealing._nearly(away, annealing.STEPS).chi2 < 1.01 * done.chi2  # or a few steps bring it there
 
 
 @pytest.mark.parametrize(("evidence", "leads"), [(400.0, True), (200.0, False)])

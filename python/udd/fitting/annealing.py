@@ -64,17 +64,18 @@ def rough(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = STEPS
 ) -> Fit:
     """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
-    result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)))
+    result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)), iterations)
     return remembering(result) if problem.likeliest and result.converged else result
 
 
-def _nearly(fitted: Fit) -> Fit:
+def _nearly(fitted: Fit, steps: int) -> Fit:
     """A fit of a search that came near its minimum, which is enough to test it, or else as it was.
 
     Along what the data hardly determine, like a frequency beside its phase, a law with kinks gets there in
-    ever smaller steps. To turn a right model away for it would make room for a wrong one.
+    ever smaller steps. To turn a right model away for it would make room for a wrong one. What is given few
+    `steps`, because it may have no end, is taken at its word.
     """
-    if fitted.converged or fitted.problem.likeliest:
+    if fitted.converged or fitted.problem.likeliest or steps < STEPS:
         return fitted
     near = solve(fitted.measurements, fitted.problem, fitted.point, _LITTLE, ROUGH)
     return near if near.converged else fitted
@@ -128,7 +129,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     own = fitted.problem.diffusion
     for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
         problem = fitted.problem.held(diffusion)
-        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps))
+        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps), steps)
         if fitted.converged:
             break
     return fitted
