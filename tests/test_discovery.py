@@ -246,9 +246,9 @@ def test_what_comes_nearest_is_told_but_not_added():
 
 
 def test_a_short_record_is_refused():
-    t = np.arange(40) * 0.04
+    t = np.arange(15) * 0.04
     measured = udd.Measurement(t, np.column_stack([0.01 * np.sin(t), 0.01 * np.cos(t), t]))
-    with pytest.raises(FitError, match="at least 60"):
+    with pytest.raises(FitError, match="at least 20"):
         udd.discover(measured, udd.Disk(0.04))
 
 

@@ -5,11 +5,13 @@
 Batches: "three" (each effect of the library at three times its detection limit), "library" (at 1 to 10
 times), "foreign" (laws in no library, 3 to 10 times), "strong" (each of these, 0.3 to 3 times gravity's pull
 on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.), "pairs" (two at once, 3 to
-10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "films" (no
-effect, by way of a film and the tracker), "machines" (simulated twins of real pendulums, sliders and the
-like, each under three sets of options). The detection limit is the amplitude at which chi2 is expected to
-fall by what it takes to be accepted. Drives, starts, devices, cameras, laws, shapes and sizes are drawn
-from the seed, which was fixed before the first run. The generator shares no code with udd.
+10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "sensors"
+(no effect: a disk, a pendulum and a cart, whose sensors have steps, are slow, hum, drift, are read 1000 times
+a second, or whose support moves), "films" (no effect, by way of a film and the tracker), "machines"
+(simulated twins of real pendulums, sliders and the like, each under three sets of options). The limit is the
+amplitude at which chi2 is expected to fall by what it takes to be accepted. Drives, starts, devices, cameras,
+laws, shapes and sizes are drawn from the seed, which was fixed before the first run. The generator shares no
+code with udd.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from filmed import filmed
 from information import information
 from laws import ASTRAY, FOREIGN, LIBRARY, Kind, Law, Look
 from motion import Device, Run, World, staying
+from sensors import BODIES, FAULTS
 from units import TRAIN, assumed, threshold
 
 import udd
@@ -21,6 +22,7 @@ _ROUNDS = 8  # of bringing a law to its multiple of the limit, from another star
 _CLOSE = 0.1  # how near the multiple must come where it is prescribed
 _NEAR = 0.3  # and where it was drawn: what it came to is kept beside it
 _DRAWS = 40
+_EASED = 8  # draws after which strong laws are drawn weaker, within their range
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,13 @@ class Case:
     @property
     def title(self) -> str:
         """How it is called in a table."""
+        if self.batch == "sensors":
+            return f"{self.names[0]}, {self.defect}"
         return " + ".join(self.names) or f"null ({self.defect})"
+
+    def generator(self, seed: int) -> np.random.Generator:
+        """What everything of it is drawn from."""
+        return np.random.default_rng([seed, zlib.crc32(f"{self.batch} {self.title}".encode()), self.number])
 
 
 @dataclass(frozen=True)
@@ -51,7 +59,7 @@ class Record:
     measurement: udd.Measurement
 
 
-BATCHES = ("three", "library", "foreign", "strong", "pairs", "nulls", "films")
+BATCHES = ("three", "library", "foreign", "strong", "pairs", "nulls", "sensors", "films")
 _STRONG = (0.3, 3.0)  # times gravity's pull on the motion, see `_strength`
 _RESTING = ("stribeck",)  # it brakes slow disks alone: as strong as that on average it holds them at rest
 _ROUNDS_STRONG = 3
@@ -77,23 +85,28 @@ def cases(batch: str, records: int) -> Iterator[Case]:
                 yield Case(batch, tuple(rng.choice(names, 2, replace=False).tolist()), number, (3.0, 10.0))
         elif batch == "nulls":
             yield from (Case(batch, (), number, defect=defect) for defect in ("all", *ALONE))
+        elif batch == "sensors":
+            yield from (Case(batch, (body,), number, defect=fault) for body in BODIES for fault in FAULTS)
         elif batch == "films":
             yield Case(batch, (), number, defect="film")
 
 
 def draw(case: Case, seed: int, duration: float, *, precise: bool) -> Record:
     """The record of a case; the same for the same seed."""
-    rng = np.random.default_rng([seed, zlib.crc32(f"{case.batch} {case.title}".encode()), case.number])
+    rng = case.generator(seed)
     t = np.arange(0, TRAIN * duration, 1 / FPS)
     kinds = [(LIBRARY | FOREIGN | ASTRAY)[name] for name in case.names]
-    for _ in range(_DRAWS):
+    for number in range(_DRAWS):
         drive = rng.uniform(*DRIVES)
         known = udd.Disk(drive)
         spread = 1 + rng.normal(0, [0.02, 0.1, 0.1, 0.1])
         plain = known.parameters
         device = Device(*(f * plain[name] for f, name in zip(spread, ("W", "k0", "k1", "k2"), strict=True)))
         camera = _camera(case, rng, precise)
-        wanted = np.exp(rng.uniform(*np.log(case.multiples), len(kinds)))
+        low, high = case.multiples
+        if case.batch == "strong":  # where the disk always leaves or rests, weaker laws of the range
+            high = low * (high / low) ** (1 - max(number - _EASED, 0) / _DRAWS)
+        wanted = np.exp(rng.uniform(np.log(low), np.log(high), len(kinds)))
         close = _CLOSE if case.multiples[0] == case.multiples[1] else _NEAR
         if case.batch == "strong":
             made = _at_strength(World(device), kinds[0], float(wanted[0]), t, duration, rng)

@@ -34,7 +34,7 @@ def report(scores: Iterable[Score]) -> str:
         rows = [one for one in everything if not one.error]
         parts.append(f"\n{batch}: {len(everything)} records, {len(everything) - len(rows)} failed")
         if rows:
-            parts.append(_nulls(rows) if batch in ("nulls", "films") else _effects(rows))
+            parts.append(_nulls(rows) if batch in ("nulls", "sensors", "films") else _effects(rows))
             parts.append(_time(rows))
     return "\n".join(parts)
 

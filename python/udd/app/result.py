@@ -40,7 +40,7 @@ def of(found: Any) -> dict[str, Any]:
         "errors": [{key: text_of(text) for key, text in row.items()} for row in tables.errors(found)],
         "evidence": [
             {"title": s.candidate.title, "chi2": s.chi2 if math.isfinite(s.chi2) else None}
-            for s in found.scans[0][:8]
+            for s in (found.scans[0][:8] if found.scans else [])
         ],
         "explore": _explore(found),
     }

@@ -30,6 +30,12 @@ def add(commands: Any) -> None:
         "Find the effect that the model lacks, from a film or a measurement, or from several jointly.",
     )
     add_input(parser, several=True)
+    parser.add_argument(
+        "--budget",
+        type=float,
+        metavar="SECONDS",
+        help="end the search after so long, with what it has by then",
+    )
     parser.add_argument("--report", type=Path, metavar="HTML", help="page to write, pictures first")
 
 
@@ -48,7 +54,7 @@ def run(args: argparse.Namespace) -> Answer:
             "matplotlib.figure", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_agg"
         )
     with telling() as tell:
-        found = discover(*given.measured, progress=tell, **options(args))
+        found = discover(*given.measured, budget=args.budget, progress=tell, **options(args))
         if args.report is not None:
             tell("writing the report")
             command = shlex.join(["udd", *sys.argv[1:]])

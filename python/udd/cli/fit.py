@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from .answer import Answer, telling
-from .inputs import add_input, check_early, inputs_of
+from .inputs import add_input, check_early, inputs_of, start_of
 from .options import new
 
 
@@ -43,6 +43,7 @@ def options(args: argparse.Namespace) -> dict[str, Any]:
         "free": _names(args.free),
         "camera": not args.no_camera,
         "each": _names(getattr(args, "each", None)),
+        "state0": start_of(args),
     }
 
 

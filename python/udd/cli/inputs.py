@@ -36,7 +36,8 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         type=Path,
         metavar="JSON",
         help='a model of your own: {"states": ["x", "v"], "equations": {"x": "v", "v": "-k*x"}, '
-        '"parameters": {"k": 1.0}, "angles": []}',
+        '"parameters": {"k": 1.0}, "angles": []}; "state0": {"v": 0.1} beside '
+        "them says where a state starts that is not seen",
     )
     add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
     add_pendulum(parser)
@@ -183,12 +184,24 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
 
 def own_model(args: argparse.Namespace) -> Model:
     """The user's own model, from its file."""
-    import json
-
     from udd.sweeping.models_json import model_from_dict
 
     if args.pendulum is not None or args.W is not None:
         raise UddError("--model says everything of the model: --pendulum and --W do not apply")
+    data = _own(args)
+    data.pop("state0", None)
+    return model_from_dict({"kind": "own"} | data)
+
+
+def start_of(args: argparse.Namespace) -> Any:
+    """Where hidden states start, as the file of the user's own model says; None where it does not."""
+    return None if args.model is None else _own(args).get("state0")
+
+
+def _own(args: argparse.Namespace) -> dict[str, Any]:
+    """What the file of the user's own model holds."""
+    import json
+
     try:
         data = json.loads(args.model.read_text(encoding="utf-8"))
     except OSError as error:
@@ -197,7 +210,7 @@ def own_model(args: argparse.Namespace) -> Model:
         raise UddError(f"{args.model} is not JSON: {error}") from None
     if not isinstance(data, dict):
         raise UddError(f"{args.model} must hold a table with states, equations and parameters")
-    return model_from_dict({"kind": "own"} | data)
+    return data
 
 
 def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:

@@ -13,11 +13,14 @@ from udd.effects import Effect
 from udd.effects.own import is_spline
 from udd.errors import FitError
 from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
+from udd.fitting.thinning import Thinned, thinned
 from udd.measurement import Measurement
+from udd.measurement.table import ANGLES
 from udd.models import Model
 from udd.own_models import OwnModel
 
 from .candidates import Candidate
+from .clock import Clock, TimeUpError
 from .heldout import misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
@@ -29,7 +32,7 @@ TRAIN = 0.6
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
 #: one drive.
 SAME = 0.9999
-_SHORTEST = 60  # frames
+_SHORTEST = 20  # frames: of fewer the first part determines no model and the rest tests none
 
 
 def discover(
@@ -40,7 +43,9 @@ def discover(
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
+    state0: Mapping[str, float] | Sequence[Mapping[str, float]] | None = None,
     candidates: Iterable[tuple[str, Expression]] = (),
+    budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Discovery:
     """Find the effect that a model lacks.
@@ -53,25 +58,30 @@ def discover(
     falls further by more than chance would once they are fitted too; where they hold too little of the motion
     that shows it, chi2 must so fall further with each half of the record, in alternate stretches, than with
     the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
-    goes on; effects that do not pass alone are tried in twos and threes. Two effects at once compete
-    with one, and with formulas. Between forms that explain the first part about as well all data decide, and
-    what each foretells of the rest. Those that the data cannot tell apart are named. Where no effect passes
-    but the model does not explain the data (chi2 per degree of freedom above 2.5, or free runs that miss by
-    the size of the motion), an effect is present that these data do not name; what comes nearest is listed
-    with its held-out error, but not added. Nor is what passes all this while free runs over the last 40 % do
-    not get better beyond doubt, where they are not as good as noise allows already: that fits the first part,
-    and is not confirmed.
+    goes on; effects that do not pass alone are tried in twos and threes; after a first effect a curve that
+    gains far more than the whole library comes before it. Two effects at once compete with one, and with
+    formulas. Between forms that explain the first part about as well all data decide, and what each foretells
+    of the rest; those that the data cannot tell apart are named. What a slow drift of the sensor's zero
+    explains about as well is no effect. Records of more than 8000 frames are averaged in blocks as far as
+    their motion and noise allow. Where no effect passes but the model does not explain the data (chi2 per
+    degree of freedom above 2.5, or free runs that miss by the size of the motion), an effect is present that
+    these data do not name; what comes nearest is listed with its held-out error, but not added. Nor is what
+    passes all this while free runs over the last 40 % do not get better beyond doubt, where they are not as
+    good as noise allows already: that fits the first part, and is not confirmed.
 
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
     model : Disk, Pendulum or a user's own Model, or a sequence of them
         The known model; its parameters are the start and the priors' means.
-    free, camera, priors, each
+    free, camera, priors, each, state0
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
         Terms to try in a user's own model beside those made of its states: the state in whose equation it
         stands and the term, as in ``("v", "abs(v)*v")``.
+    budget : float, optional
+        Seconds after which the search ends with what it has, which the verdict then says. The known model's
+        fit, which comes first, and the last one are made in any case.
     progress : callable, optional
         Told in a few words what is being done.
 
@@ -97,9 +107,12 @@ def discover(
     >>> [effect.title for effect in found.effects]
     ['quadratic drag']
     """
-    tell = progress or (lambda _text: None)
+    clock = Clock(budget, progress or (lambda _text: None))
     free = free if free is None or isinstance(free, str) else list(free)
-    record = record_of(measurement, model)
+    thin = _thinned(measurement, model)
+    measurement = [own.measurement for own in thin]
+    measurement = measurement[0] if len(measurement) == 1 else measurement
+    record = record_of(measurement, model, state0)
     one = model if isinstance(model, Model) else next(iter(model))
     given = _given(one, candidates)
     n = len(record.t)
@@ -108,7 +121,7 @@ def discover(
     train = record.first(TRAIN)
     options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
 
-    tell("fitting the known model")
+    clock.finish("fitting the known model")
     _beside.importing("scipy.stats", "pyoperon.sklearn")
 
     def fits() -> tuple[Fit, ...]:
@@ -118,12 +131,12 @@ def discover(
         )
 
     base, baseline = checked_units(measurement, model, options, fits)
-    search = Search(record, ~train, tell, pace(base), given, base.problem.free)
+    search = Search(record, ~train, clock, pace(base), given, base.problem.free)
     before = search.errors(base)
     known = State(base, baseline, before)
     begin = _begin(search, known)
     end = search.run(begin, known)
-    tell("fitting the model as found")
+    clock.finish("fitting the model as found")
     final = refit(end.whole)
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
@@ -131,15 +144,21 @@ def discover(
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed
-    if unexplained and not refused:
-        tell("trying what comes nearest")
-        refused = search.refused(begin, end.looks[-1])
+    stopped = end.stopped
+    if unexplained and not refused and end.looks:
+        try:
+            clock.tell("trying what comes nearest")
+            refused = search.refused(begin, end.looks[-1])
+        except TimeUpError as up:
+            stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
     elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
+    elif found:
+        verdict = "effect identified"
     else:
-        verdict = "effect identified" if found else "nothing missing"
+        verdict = "search not finished" if stopped else "nothing missing"
     return Discovery(
         verdict=verdict,
         baseline=(baseline if found else final).put_away(),
@@ -155,7 +174,24 @@ def discover(
         split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=end.part.put_away(),
         refused=refused,
+        thinned=thin if any(own.every > 1 for own in thin) else [],
+        budget=clock.budget if stopped else None,
+        stopped=stopped,
     )
+
+
+def _thinned(
+    measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
+) -> list[Thinned]:
+    """The measurements, those that were sampled more often than their motion needs by block averages."""
+    some: list[Measurement] = [measurement] if isinstance(measurement, Measurement) else []
+    if isinstance(measurement, (list, tuple)):
+        some = list(measurement)
+    if not some or not all(isinstance(own, Measurement) for own in some):
+        record_of(measurement, model)  # which says what is wrong
+    one = model if isinstance(model, Model) else next(iter(model))
+    angles = one.angles if isinstance(one, OwnModel) else ANGLES
+    return [thinned(own, angles) for own in some]
 
 
 def _begin(search: Search, known: State) -> State:

@@ -31,6 +31,7 @@ _AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
 _UNITS = 24  # that the part which is fitted should at least be long
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
+_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record's frames are cut into
 _FLOOR = 1.5  # times the noise floor that an error may be and still be noise
 _LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
@@ -146,7 +147,8 @@ def held_out_errors(
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    blocks = stretches(record, _BLOCK * unit)[starts]
+    own_blocks = _blocks(record, held, _BLOCK * unit)
+    blocks = own_blocks[starts]
     low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
     return Errors(
         unit={"disk": "m", "pendulum": "rad", "own": "spread"}[kind],
@@ -158,7 +160,7 @@ def held_out_errors(
         samples=samples,
         blocks=blocks,
         run=_run(fit, record, held),
-        run_blocks=stretches(record, _BLOCK * unit)[held],
+        run_blocks=own_blocks[held],
     )
 
 
@@ -167,6 +169,15 @@ def stretches(record: Record, length: float) -> NDArray[np.int64]:
     own = ((record.t - record.t.min()) // length).astype(np.int64)
     result: NDArray[np.int64] = own + record.film * (int(own.max()) + 1)
     return result
+
+
+def _blocks(record: Record, held: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
+    """Stretches to resample; shorter ones where the frames held out would be too few stretches for it."""
+    result = stretches(record, length)
+    if len(np.unique(result[held])) >= _FEWEST:
+        return result
+    spans = [np.ptp(record.t[held & (record.film == film)]) for film in range(len(record.origins))]
+    return stretches(record, float(max(spans)) / _SHORT)
 
 
 def comparison_horizon(errors: Errors) -> float:
@@ -397,7 +408,7 @@ def _interval(
 ) -> tuple[float, float]:
     """95 % interval of a statistic of columns (n, c), over resampled blocks of them."""
     numbers, counts = np.unique(blocks, return_counts=True)
-    if len(numbers) < 3:
+    if len(numbers) < _FEWEST:
         return float("nan"), float("nan")
 
     from scipy.stats import bootstrap  # takes half a second to import

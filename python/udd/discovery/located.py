@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -100,19 +101,23 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     FitError
         The curve cannot be added to a model, or the fit does not converge with it.
     """
-    curve, start = refined(curve, fit), fit
+    curve, start, settled = refined(curve, fit), fit, False
     for _ in range(_ROUNDS):
         effect, at = curve_effect(curve, name), curve.coefficients
         problem, point = widened(fit, [effect], start)
         current = tighten(fit.measurements, problem, point, problem.schedule[1:])
         curve, start = rescored(curve, current, at), current
         moved = curve.coefficients - at
-        if moved @ curve.score.information @ moved / 2 < _STILL:
+        settled = bool(moved @ curve.score.information @ moved / 2 < _STILL)
+        if settled:
             break
     # What the model holds; the next move would be within the last one.
     curve, score = replace(curve, coefficients=at), curve.score
     gain = float(score.gradient @ at - at @ score.information @ at / 2)
-    return CurveFit(current, distinct(curve, current), gain - curve.evidence)
+    price = gain - curve.evidence
+    if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
+        price = max(price, curve.df * math.log(fit.observations) / 2)
+    return CurveFit(current, distinct(curve, current), price)
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from udd.fitting import Fit, loosened
@@ -15,6 +16,7 @@ from .scan import Scan, Scored, scan, strongest_ripple
 from .together import together
 from .trials import price_of
 
+_LEADS = 2.0  # times the gain of the library's best
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
 
 
@@ -53,16 +55,28 @@ class Look:
 
     def strongest(self) -> float:
         """The gain of the best explanation."""
-        singles = [self.nats(s) for s in self.library.scored if s.physical]
-        return max([c.evidence for c in self.curves] + singles, default=0.0)
+        return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
+
+    def curve_leads(self) -> bool:
+        """Whether a curve over one coordinate gains far more than every effect of the library."""
+        best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
+        return best > _LEADS * max(self._known(), 0.0) + 3 * NATS
+
+    def _known(self) -> float:
+        """The gain of the library's best."""
+        return max((self.nats(s) for s in self.library.scored if s.physical), default=-math.inf)
 
 
-def look_around(fitted: Fit, given: Sequence[Candidate] = ()) -> Look:
+def look_around(
+    fitted: Fit,
+    given: Sequence[Candidate] = (),
+    watched: Callable[[Callable[[Fit], Look]], Callable[[Fit], Look]] = lambda work: work,
+) -> Look:
     """Score every candidate and curve around the fit and, where it explains little, around a looser one.
 
     A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
     where it is held tightly. The scores with the stronger explanation count. `given` are the user's own
-    candidates.
+    candidates; `watched` makes work that does not begin once a search's time is up.
     """
 
     def look(current: Fit) -> Look:
@@ -73,7 +87,7 @@ def look_around(fitted: Fit, given: Sequence[Candidate] = ()) -> Look:
         looks = len(scanned.scored) + frequencies + curves.looks
         return Look(current, scanned, curves.curves, looks)
 
-    found = together(look, dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
+    found = together(watched(look), dict.fromkeys((fitted, loosened(fitted, _SCATTER))))
     return replace(max(found, key=Look.strongest), looks=sum(look.looks for look in found))
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from udd.effects import Effect
 from udd.fitting import Fit
 from udd.fitting.doubts import ran_off
+from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -20,10 +21,10 @@ from .scan import Scored
 
 #: What bears an effect out, of data that were not fitted.
 Witness = Literal["held", "fitted", "halves"]
-#: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; the
-#: held-out data do not bear it out; another form that fits better fails; or it passed all tests but free runs
-#: over the held-out data do not get better beyond doubt.
-Failing = Literal["chance", "part", "held", "form", "unconfirmed"]
+#: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; a
+#: slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that fits
+#: better fails; or it passed all tests but free runs over the held-out data do not get better beyond doubt.
+Failing = Literal["chance", "drift", "part", "held", "form", "unconfirmed"]
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
@@ -140,10 +141,11 @@ class Refused:
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
-    why : {"chance", "part", "held", "form", "unconfirmed"}
-        Why it is not added: chance does as much, in all data or in the part that effects are sought in; the
-        held-out data do not bear it out; another form that fits clearly better does not pass; or it passed,
-        but free runs over the held-out data do not get better beyond doubt.
+    why : {"chance", "drift", "part", "held", "form", "unconfirmed"}
+        Why it is not added: chance does as much, in all data or in the part that effects are sought in; a
+        slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that
+        fits clearly better does not pass; or it passed, but free runs over the held-out data do not get
+        better beyond doubt.
     """
 
     effect: Effect
@@ -178,7 +180,8 @@ class Discovery:
     verdict : str
         ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or
         ``"fits the first part, not confirmed"`` where free runs over the held-out data do not bear it out:
-        what that is stands in `refused`.
+        what that is stands in `refused`. ``"search not finished"`` where its time was up before anything
+        was found.
     baseline, fit : Fit
         The model without and with the added effects, each fitted to all data; the same where none was added.
     effects : list of Found
@@ -201,6 +204,13 @@ class Discovery:
     refused : list of Refused
         Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
         was not confirmed.
+    thinned : list of Thinned
+        What became of measurements with more frames than their motion needs: block averages, which the
+        measurements of `fit` are then. Empty where all frames were taken as they were.
+    budget : float or None
+        The seconds that ended the search before it was done, where they did.
+    stopped : str or None
+        What it was at then.
     """
 
     verdict: str
@@ -217,6 +227,9 @@ class Discovery:
     split: float
     trained: Fit = field(repr=False)
     refused: list[Refused] = field(default_factory=list)
+    thinned: list[Thinned] = field(default_factory=list)
+    budget: float | None = None
+    stopped: str | None = None
 
     @property
     def measurement(self) -> Measurement:
@@ -243,6 +256,12 @@ class Discovery:
                 f"Held as stated, because they run away where they are free: {', '.join(held)}. What was "
                 "found may make up for errors in these."
             )
+        said += [
+            f"The record's {own.frames} frames were averaged over {own.every} at a time, to "
+            f"{int(own.measurement.seen.sum())}: the motion changes so slowly that nothing is lost by it."
+            for own in self.thinned
+            if own.every > 1
+        ]
         return said
 
     @cached_property
@@ -259,6 +278,7 @@ class Discovery:
         """What a machine reads."""
         return {
             "verdict": self.verdict,
+            "stopped": self.stopped,
             "remarks": self.remarks,
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],

@@ -23,6 +23,7 @@ from .terms import waves
 #: A candidate is absorbed when the free parameters take this share of its information.
 _ABSORBED = 1e-4
 _ALIKE = 1e6  # condition of the information from which on candidates act alike
+_STRONG = 4.0  # times the usual amplitudes, of effects that may have either sign
 _WAVES = 100  # scored at a time: what a long record takes in memory
 _GROUPS = 20_000  # looked at together: some ten megabytes
 _LINES = 24  # of a scan over frequencies, looked at between them too
@@ -223,10 +224,15 @@ def _score(
 
 
 def physical(candidate: Candidate, estimate: Iterable[float], errors: Iterable[float]) -> bool:
-    """Whether amplitudes lie in their range, give or take their error."""
+    """Whether amplitudes lie in their range, give or take their error.
+
+    Where both signs are, the range says what is usual, which a strong effect, and more so its score around a
+    fit that went astray, may leave.
+    """
     ranges = [p.range for p in candidate.effect.spec.parameters if p.role == "amplitude"]
+    wide = [(_STRONG * low, _STRONG * high) if low < 0 < high else (low, high) for low, high in ranges]
     return all(
-        low - 2 * e <= a <= high + 2 * e for a, e, (low, high) in zip(estimate, errors, ranges, strict=True)
+        low - 2 * e <= a <= high + 2 * e for a, e, (low, high) in zip(estimate, errors, wide, strict=True)
     )
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,9 @@ from udd.fitting.parameters import Free
 
 from .bearing import ALPHA, Pair, borne_out, held_ratio, same_level
 from .candidates import Candidate
+from .clock import Clock, TimeUpError
 from .curves import NATS, Curve
+from .drift import drift_gain
 from .formulas import Formula, formulas_for
 from .heldout import (
     Errors,
@@ -36,9 +39,13 @@ from .scan import Scan, Scored
 from .together import together
 from .trials import Trial, fitted_ones, of_curve, of_formula, of_library, one_of_each, same_law
 
+From = TypeVar("From")
+To = TypeVar("To")
+
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
+_DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion held, may be all there is
 _TRIED = 6  # of the best candidates, fitted in full
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
@@ -130,6 +137,8 @@ class Judged:
         Of all data.
     chi2, p, ratio, witness
         As of a :class:`Step`; a trial that chance explains is not asked for a witness.
+    drifts : bool
+        Whether a slow drift of the sensor's zero would explain more.
     """
 
     whole: Fit
@@ -137,11 +146,15 @@ class Judged:
     p: float
     ratio: Ratio
     witness: Witness | None
+    drifts: bool = False
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where a search ended: fits of the first part and of all data, errors, what was seen and done."""
+    """Where a search ended: fits of the first part and of all data, errors, what was seen and done.
+
+    `stopped` is what it was at when its time was up.
+    """
 
     part: Fit
     whole: Fit
@@ -149,6 +162,7 @@ class Outcome:
     accepted: list[Step]
     looks: list[Look]
     unconfirmed: list[Refused]
+    stopped: str | None = None
 
 
 class Search:
@@ -158,13 +172,17 @@ class Search:
         self,
         record: Record,
         held: NDArray[np.bool_],
-        tell: Callable[[str], None],
+        clock: Clock,
         unit: float = 1.0,
         given: Sequence[Candidate] = (),
         free: Sequence[Free] = (),
     ) -> None:
-        self.record, self.held, self.tell = record, held, tell
+        self.record, self.held, self.clock, self.tell = record, held, clock, clock.tell
         self.unit, self.given, self.free = unit, given, free
+
+    def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
+        """Independent pieces of work side by side, as long as there is time."""
+        return together(self.clock.watched(work), pieces)
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -184,14 +202,31 @@ class Search:
         accepted: list[Step] = []
         looks: list[Look] = []
         states = [begin]
+        stopped = None
+        try:
+            self._grow(accepted, states, looks)
+        except TimeUpError as up:
+            stopped = str(up)
+        number = self._confirmed(known or states[0], states)
+        unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
+        end = states[number] if number else known or states[0]
+        return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed, stopped)
+
+    def _grow(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+        """Add effects to the lists as they pass."""
         while sum(len(step.candidates) for step in accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = look_around(states[-1].part, self.given)
-            found = self._known(states[-1], look)
-            if found is None:
-                look = wider(look)
-                found = self._located(states[-1], look)
+            look = look_around(states[-1].part, self.given, self.clock.watched)
             looks.append(look)
+            # What the library has been asked for already, and what a curve still says far more of than
+            # anything in it, is no bent view of something known.
+            tried = look.curves if accepted and look.curve_leads() else []
+            found = self._located(states[-1], look) if tried else None
+            found = found or self._known(states[-1], look)
+            if found is None:
+                self.tell("scoring surfaces over two coordinates")
+                looks[-1] = look = wider(look)
+                found = self._located(states[-1], look, tried)
             if found is None:
                 break
             accepted.append(found[0])
@@ -200,10 +235,6 @@ class Search:
             states[-1] = self._released(states[-1])
         self._simplify(accepted, states, looks)
         states[-1] = self._released(states[-1])
-        number = self._confirmed(known or states[0], states)
-        unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
-        end = states[number] if number else known or states[0]
-        return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed)
 
     def _confirmed(self, known: State, states: list[State]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
@@ -261,6 +292,8 @@ class Search:
             why: Failing = "form"
             if judged.p >= ALPHA:
                 why = "chance"
+            elif judged.drifts:
+                why = "drift"
             elif trial.candidates[0] not in shown:
                 why = "part"
             elif judged.witness is None or self._worse(base.errors, errors):
@@ -294,16 +327,22 @@ class Search:
             or self._group(current, look, 3)
         )
 
-    def _located(self, current: State, look: Look) -> tuple[Step, State] | None:
-        """The best curve or surface that passes."""
+    def _located(self, current: State, look: Look, tried: Sequence[Curve] = ()) -> tuple[Step, State] | None:
+        """The best curve or surface that passes; of some those that would have been chosen were tried."""
         faults = look.fit.faults
-        shown = [c for c in look.curves if c.p * look.looks < ALPHA and c.chi2 > faults]
-        return self._accept(current, self._curves(current, states_first(shown)[:_CURVES]), look)
+
+        def best(curves: Sequence[Curve]) -> list[Curve]:
+            shown = [c for c in curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+            return states_first(shown)[:_CURVES]
+
+        known = [c.name for c in best(tried)]
+        likely = [c for c in best(look.curves) if c.name not in known]
+        return self._accept(current, self._curves(current, likely), look)
 
     def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
         """Formulas for a curve, fitted."""
         self._trying([f.text for f in formulas])
-        return fitted_ones(together(lambda written: of_formula(current.part, curve, written), formulas))
+        return fitted_ones(self._each(lambda written: of_formula(current.part, curve, written), formulas))
 
     def _trying(self, titles: list[str]) -> None:
         if titles:
@@ -320,7 +359,7 @@ class Search:
 
     def _tried(self, current: State, some: list[Scored]) -> list[Trial]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
-        found = together(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
+        found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
     def _pairs(self, current: State, look: Look) -> list[Trial]:
@@ -339,7 +378,7 @@ class Search:
         def tried(pair: list[Candidate]) -> Trial | None:
             return of_library(current.part, pair, [0.0] * sum(len(c.amplitude_names) for c in pair))
 
-        return fitted_ones(together(tried, pairs))
+        return fitted_ones(self._each(tried, pairs))
 
     def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
         """Several effects at once that pass only together."""
@@ -356,13 +395,13 @@ class Search:
         def tried(group: list[Candidate]) -> Trial | None:
             return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
 
-        return self._accept(current, fitted_ones(together(tried, likely)), replace(look, looks=len(best)))
+        return self._accept(current, fitted_ones(self._each(tried, likely)), replace(look, looks=len(best)))
 
     def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
         """The likeliest curves, as splines and by short formulas."""
         trials: list[Trial] = []
         self._trying([curve.title for curve in likely])
-        for located in fitted_ones(together(lambda curve: of_curve(current.part, curve), likely)):
+        for located in fitted_ones(self._each(lambda curve: of_curve(current.part, curve), likely)):
             trials.append(located)
             if located.curve is not None:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))
@@ -469,7 +508,7 @@ class Search:
             except FitError:
                 return None
 
-        pairs = zip(near, together(again, near), strict=True)
+        pairs = zip(near, self._each(again, near), strict=True)
         wholes = [(t, w) for t, w in pairs if w is not None and w.needed]
         level = min((w.fit.level for _t, w in wholes), default=0)
         result = {}
@@ -492,12 +531,14 @@ class Search:
             fall, p = _chance(pair, trial, look)
             ratio: Ratio = (math.nan, math.nan, math.nan)
             witness: Witness | None = None
-            if p < ALPHA:
+            before, after = pair
+            drifts = _DRIFT * (before.chi2 - after.chi2) / max(before.scatter, 1.0) < drift_gain(before)
+            if p < ALPHA and not drifts:
                 part, rest = (current.part, trial.fit), self.record.part(self.held)
                 ratio, witness = borne_out(part, pair, rest, trial.names, self.unit)
         except FitError:
             return None
-        return Judged(whole.fit, fall, p, ratio, witness)
+        return Judged(whole.fit, fall, p, ratio, witness, drifts)
 
     def _errors_or_none(self, fitted: Fit) -> Errors | None:
         """None where the model cannot be run over the held-out frames."""

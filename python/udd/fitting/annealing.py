@@ -24,6 +24,7 @@ _LEAP = 3  # levels that it takes at once
 ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
 LESS = 3.0
+_LITTLE = 3  # steps more, of a fit that may be near its minimum
 _LOOSE = 0.3  # leverage from which on misfits are not the noise
 _SAME = 0.03  # autocorrelations that differ by less need no other fit
 
@@ -63,8 +64,21 @@ def rough(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = STEPS
 ) -> Fit:
     """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
-    result = solve(measurements, problem, point, iterations, _enough(problem))
+    result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)), iterations)
     return remembering(result) if problem.likeliest and result.converged else result
+
+
+def _nearly(fitted: Fit, steps: int) -> Fit:
+    """A fit of a search that came near its minimum, which is enough to test it, or else as it was.
+
+    Along what the data hardly determine, like a frequency beside its phase, a law with kinks gets there in
+    ever smaller steps. To turn a right model away for it would make room for a wrong one. What is given few
+    `steps`, because it may have no end, is taken at its word.
+    """
+    if fitted.converged or fitted.problem.likeliest or steps < STEPS:
+        return fitted
+    near = solve(fitted.measurements, fitted.problem, fitted.point, _LITTLE, ROUGH)
+    return near if near.converged else fitted
 
 
 def _is_last(problem: Problem) -> bool:
@@ -115,7 +129,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     own = fitted.problem.diffusion
     for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
         problem = fitted.problem.held(diffusion)
-        fitted = solve(fitted.measurements, problem, fitted.point, steps)
+        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps), steps)
         if fitted.converged:
             break
     return fitted

@@ -49,6 +49,7 @@ def fit(
     camera: bool | Iterable[str] = True,
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
+    state0: Mapping[str, float] | Sequence[Mapping[str, float]] | None = None,
 ) -> Fit:
     """Fit a model to measured motion.
 
@@ -79,6 +80,10 @@ def fit(
     each : iterable of str, optional
         The model's parameters that every measurement has a value of its own of; by default the drive ``W``.
         They are called ``W[0]``, ``W[1]`` ... then, as the camera's are.
+    state0 : mapping of str to float, optional
+        Where states of your own model that are not seen start, by their names; of several measurements also a
+        list of such tables. The search for them begins with the motion from there, driven by what was seen.
+        Without it they begin at zero, or at the rate of what is seen.
 
     Returns
     -------
@@ -105,7 +110,7 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
-    record = record_of(measurement, model)
+    record = record_of(measurement, model, state0)
     free = free if free is None or isinstance(free, str) else list(free)
 
     options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.errors import FitError
 from udd.own_models import OwnModel
 
 Array = NDArray[np.float64]
@@ -27,8 +28,18 @@ def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
     return rate
 
 
-def guessed(model: OwnModel, t: Array, seen: Mapping[str, Array], linked: NDArray[np.bool_]) -> Array:
-    """A first guess of all states: as seen, or the rate of one that is seen, or else zero."""
+def guessed(
+    model: OwnModel,
+    t: Array,
+    seen: Mapping[str, Array],
+    linked: NDArray[np.bool_],
+    state0: Mapping[str, float] | None = None,
+) -> Array:
+    """A first guess of all states: as seen, or the rate of one that is seen, or else zero.
+
+    Of hidden states that a start is given of, their own equations are followed from there, driven by what was
+    seen.
+    """
     rates = {text.strip(): name for name, text in model.equations.items() if name in seen}
     columns = []
     for name in model.state_names:
@@ -38,7 +49,54 @@ def guessed(model: OwnModel, t: Array, seen: Mapping[str, Array], linked: NDArra
             columns.append(slope(t, seen[rates[name]], linked))
         else:
             columns.append(np.zeros(len(t)))
-    return np.column_stack(columns)
+    states = np.column_stack(columns)
+    given = {name: value for name, value in (state0 or {}).items() if name not in seen}
+    return _followed(model, t, states, given) if given else states
+
+
+def _followed(model: OwnModel, t: Array, states: Array, start: Mapping[str, float]) -> Array:
+    """States of which some follow their own equations from a start, by Heun's method from frame to frame.
+
+    Where that runs away they stay as they were last.
+    """
+    places = [model.state_names.index(name) for name in start]
+    result = states.copy()
+    now = result[0]
+    now[places] = list(start.values())
+    for k in range(len(t) - 1):
+        dt, following = t[k + 1] - t[k], result[k + 1]
+        rate = model.rates(t[k], now)[places]
+        following[places] = now[places] + dt * rate
+        moved = now[places] + 0.5 * dt * (rate + model.rates(t[k + 1], following)[places])
+        following[places] = moved if np.isfinite(moved).all() else now[places]
+        now = following
+    return result
+
+
+def checked_start(model: OwnModel | None, state0: object) -> dict[str, float]:
+    """The starts of states that a user gave, by the states' names.
+
+    Raises
+    ------
+    FitError
+        They are no numbers of states of a model of the user's own.
+    """
+    if model is None:
+        raise FitError(
+            "starts can be given for a model of your own; a disk's and a pendulum's show themselves"
+        )
+    if not isinstance(state0, Mapping):
+        raise FitError(f"state0 must be a table of states and their starts, not {state0!r}")
+    result = {}
+    for name, value in state0.items():
+        if name not in model.state_names:
+            raise FitError(
+                f"a start is given for {name!r}, but the states are {', '.join(model.state_names)}"
+            )
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+            raise FitError(f"the start of {name} must be a finite number, not {value!r}")
+        result[str(name)] = float(value)
+    return result
 
 
 def typical_noise(values: Array) -> Array:

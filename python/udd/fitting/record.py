@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from udd.measurement import Measurement
 from udd.models import Model
 from udd.own_models import OwnModel
 
-from .own import guessed, slope, typical_noise
+from .own import checked_start, guessed, slope, typical_noise
 from .sensor import frame_noise, is_encoder, lattice
 
 Array = NDArray[np.float64]
@@ -123,12 +123,15 @@ class Record:
 
 
 def record_of(
-    measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model] | None = None
+    measurement: Measurement | Sequence[Measurement],
+    model: Model | Sequence[Model] | None = None,
+    state0: Mapping[str, float] | Sequence[Mapping[str, float]] | None = None,
 ) -> Record:
     """Lay a measurement out for the estimator, or several one after the other.
 
     The channels are the measurement's columns; for a model of the user's own they are the model's states, of
-    which the measurement may see but some.
+    which the measurement may see but some; `state0` holds starts of the others, for all measurements or one
+    table each.
 
     Raises
     ------
@@ -138,11 +141,15 @@ def record_of(
     if not isinstance(measurement, Measurement):
         if isinstance(measurement, (list, tuple)) and len(measurement):
             models = model if isinstance(model, Sequence) else [model] * len(measurement)
-            return _joined([record_of(*pair) for pair in zip(measurement, models, strict=True)])
+            starts = state0 if isinstance(state0, Sequence) else [state0] * len(measurement)
+            if len(starts) != len(measurement):
+                raise FitError(f"there are {len(measurement)} measurements but {len(starts)} starts")
+            return _joined([record_of(*own) for own in zip(measurement, models, starts, strict=True)])
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     if isinstance(model, Sequence):
         (model,) = model
     own = model if isinstance(model, OwnModel) else None
+    start = None if state0 is None else checked_start(own, state0)
     if own and not set(measurement.names) <= set(own.state_names):
         given, wanted = ", ".join(measurement.names), ", ".join(own.state_names)
         raise FitError(f"the measurement has columns {given}, but the model's states are {wanted}")
@@ -180,12 +187,12 @@ def record_of(
         if np.ptp(known[:, k]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
             known[:, k] = np.unwrap(known[:, k])
     guess = np.column_stack([np.interp(t, t[there], column) for column in known.T])
-    odd = _odd(guess, np.median(sigma[np.ix_(there, places)], axis=0), linked)
+    odd = odd_frames(guess, np.median(sigma[np.ix_(there, places)], axis=0), linked)
     for channel in guess.T:
         channel[odd] = _between(odd, channel)
     film = np.zeros(len(t), dtype=np.int64)
     if own:
-        states = guessed(own, t, dict(zip(columns, guess.T, strict=True)), linked)
+        states = guessed(own, t, dict(zip(columns, guess.T, strict=True)), linked, start)
     else:
         states = _states(t, guess, linked)
     return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
@@ -237,7 +244,7 @@ def _fill(
     return np.append(t[:1], times), np.append(rows[:1], origin), gap[before] <= longest
 
 
-def _odd(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Frames far from the cubic through the two before and the two after, in any channel (noise `sigma`)."""
     n = len(guess)
     odd = np.zeros(n, dtype=bool)

@@ -214,7 +214,7 @@ def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str
     rows = []
     found = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
-    for s in discovery.scans[stage][:most]:
+    for s in discovery.scans[stage][:most] if stage < len(discovery.scans) else []:
         title = s.candidate.title
         rows.append(
             {

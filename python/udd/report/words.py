@@ -71,7 +71,17 @@ def enters(effect: Any) -> list[str]:
 
 
 def verdict(discovery: Any) -> str:
-    """The whole result in one sentence."""
+    """The whole result in a sentence, and a second where the search was not finished."""
+    said = _verdict(discovery)
+    if discovery.stopped is None:
+        return said
+    return (
+        f"{said} The search ended after {discovery.budget:.3g} s, as asked, while "
+        f"{discovery.stopped}; what else may be missing was not tried."
+    )
+
+
+def _verdict(discovery: Any) -> str:
     said = "; and ".join(_counted(["; or ".join(_meanings(f, discovery)) for f in discovery.effects]))
     if discovery.verdict == "fits the first part, not confirmed":
         titles = list(dict.fromkeys(near.title for near in discovery.refused if near.why == "unconfirmed"))
@@ -80,6 +90,10 @@ def verdict(discovery: Any) -> str:
             f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "
             "free runs over the part that was held back do not get better by it beyond doubt."
         )
+    if discovery.verdict == "search not finished":
+        return "Whether something is missing is not known yet: nothing was found so far."
+    if not discovery.effects and discovery.verdict != "nothing missing" and discovery.stopped:
+        return "The model lacks something; what, was not found so far."
     if not discovery.effects and discovery.verdict != "nothing missing":
         return "The model lacks something, but no effect of the library explains what."
     if discovery.verdict == "nothing missing" and not at_the_floor(discovery):
@@ -112,6 +126,7 @@ def refused(discovery: Any) -> list[str]:
         why = {
             "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
             f"as by chance with a probability of {probability(near.p)}",
+            "drift": "a slow drift of the sensor's zero would explain more",
             "part": "the part in which effects are sought does not show it beyond chance",
             "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
             "held": "the frames that were held back do not bear it out",

@@ -1,0 +1,64 @@
+"""How long a search may take."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from udd.errors import FitError
+
+From = TypeVar("From")
+To = TypeVar("To")
+
+
+class TimeUpError(Exception):
+    """The time that a search was given is over; no fault of a model, which an attempt would survive."""
+
+
+class Clock:
+    """The time that a search has, and what it is doing.
+
+    Parameters
+    ----------
+    budget : float or None
+        s from now; None for as long as it takes.
+    tell : callable
+        Told in a few words what is being done.
+
+    Raises
+    ------
+    FitError
+        The budget is no positive number.
+    """
+
+    def __init__(self, budget: float | None, tell: Callable[[str], None]) -> None:
+        if budget is not None and not (isinstance(budget, (int, float)) and budget > 0):
+            raise FitError(f"the budget must be a positive number of seconds, not {budget!r}")
+        self.budget = math.inf if budget is None else float(budget)
+        self.end, self._tell, self.doing = time.monotonic() + self.budget, tell, ""
+
+    def tell(self, text: str) -> None:
+        """Begin something, unless the time is up."""
+        self.doing = text
+        self.check()
+        self._tell(text)
+
+    def finish(self, text: str) -> None:
+        """Begin something that is done in any case."""
+        self._tell(text)
+
+    def check(self) -> None:
+        """Raise TimeUpError once the time is up."""
+        if time.monotonic() > self.end:
+            raise TimeUpError(self.doing)
+
+    def watched(self, work: Callable[[From], To]) -> Callable[[From], To]:
+        """The same work, which does not begin once the time is up."""
+
+        def checked(piece: From) -> To:
+            self.check()
+            return work(piece)
+
+        return checked

@@ -1,0 +1,65 @@
+"""What a sensor's drift looks like, fits that come near their minimum, and curves that lead."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import udd
+from udd.discovery.drift import drift_gain
+from udd.discovery.looks import Look
+from udd.discovery.scan import Scan
+from udd.fitting import annealing, fit_record, record_of
+
+KNOWN = udd.Pendulum(0.8, k0=0.013)
+
+
+def drifting(size: float) -> udd.Measurement:
+    """A pendulum whose sensor's zero wanders by so much."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0, 100, 0.04)
+    theta = udd.simulate(udd.Pendulum(0.82, k0=0.012), t, [0.0, 0.8]).state[:, 1]
+    walk = np.cumsum(rng.standard_normal(len(t))) / np.sqrt(len(t))
+    return udd.Measurement(t, {"theta": theta + size * walk + 2e-3 * rng.standard_normal(len(t))})
+
+
+def test_a_drift_of_the_sensor_is_no_effect():
+    found = udd.discover(drifting(8e-3), KNOWN)
+    assert found.effects == []
+    assert drift_gain(found.baseline) > 300  # far beyond the price of its freedom
+
+
+def test_a_steady_sensor_gains_nothing_by_a_drift():
+    measured = drifting(0.0)
+    assert drift_gain(fit_record(measured, record_of(measured), KNOWN, search=True)) == 0.0
+    short = measured.rows(np.arange(150))  # too short to tell a drift from the swing
+    assert drift_gain(fit_record(short, record_of(short), KNOWN, search=True)) == 0.0
+
+
+def test_a_search_takes_a_fit_that_is_near_its_minimum():
+    measured = drifting(0.0)
+    done = fit_record(measured, record_of(measured), KNOWN, search=True)
+    unfinished = replace(done, converged=False)
+    assert annealing._nearly(unfinished, annealing.STEPS).converged
+    # Of a fit that is asked for itself nothing less than the minimum will do.
+    alone = replace(unfinished, problem=replace(done.problem, likeliest=True))
+    assert annealing._nearly(alone, annealing.STEPS) is alone
+    # Nor of a formula, whose constants may trade for each other for ever.
+    assert annealing._nearly(unfinished, annealing.FEW) is unfinished
+    far = replace(done.point.bare(), states=done.states + np.array([0.0, 0.3]))
+    away = replace(unfinished, point=far)
+    assert annealing._nearly(away, annealing.STEPS).chi2 < 1.01 * done.chi2  # or a few steps bring it there
+
+
+@pytest.mark.parametrize(("evidence", "leads"), [(400.0, True), (200.0, False)])
+def test_a_curve_leads_that_says_far_more_than_the_library(evidence, leads):
+    measured = drifting(0.0)
+    fitted = fit_record(measured, record_of(measured), KNOWN, search=True)
+    scored = SimpleNamespace(chi2=200.0, physical=True, candidate=SimpleNamespace(parameters=1))
+    curve = SimpleNamespace(evidence=evidence, coordinates=("Z",))
+    scan = Scan([scored], np.zeros(1), np.eye(1), [[0]], 1.0)  # type: ignore[list-item]
+    look = Look(fitted, scan, [curve], 1)  # type: ignore[list-item]
+    assert look.curve_leads() is leads
