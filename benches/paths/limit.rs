@@ -134,8 +134,8 @@ fn rate<S: Scalar>() -> f64 {
     let mut sums = [S::one(); SUMS];
     let begin = Instant::now();
     for _ in 0..ROUNDS {
-        for i in 0..SUMS {
-            sums[i] = b.fused(sums[i], a);
+        for sum in &mut sums {
+            *sum = b.fused(*sum, a);
         }
     }
     black_box(sums);
