@@ -165,7 +165,7 @@ fn follow<F: Family<D>, const D: usize>(
     if let Some(tape) = &rows::tape(family, &[values.to_vec()]) {
         let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
         match frames_of(&system, method, x0, span, tolerance, stop) {
-            Err(failure) if failure.is_of_series() => {}
+            Err(failure) if tape.hands_over(&failure) => {}
             found => return found,
         }
     }

@@ -79,9 +79,13 @@ fn run<F: Family<D>, const D: usize>(
         trajectory(system(), method, output, x0, tolerance, keep, stiff)
     };
     let stages = || trajectory(system(), Dop853::default(), output, x0, tolerance, keep, stop);
+    let tape = match by {
+        By::Stepper(Stepper::Taylor | Stepper::Auto) => rows::tape(family, &[values.to_vec()]),
+        _ => None,
+    };
     let series = || {
-        let tape = rows::tape(family, &[values.to_vec()])?;
-        let method = Taylor::new(&tape, values.to_vec(), order(tolerance), Isa::best());
+        let tape = tape.as_ref()?;
+        let method = Taylor::new(tape, values.to_vec(), order(tolerance), Isa::best());
         Some(trajectory(system(), method, output, x0, tolerance, keep, stop))
     };
     let run = match by {
@@ -96,7 +100,7 @@ fn run<F: Family<D>, const D: usize>(
         }
         By::Stepper(Stepper::Auto) => match series() {
             None => stages(),
-            Some(Err(failure)) if failure.is_of_series() => stages(),
+            Some(Err(failure)) if tape.as_ref().is_some_and(|tape| tape.hands_over(&failure)) => stages(),
             Some(run) => run,
         },
     };

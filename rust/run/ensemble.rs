@@ -65,7 +65,7 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
                 let passages = sail(&Sampled { ensemble: self, recipe, isa }, runs, crew);
                 let failed = |passage: &Passage<D>| {
                     self.stepper == Stepper::Auto
-                        && passage.outcome.is_err_and(|failure| failure.is_of_series())
+                        && passage.outcome.is_err_and(|failure| tape.hands_over(&failure))
                 };
                 sail_again(&stages, passages, failed, crew)
             }

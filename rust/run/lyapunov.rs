@@ -69,7 +69,7 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
                 let recipe = ByTaylor { tape, order: order(&self.options.tolerance), isa };
                 let found = sail(&Tangents::<_, D, N, _> { orbits: self, recipe, isa }, orbits, crew);
                 let failed =
-                    |orbit: &Exponents<D, N>| orbit.outcome.is_err_and(|failure| failure.is_of_series());
+                    |orbit: &Exponents<D, N>| orbit.outcome.is_err_and(|failure| tape.hands_over(&failure));
                 sail_again(&stages, found, failed, crew)
             }
             None => sail(&stages, orbits, crew),

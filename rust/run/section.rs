@@ -102,7 +102,7 @@ impl<F: Family<D>, const D: usize> Sections<'_, F, D> {
             Some(tape) => {
                 let recipe = ByTaylor { tape, order: order(&self.tolerance), isa };
                 let found = sail(&Collect { sections: self, recipe, isa }, jobs, crew);
-                let failed = |crossings: &Crossings<D>| matches!(crossings.ended, Ended::Failed(failure) if failure.is_of_series());
+                let failed = |crossings: &Crossings<D>| matches!(crossings.ended, Ended::Failed(failure) if tape.hands_over(&failure));
                 sail_again(&stages, found, failed, crew)
             }
             None => sail(&stages, jobs, crew),

@@ -78,7 +78,7 @@ fn one<F: Family<D>, const D: usize>(
     if let Some(tape) = tape {
         let method = Taylor::new(tape, values, order(tolerance), Isa::best());
         match follow(method, &system, piece, tolerance, stop) {
-            Err(failure) if failure.is_of_series() => {}
+            Err(failure) if tape.hands_over(&failure) => {}
             flown => return flown,
         }
     }

@@ -20,6 +20,7 @@ pub use node::{Held, Node, Step};
 pub use record::Unrecordable;
 pub use symbol::{Function, SideOf, Symbol};
 
+use crate::integrate::Failure;
 use crate::model::Sides;
 use crate::scalar::Scalar;
 
@@ -77,6 +78,14 @@ impl<const D: usize> Tape<D> {
     /// Whether its series are computed by a program of their own.
     pub fn is_unrolled(&self) -> bool {
         self.known != known::Known::Not
+    }
+
+    /// Whether a method that needs no power series may do better where one along this tape failed.
+    ///
+    /// The laws whose series are written out have no poles: where these overflow, steps of any method are too
+    /// short for the run ever to end.
+    pub fn hands_over(&self, failure: &Failure) -> bool {
+        !self.is_unrolled() && failure.is_of_series()
     }
 
     /// What does not change along a solution, in the order of evaluation.
