@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import udd
+from udd.trajectory import integrated
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def start_between_wheels(model: udd.Disk, duration: float, rng: np.random.Genera
     for _ in range(400):
         radius, angle = rng.uniform(0.01, 0.05), rng.uniform(0, 2 * np.pi)
         state = [rng.normal(0, 2), radius * np.sin(angle), radius * np.cos(angle), rng.uniform(0, 6)]
-        if udd.simulate(model, [0.0, duration], state, rtol=1e-7, atol=1e-9).outcome == "finished":
+        if integrated(model, [0.0, duration], state, rtol=1e-7, atol=1e-9).outcome == "finished":
             return state
     raise RuntimeError("no start stays between the wheels")
 
@@ -54,9 +55,7 @@ def film(
     # A tilted camera sees a tilted world; a lagging orientation is an earlier one; a clock that is fast
     # counts more.
     times = np.concatenate([[0.0], fine])
-    run = udd.simulate(
-        model, times, state or start_between_wheels(model, duration, rng), rtol=1e-9, atol=1e-11
-    )
+    run = integrated(model, times, state or start_between_wheels(model, duration, rng), rtol=1e-9, atol=1e-11)
     if run.outcome != "finished":  # chaos: the start was tried with a looser tolerance
         return film(model, rng, duration, camera)
     mean = run.state[1:].reshape(len(t), sub, 4).mean(axis=1)

@@ -14,6 +14,7 @@ import pytest
 import udd
 from sweeps_for_tests import DISK, disk_spec, exponents_spec, files
 from udd.errors import ModelError, UddError
+from udd.trajectory import integrated
 
 pytest.importorskip("xarray", reason="sweeps need the extra 'scale'")
 zarr = pytest.importorskip("zarr", reason="sweeps need the extra 'scale'")
@@ -59,7 +60,7 @@ def test_final_states_are_those_of_simulate_to_the_last_bit() -> None:
         if Z > 0.08:  # the radius
             assert (outcome, float(here["t_end"]), float(here["final_Z"])) == ("ejected", 0.0, Z)
         else:
-            run = udd.simulate(model, [0.0, 2.0], [0.0, 1e-3, Z, 0.0], method="auto")
+            run = integrated(model, [0.0, 2.0], [0.0, 1e-3, Z, 0.0], method="auto")
             assert run.outcome == outcome
             assert [float(here[f"final_{name}"]) for name in model.state_names] == run.state[-1].tolist()
             assert here["t_end"] == run.t[-1]

@@ -247,14 +247,6 @@ def simulate(
     Trajectory
         A run that leaves the disk is cut at the edge and has the outcome "ejected".
 
-    Warns
-    -----
-    IncompleteWarning
-        The disk left the wheels.
-    StiffnessWarning
-        A model of your own that is stiff is run by a method for those that are not; the warning comes while
-        the run goes on.
-
     Raises
     ------
     ModelError
@@ -263,6 +255,14 @@ def simulate(
         The solution blows up.
     KeyboardInterrupt
         On Ctrl-C, at once.
+
+    Warns
+    -----
+    IncompleteWarning
+        The disk left the wheels.
+    StiffnessWarning
+        A model of your own that is stiff is run by a method for those that are not; the warning comes while
+        the run goes on.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from udd.paper.figures.steady import eight, forced_swings, jitter, lengths, pump
 from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
 from udd.sections import poincare
-from udd.trajectory import simulate
+from udd.trajectory import integrated
 
 
 @claim(
@@ -56,7 +56,7 @@ def clock_period(_lab: Lab) -> Verdict:
     scaled = periods(w) * np.sqrt(w)
     W = np.linspace(0.08, 0.12, 9)
     slope = np.polyfit(np.log(W), np.log(disk_periods(W)), 1)[0]
-    fast = simulate(device.disk(0.15), 120.0, EIGHT, method="taylor")
+    fast = integrated(device.disk(0.15), 120.0, EIGHT, method="taylor")
     evidence = (
         f"DLE: T √w = {scaled[0]:.6f}, {scaled[1]:.6f}, {scaled[2]:.6f} at w = 10, 100, 1000 (limit "
         f"{C:.6f}); disk: T goes as W^{slope:.3f} from 8 to 12 cm/s; from the same start the disk "
