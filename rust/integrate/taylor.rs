@@ -3,7 +3,7 @@
 use super::method::{EIGHTHS, MOST_PROBES, Method, Point, Trial};
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
-use crate::scalar::{Instructions, Isa, Mask, Real, Scalar, Work};
+use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
 use crate::tape::{HIGH, Jets, LOW, Tape};
 use crate::unroll::vector;
 
@@ -57,15 +57,16 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         let mut bad = S::mask(false);
         for halvings in 0..=MOST_HALVINGS {
             let Trial { size, error, .. } = *trial;
-            let known = error.finite();
-            let jets = &mut self.jets;
+            let (isa, known) = (self.jets.isa(), error.finite());
             let mut strays = |part: f64| {
                 let dt = size.scale(part);
-                let x = jets.real_at(dt, &[true; D]);
-                let rates = jets.rates(self.tape, at.t + dt, &x, &at.sides);
-                let slope = jets.real_slope(dt);
-                let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
-                let defect = norm.state().norm(defect, from, x);
+                let defect = Defect { method: &mut *self, at, from: &from, size, dt, norm };
+                // Packets are only fast with their own instructions.
+                let defect = if const { S::Real::LANES > 1 } {
+                    S::Real::work(isa, defect)
+                } else {
+                    defect.run::<Plain>()
+                };
                 known.and(defect.less(S::Real::constant(MOST_DEFECT)).not())
             };
             bad = strays(1.0);
@@ -84,6 +85,31 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
             trial.x = self.jets.at(trial.size);
         }
         trial.error = S::Real::select(bad, S::Real::constant(f64::NAN), trial.error);
+    }
+}
+
+/// By how much the rates of the polynomial at a distance `dt` miss those of the law, over a step of this `size`, in
+/// units of what its error may be.
+struct Defect<'a, 'b, S: Scalar, const D: usize, E> {
+    method: &'a mut Taylor<'b, S, D>,
+    at: &'a Point<S, D>,
+    from: &'a [S::Real; D],
+    size: S::Real,
+    dt: S::Real,
+    norm: &'a E,
+}
+
+impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Defect<'_, '_, S, D, E> {
+    type Output = S::Real;
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) -> S::Real {
+        let Self { method, at, from, size, dt, norm } = self;
+        let x = method.jets.real_at(dt, &[true; D]);
+        let rates = method.jets.rates(method.tape, at.t + dt, &x, &at.sides);
+        let slope = method.jets.slope_here(dt);
+        let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
+        norm.state().norm(defect, *from, x)
     }
 }
 

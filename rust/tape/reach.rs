@@ -25,17 +25,9 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(self.isa(), Along::<S, D, N, P>(self, dt, parts, of))
     }
 
-    /// The rates of the polynomial at a distance `dt`, without derivatives.
-    pub fn real_slope(&self, dt: S::Real) -> [S::Real; D] {
-        if const { S::Real::LANES > 1 } {
-            S::Real::work(self.isa(), Slope(self, dt))
-        } else {
-            self.slope_here(dt)
-        }
-    }
-
+    /// The rates of the polynomial at a distance `dt`, without derivatives, with the caller's instructions.
     #[inline(always)]
-    fn slope_here(&self, dt: S::Real) -> [S::Real; D] {
+    pub fn slope_here(&self, dt: S::Real) -> [S::Real; D] {
         vector!(S::Real, D; n => {
             let c = &self.coefficients()[n];
             let mut sum = S::Real::zero();
@@ -153,17 +145,6 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
     #[inline(always)]
     fn run<V: Instructions>(self) -> [S; D] {
         self.0.at_here(self.0.order(), self.1)
-    }
-}
-
-struct Slope<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
-
-impl<S: Scalar, const D: usize, const N: usize> Work for Slope<'_, S, D, N> {
-    type Output = [S::Real; D];
-
-    #[inline(always)]
-    fn run<V: Instructions>(self) -> [S::Real; D] {
-        self.0.slope_here(self.1)
     }
 }
 
