@@ -11,8 +11,8 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-import udd
 from udd.app.spec import start_of
+from udd.trajectory import integrated
 
 from .conftest import Opened, until
 
@@ -36,7 +36,7 @@ def simulated(home: dict[str, Any], count: int) -> np.ndarray:
     start = start_of(home)
     per = 64 if home["model"]["kind"] == "dle" else 240
     # Longer than the page's own calls: the last step of a call is cut to its end.
-    run = udd.simulate(start.model, np.arange(30_000) / per, list(start.state))
+    run = integrated(start.model, np.arange(30_000) / per, list(start.state))
     return run.state[:count]
 
 
