@@ -417,8 +417,8 @@ def test_one_law_takes_the_place_of_several_that_come_near_it():
     told: list[str] = []
     measured = unmodelled.record(law, 5, noise=(5e-4, 7e-3))
     found = udd.discover(measured, udd.Disk(W), progress=told.append)
-    # Several of the library are replaced at the end, or the first of them as soon as the curve leads.
-    assert any("instead of" in line for line in told)
+    # The first of the library is replaced as soon as the curve leads, before others come beside it.
+    assert any("torque as a function of theta instead of" in line for line in told)
     (effect,) = found.effects
     assert effect.curve.name == ("torque", "theta")
     theta = np.arange(-3, 3.1, 0.25)
