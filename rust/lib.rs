@@ -4,7 +4,7 @@
 //! [`scalar`] (what a number is) → [`formula`] (what a user writes) → [`model`] (what is integrated) → [`integrate`] (how a step is
 //! taken) → [`observe`] (what is seen on the way) → [`run`] (who drives it) → [`estimate`] (what
 //! measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
-//! Beside this stands [`picture`], the inner loop of the tracker, which knows none of them.
+//! Beside this stand [`picture`], the inner loop of the tracker, and [`memory`], which know none of them.
 
 // Formulas over components are read with their indices.
 #![allow(clippy::needless_range_loop)]
@@ -12,6 +12,7 @@
 pub mod estimate;
 pub mod formula;
 pub mod integrate;
+pub mod memory;
 pub mod model;
 pub mod observe;
 pub mod picture;

@@ -224,10 +224,11 @@ def test_ctrl_c_gives_what_is_finished() -> None:
     timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     try:
-        with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):
-            found = udd.basins(udd.DLE(9.0), square(3, 300), n=24, transient=2000, threads=1)
+        with pytest.raises(udd.Interrupted, match="stopped by Ctrl-C") as stopped:
+            udd.basins(udd.DLE(9.0), square(3, 300), n=24, transient=2000, threads=1)
     finally:
         timer.cancel()
+    found = stopped.value.partial
     names = np.array(found["outcome"].attrs["flag_meanings"].split())[found["outcome"].to_numpy()]
     finished = names == "finished"
     assert 0 < finished.sum() < finished.size

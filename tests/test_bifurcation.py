@@ -357,6 +357,7 @@ def test_ctrl_c_gives_what_is_finished(path: str) -> None:
                 path=path,  # type: ignore[arg-type]
                 component="y",
                 threads=1,
+                partial=True,
             )
     finally:
         timer.cancel()

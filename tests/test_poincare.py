@@ -197,13 +197,13 @@ def test_ctrl_c_keeps_what_is_found() -> None:
     before = signal.signal(signal.SIGALRM, stop)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.5)
-        with pytest.warns(IncompleteWarning, match="interrupted") as said:
-            found = udd.poincare(udd.DLE(1.0), n=10_000_000, threads=1)
+        with pytest.raises(udd.Interrupted, match="interrupted") as stopped:
+            udd.poincare(udd.DLE(1.0), n=10_000_000, threads=1)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     assert threading.active_count() >= 1
-    assert said[0].message.interrupted  # type: ignore[union-attr]
+    found = stopped.value.partial
     assert 0 < found.found < 10_000_000
     assert found.outcome == "interrupted"
     assert found.t.shape == (found.found,)

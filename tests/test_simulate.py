@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 import subprocess
 import sys
 
@@ -226,7 +227,7 @@ def test_a_single_time_is_the_start() -> None:
 
 INTERRUPTED = """
 import os, signal, sys, threading, time, warnings
-import numpy as np, udd
+import numpy as np, udd, xarray
 called = 0.0
 def fire():
     global called
@@ -247,6 +248,11 @@ for _ in range(3):
     [
         "udd.simulate(udd.DLE(1.0), [0, 1e9], [1, 1, 0.01])",
         "udd.lyapunov(np.linspace(1, 4, 64), tol=1e-9, t=1e9)",
+        "udd.ensemble(udd.DLE(1.0), 1e5, np.ones((10_000, 3)))",
+        "udd.poincare(udd.DLE(1.0), n=1_000_000, parameters={'w': np.linspace(1, 5, 64)})",
+        "udd.bifurcation(udd.DLE(1.0), 'w', np.linspace(1, 9, 4000))",
+        "udd.basins(udd.DLE(6.2), {'omega': np.linspace(-3, 3, 200), 'z': np.linspace(-3, 3, 200)})",
+        "udd.sweep(udd.SweepSpec('lyapunov', udd.DLE(1.0), {'w': np.linspace(1, 2, 9999)}))",
     ],
 )
 def test_ctrl_c_is_answered_within_0_2_s(call: str) -> None:
@@ -256,3 +262,63 @@ def test_ctrl_c_is_answered_within_0_2_s(call: str) -> None:
     assert len(delays) == 3, out.stderr
     # The best of three: a busy machine may hold up any one.
     assert min(delays) < 0.2
+
+
+LARGE = """
+import resource
+import numpy as np, udd
+resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+try:
+    {call}
+except MemoryError as error:
+    print(error)
+print(udd.simulate(udd.DLE(1.0), 1.0, [1, 1, 1]).outcome)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit of memory for a process of its own")
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            "udd.simulate(udd.DLE(1.0), 1e9, [1, 1, 0.01], method='taylor')",
+            r"keeping every step to t = 1000000000 would need about \d{2,3}\.\d{3} GB, .*give the times",
+        ),
+        (
+            "udd.simulate(udd.DLE(1.0), [0, 1e9], [1, 1, 0.01], dense=True)",
+            r"keeping every step to t = 1000000000 would need about \d{3,4}\.\d{3} GB, .*leave out dense",
+        ),
+        (
+            "udd.ensemble(udd.DLE(1.0), np.arange(10_000), np.ones((100_000, 3)))",
+            r"100000 runs of 10000 states take 24\.000 GB, for which there is no room",
+        ),
+        (
+            "udd.poincare(udd.DLE(1.0), n=10**9)",
+            r"1000000000 points take 33\.000 GB, for which there is no room",
+        ),
+    ],
+    ids=["steps", "polynomials", "runs", "points"],
+)
+def test_what_does_not_fit_into_memory_is_said(call: str, said: str) -> None:
+    code = LARGE.format(call=call)
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    message, after = out.stdout.splitlines()
+    assert re.match(said, message), message
+    assert after == "finished"
+
+
+def test_arrays_that_are_not_aligned_are_copied() -> None:
+    def askew(values: list[float]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        room = np.zeros(8 * len(values) + 1, dtype=np.uint8)
+        there = room[1:].view(np.float64)
+        there[:] = values
+        assert not there.flags.aligned
+        return there
+
+    times, start = [0.0, 1.0, 2.0], [1.0, 1.0, 0.01]
+    run = udd.simulate(udd.DLE(1.0), askew(times), askew(start), dense=True)
+    assert np.array_equal(run.state, udd.simulate(udd.DLE(1.0), times, start).state)
+    assert np.array_equal(run(askew(times)), run.state)
+    ends = [udd.ensemble(udd.DLE(1.0), t, start).end for t in (askew(times), times)]
+    assert np.array_equal(*ends)
+    assert np.array_equal(udd.DLE(1.0).rates(0.0, askew(start)), udd.DLE(1.0).rates(0.0, start))

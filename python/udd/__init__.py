@@ -27,6 +27,7 @@ _PUBLIC = {
     "Fit": "udd.fitting",
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
+    "Interrupted": "udd.errors",
     "Locus": "udd.structure",
     "Measurement": "udd.measurement",
     "Model": "udd.models",
@@ -89,6 +90,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.ensembles import ensemble as ensemble
     from udd.errors import ConvergenceWarning as ConvergenceWarning
     from udd.errors import IncompleteWarning as IncompleteWarning
+    from udd.errors import Interrupted as Interrupted
     from udd.errors import StiffnessWarning as StiffnessWarning
     from udd.errors import UddError as UddError
     from udd.exponents import lyapunov as lyapunov

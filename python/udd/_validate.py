@@ -50,7 +50,7 @@ def whole(name: str, value: object, least: int) -> int:
 
 
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """A C-contiguous float64 array of finite numbers.
+    """A C-contiguous, aligned float64 array of finite numbers; what is not is copied.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         given: NDArray[Any] = np.asarray(value)
         if given.dtype.kind not in "iuf":
             raise TypeError
-        result = np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
+        result = np.require(given, np.float64, ["C", "A"])
     except (TypeError, ValueError):
         raise ModelError(f"{name} must be numbers") from None
     if not np.isfinite(result).all():

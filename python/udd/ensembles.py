@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import array, number
 from udd.crew import bar, thread_count
-from udd.errors import IncompleteWarning, ModelError
+from udd.errors import ModelError, interrupted
 from udd.models import Model, require_model
 from udd.orbits import orbits_of
 from udd.outcomes import OUTCOMES
@@ -65,6 +64,7 @@ def ensemble(
     method: str = "auto",
     threads: int | None = None,
     progress: bool | None = None,
+    partial: bool = False,
 ) -> Ensemble:
     """Run a model from many states, or with many values of its parameters, on all cores.
 
@@ -86,6 +86,8 @@ def ensemble(
         How many threads to use, by default one per core. No bit of the result depends on it.
     progress : bool, optional
         Whether to show a progress bar on stderr; by default for many runs, where stderr is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -97,10 +99,15 @@ def ensemble(
     ModelError
         Times, states or parameters that cannot be used.
 
+    Interrupted
+        On Ctrl-C, with the ensemble as its ``partial``: the runs that are not finished are NaN.
+    MemoryError
+        There is no room for so many states.
+
     Warns
     -----
     IncompleteWarning
-        On Ctrl-C: the runs that are not finished are NaN.
+        Ctrl-C, where a partial result was asked for.
 
     Examples
     --------
@@ -138,12 +145,8 @@ def ensemble(
             model, rows, starts, times, rtol, atol, stepper, thread_count(threads), since(0)
         )
     names = np.array(OUTCOMES)[found["outcome"]]
-    stopped = int((names == "interrupted").sum())
-    if stopped:
-        message = f"{stopped} of {runs} runs were interrupted and are NaN"
-        warnings.warn(IncompleteWarning(message, interrupted=True), stacklevel=2)
     states = found["states"][:, wanted]
-    return Ensemble(
+    made = Ensemble(
         times[wanted],
         states.reshape(*shape, *states.shape[1:]),
         names.reshape(shape),
@@ -151,3 +154,7 @@ def ensemble(
         found["t_end"].reshape(shape),
         model,
     )
+    stopped = int((names == "interrupted").sum())
+    if stopped:
+        interrupted(made, f"{stopped} of {runs} runs were interrupted and are NaN", partial)
+    return made

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from typing import Any
+
 
 class UddError(ValueError):
     """Base class of what `udd` raises for bad input."""
@@ -41,3 +44,27 @@ class IncompleteWarning(UserWarning):
     def __init__(self, message: str, interrupted: bool = False) -> None:
         super().__init__(message)
         self.interrupted = interrupted
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, with what was computed before it.
+
+    Parameters
+    ----------
+    message : str
+        How much is missing.
+    partial : object
+        What the function returns, as far as it came: NaN where nothing is known, and an outcome
+        "interrupted".
+    """
+
+    def __init__(self, message: str, partial: Any) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+def interrupted(result: Any, message: str, partial: bool) -> None:
+    """Raise :class:`Interrupted`, or warn whoever asked for a partial result."""
+    if not partial:
+        raise Interrupted(message, result) from None
+    warnings.warn(IncompleteWarning(message, interrupted=True), stacklevel=3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -25,8 +26,8 @@ def made_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
-def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file in one go; what stood there before stays until the new one is complete.
+def require_writable(path: str | os.PathLike[str]) -> None:
+    """Refuse a file that cannot be written, before the work for it begins.
 
     Raises
     ------
@@ -38,6 +39,20 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
         raise UddError(f"{target} is a folder, not a file to write to")
     if not target.parent.is_dir():
         raise UddError(f"{target}: there is no folder {target.parent}")
+    if not os.access(target.parent, os.W_OK):
+        raise UddError(f"{target} cannot be written: {os.strerror(errno.EACCES)}")
+
+
+def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file in one go; what stood there before stays until the new one is complete.
+
+    Raises
+    ------
+    UddError
+        There is no such folder, it may not be written to, or the path is a folder.
+    """
+    target = Path(path)
+    require_writable(target)
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     except OSError as error:

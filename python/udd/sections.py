@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._validate import number, whole
 from udd.crew import bar, thread_count
-from udd.errors import IncompleteWarning, ModelError
+from udd.errors import IncompleteWarning, ModelError, interrupted
 from udd.models import Model, require_model
 from udd.orbits import orbits_of
 from udd.outcomes import OUTCOMES
@@ -210,6 +210,7 @@ def poincare(
     atol: float = 1e-12,
     threads: int | None = None,
     progress: bool | None = None,
+    partial: bool = False,
 ) -> Section:
     """Crossings of a surface along orbits: a Poincaré section.
 
@@ -246,6 +247,8 @@ def poincare(
         By default one per core. The result does not depend on it.
     progress : bool, optional
         Whether to show a progress bar; by default for many orbits in a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -256,10 +259,16 @@ def poincare(
     ModelError
         An expression, a state or an option that cannot be used.
 
+    Interrupted
+        On Ctrl-C, with the crossings found as its ``partial``.
+    MemoryError
+        There is no room for so many points.
+
     Warns
     -----
     IncompleteWarning
-        Where orbits end before the surface is crossed n times, or on Ctrl-C; what was found is returned.
+        Where orbits end before the surface is crossed n times; after Ctrl-C where a partial result was asked
+        for.
 
     Notes
     -----
@@ -301,15 +310,14 @@ def poincare(
             thread_count(threads),
             since(0),
         )
-    _tell(found["outcome"], found["found"], count)
-
     names = np.array(OUTCOMES)[found["outcome"]]
     numbers = found["found"].astype(np.int64)
-    which = np.where(np.arange(count) < numbers[:, None], found["which"].astype(np.int64), -1)
+    columns = found["t"].shape[1]  # as many as were asked for, or were found until Ctrl-C
+    which = np.where(np.arange(columns) < numbers[:, None], found["which"].astype(np.int64), -1)
     words = tuple(next(word for word, sign in _DIRECTIONS.items() if sign == way) for way in ways)
     if shape == ():
         own = int(numbers[0])
-        return Section(
+        made = Section(
             found["t"][0, :own],
             found["points"][0, :own],
             which[0, :own],
@@ -322,19 +330,22 @@ def poincare(
             float(found["t_end"][0]),
             model,
         )
-    return Section(
-        found["t"].reshape(*shape, count),
-        found["points"].reshape(*shape, count, -1),
-        which.reshape(*shape, count),
-        surfaces,
-        words,
-        numbers.reshape(shape),
-        found["residual"].reshape(shape),
-        names.reshape(shape),
-        found["end"].reshape(*shape, -1),
-        found["t_end"].reshape(shape),
-        model,
-    )
+    else:
+        made = Section(
+            found["t"].reshape(*shape, columns),
+            found["points"].reshape(*shape, columns, -1),
+            which.reshape(*shape, columns),
+            surfaces,
+            words,
+            numbers.reshape(shape),
+            found["residual"].reshape(shape),
+            names.reshape(shape),
+            found["end"].reshape(*shape, -1),
+            found["t_end"].reshape(shape),
+            model,
+        )
+    _tell(found["outcome"], numbers, count, made, partial)
+    return made
 
 
 def surfaces_of(
@@ -392,16 +403,18 @@ def clock_of(model: Model, rows: _Floats) -> float:
     return 1.0 / max(slowest, 1e-6)
 
 
-def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int) -> None:
-    """Warn of orbits with fewer points."""
+def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Section, partial: bool) -> None:
+    """Tell of orbits with fewer points."""
     short = outcome != OUTCOMES.index("finished")
     if not short.any():
         return
-    interrupted = bool((outcome == OUTCOMES.index("interrupted")).any())
     kinds, counts = np.unique(outcome[short], return_counts=True)
     if len(outcome) == 1:
         message = f"the orbit has {int(found[0])} crossings instead of {n}: {OUTCOMES[kinds[0]]}"
     else:
         whys = ", ".join(f"{OUTCOMES[kind]} {count}" for kind, count in zip(kinds, counts, strict=True))
         message = f"{int(short.sum())} of {len(outcome)} orbits have fewer than {n} crossings: {whys}"
-    warnings.warn(IncompleteWarning(message, interrupted=interrupted), stacklevel=3)
+    if (outcome == OUTCOMES.index("interrupted")).any():
+        interrupted(section, message, partial)
+    else:
+        warnings.warn(IncompleteWarning(message), stacklevel=3)

@@ -167,6 +167,11 @@ pub enum Failure {
     LeftDomain { t: f64 },
     #[error("the law switches without end at t = {t}: the run chatters")]
     Chattering { t: f64 },
+    #[error(
+        "keeping every step to t = {end} would need about {:.3} GB, and there is no room for more than \
+         {:.3}: give the times that are wanted, or leave out dense", bytes * 1e-9, kept * 1e-9
+    )]
+    NoRoom { end: f64, bytes: f64, kept: f64 },
     #[error("interrupted")]
     Interrupted,
 }

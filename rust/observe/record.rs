@@ -1,6 +1,10 @@
 //! A whole run as a piecewise polynomial.
 
 use crate::integrate::Steps;
+use crate::memory;
+
+/// More than the polynomial of any method's step.
+const MOST_COEFFICIENTS: usize = 32;
 
 /// The polynomials of all steps.
 #[derive(Clone, Debug)]
@@ -27,6 +31,18 @@ impl<const D: usize> Record<D> {
             let unit = run.polynomial(&mut self.coefficients);
             self.pieces.push((unit, self.coefficients.len()));
         }
+    }
+
+    /// Makes room for another step; false where there is none.
+    pub fn grow(&mut self) -> bool {
+        memory::grow(&mut self.times, 1)
+            && memory::grow(&mut self.pieces, 1)
+            && memory::grow(&mut self.coefficients, MOST_COEFFICIENTS)
+    }
+
+    /// What it takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.times) + size_of_val(&*self.pieces) + size_of_val(&*self.coefficients)
     }
 
     /// The first and the last time.

@@ -9,6 +9,7 @@ use super::jobs::{self, Jobs, outcome_code};
 use super::model::{AnyModel, with_wide_model};
 use super::simulate::stepper;
 use crate::integrate::Tolerance;
+use crate::memory;
 use crate::model::Family;
 use crate::run::{Crew, Ensemble, Passage, rows};
 
@@ -26,11 +27,12 @@ impl Table {
         let mut table =
             Self { times, states: Vec::new(), end: Vec::new(), t_end: Vec::new(), outcome: Vec::new() };
         let numbers = runs.saturating_mul(times).saturating_mul(dimension);
-        let room = table.states.try_reserve_exact(numbers);
-        room.map_err(|_| {
-            PyMemoryError::new_err(format!("there is no room for {runs} runs of {times} states"))
-        })?;
-        Ok(table)
+        memory::reserve(&mut table.states, numbers).then_some(table).ok_or_else(|| {
+            let gigabytes = numbers as f64 * 8e-9;
+            PyMemoryError::new_err(format!(
+                "{runs} runs of {times} states take {gigabytes:.3} GB, for which there is no room"
+            ))
+        })
     }
 
     /// The states that a run met, one after the other, and its end.

@@ -1,7 +1,7 @@
 //! The core's errors as Python exceptions.
 
 use pyo3::PyErr;
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
 
 use crate::integrate::Failure;
 
@@ -13,6 +13,7 @@ impl From<Failure> for PyErr {
     fn from(failure: Failure) -> PyErr {
         match failure {
             Failure::Interrupted => PyKeyboardInterrupt::new_err(()),
+            full @ Failure::NoRoom { .. } => PyMemoryError::new_err(full.to_string()),
             other => IntegrationError::new_err(format!("the integration failed: {other}")),
         }
     }

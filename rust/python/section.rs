@@ -10,6 +10,7 @@ use super::jobs::{self, Jobs};
 use super::model::{AnyModel, with_wide_model};
 use crate::formula::{Expression, Names};
 use crate::integrate::Tolerance;
+use crate::memory;
 use crate::model::Family;
 use crate::run::{Crew, Crossings, Ended, Section, Sections};
 
@@ -63,10 +64,14 @@ impl Table {
             outcome: Vec::new(),
         };
         let points = rows.saturating_mul(count);
-        let room = table.points.try_reserve_exact(points.saturating_mul(dimension));
-        let room = room.and(table.t.try_reserve_exact(points)).and(table.which.try_reserve_exact(points));
-        room.map_err(|_| PyMemoryError::new_err(format!("there is no room for {points} points")))?;
-        Ok(table)
+        let room = memory::reserve(&mut table.points, points.saturating_mul(dimension))
+            && memory::reserve(&mut table.t, points)
+            && memory::reserve(&mut table.which, points);
+        room.then_some(table).ok_or_else(|| {
+            let gigabytes = points as f64 * (8.0 * (dimension + 1) as f64 + 1.0) * 1e-9;
+            let message = format!("{points} points take {gigabytes:.3} GB, for which there is no room");
+            PyMemoryError::new_err(message)
+        })
     }
 
     /// The points of a trajectory: where, when, and of which surface; then its end, and how large the surfaces'
@@ -98,7 +103,12 @@ fn collect<F: Family<D>, const D: usize>(
     mut table: Table,
     crew: Crew<'_>,
 ) -> Table {
-    for crossings in sections.run(crew) {
+    let all = sections.run(crew);
+    if all.iter().any(|one| one.as_ref().is_none_or(|found| found.ended == Ended::Interrupted)) {
+        // Room for points that never came is not even filled.
+        table.count = all.iter().flatten().map(|found| found.t.len()).max().unwrap_or(0);
+    }
+    for crossings in all {
         match crossings {
             Some(Crossings { t, x, which, residual, end, ended }) => {
                 table.push((x.as_flattened(), &t, &which), (end.0, &end.1, code(ended)), residual);
@@ -168,7 +178,7 @@ fn sections<'py>(
         watched.watch(py, |crew| collect(&sections, table, crew))?
     });
     jobs::lost(py, signal, &table.outcome)?;
-    let jobs = table.outcome.len();
+    let (jobs, count) = (table.outcome.len(), table.count);
     let dict = PyDict::new(py);
     dict.set_item("points", PyArray1::from_vec(py, table.points).reshape([jobs, count, names.len()])?)?;
     dict.set_item("t", PyArray1::from_vec(py, table.t).reshape([jobs, count])?)?;

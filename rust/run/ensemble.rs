@@ -200,7 +200,10 @@ fn passage<const D: usize>(
     stop: &Stop,
 ) -> Option<Passage<D>> {
     let mut samples = Samples::new(times, *run.x());
-    let outcome = match follow(run, end, (stop, None), &mut |run, _| samples.take(run)) {
+    let outcome = match follow(run, end, (stop, None), &mut |run, _| {
+        samples.take(run);
+        Ok(())
+    }) {
         Err(Failure::Interrupted) => return None,
         Ok(Outcome::Chattering) => Err(Failure::Chattering { t: run.t() }),
         outcome => outcome,

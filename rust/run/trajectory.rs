@@ -2,6 +2,7 @@
 
 use super::stiffness::{Look, Stiffness};
 use crate::integrate::{Counts, Driver, Ending, Failure, Method, Steps, Tolerance};
+use crate::memory;
 use crate::model::System;
 use crate::observe::{Event, Record, Samples};
 use crate::run::Stop;
@@ -89,6 +90,9 @@ fn sampled<const D: usize>(
         if times.is_empty() {
             // Two events can share a time.
             if run.t() > steps.0[steps.0.len() - 1] {
+                if !(memory::grow(&mut steps.0, 1) && memory::grow(&mut steps.1, 1)) {
+                    return Err(no_room(steps.0.len() * size_of::<[f64; D]>(), run.t(), (start, end)));
+                }
                 steps.0.push(run.t());
                 steps.1.push(*run.x());
             }
@@ -96,9 +100,13 @@ fn sampled<const D: usize>(
             samples.take(run);
         }
         if let Some(record) = &mut record {
+            if !record.grow() {
+                return Err(no_room(record.bytes(), run.t(), (start, end)));
+            }
             record.push(run);
         }
         events.extend(Event::seen(ending, run));
+        Ok(())
     })?;
 
     let (mut t, mut x) = steps;
@@ -113,12 +121,18 @@ fn sampled<const D: usize>(
     Ok(Run { t, x, events, outcome, counts: run.counts(), record })
 }
 
+/// What `kept` bytes at time `t` say of the whole run.
+fn no_room(kept: usize, t: f64, (start, end): (f64, f64)) -> Failure {
+    let kept = kept as f64;
+    Failure::NoRoom { end, bytes: kept * (end - start) / (t - start), kept }
+}
+
 /// Follows a run to `end`, showing every step; where asked for, it is watched for being stiff.
 pub(super) fn follow<const D: usize>(
     run: &mut dyn Steps<D>,
     end: f64,
     (stop, stiffness): (&Stop, Option<&Stiffness>),
-    see: &mut dyn FnMut(&dyn Steps<D>, Ending),
+    see: &mut dyn FnMut(&dyn Steps<D>, Ending) -> Result<(), Failure>,
 ) -> Result<Outcome, Failure> {
     let mut look = Look::new();
     while run.t() < end {
@@ -131,7 +145,7 @@ pub(super) fn follow<const D: usize>(
         if let Some(stiffness) = stiffness {
             look.at(run, stiffness)?;
         }
-        see(run, ending);
+        see(run, ending)?;
         if let Some(outcome) = outcome {
             return Ok(outcome);
         }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._validate import number, whole
-from udd.errors import IncompleteWarning, ModelError
+from udd.errors import ModelError, interrupted
 from udd.models import Model
 
 from .asked import parameter_rows, parameter_values, runner_of, start_states
@@ -59,6 +58,7 @@ def bifurcation(
     t_max: float | None = None,
     threads: int | None = None,
     progress: bool | None = None,
+    partial: bool = False,
 ) -> xr.Dataset:
     """Section points over a parameter, with the attractors told apart.
 
@@ -102,6 +102,8 @@ def bifurcation(
         How many; by default one per core.
     progress : bool, optional
         Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -130,10 +132,14 @@ def bifurcation(
     UddError
         The extra ``scale`` is not installed.
 
+    Interrupted
+        On Ctrl-C, with the dataset as its ``partial``: what is not finished is NaN with the outcome
+        "interrupted".
+
     Warns
     -----
     IncompleteWarning
-        After Ctrl-C: what is finished is returned, the rest is NaN with the outcome "interrupted".
+        After Ctrl-C, where a partial result was asked for.
 
     Notes
     -----
@@ -186,12 +192,12 @@ def bifurcation(
     shown = sys.stderr.isatty() if progress is None else progress
     with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
         added = kick(judge.coordinates.size, nudge)
-        interrupted = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
+        stopped = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
     told, kinds = Told.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
     try:
         if attractors:
             told = tell(judge, found, verdicts, places, reach)
-        if told.differ.any() and not interrupted:
+        if told.differ.any() and not stopped:
             unsure = places[:, :, told.differ].ravel()
             unsure = unsure[decided(found, verdicts)[unsure]]
             for part in parts(len(unsure), longest + n):
@@ -202,12 +208,7 @@ def bifurcation(
         if attractors:
             kinds = kinds_of(runner, judge, found, verdicts, rows, of_job)
     except KeyboardInterrupt:
-        interrupted = True
-    if interrupted:
-        left = int((found.outcome == INTERRUPTED).sum())
-        missing = f"{left} of {places.size} runs are" if left else "telling the attractors apart is"
-        warnings.warn(IncompleteWarning(f"{missing} not finished: stopped by Ctrl-C", True), stacklevel=2)
-
+        stopped = True
     dims = ("path", "start", parameter)
     data: Variables = {
         name: (
@@ -231,10 +232,14 @@ def bifurcation(
     for k, name in enumerate(model.state_names):
         coords[f"start_{name}"] = ("start", begin[:, k], of_state(model, name, "at the start"))
     options = {"parameter": parameter, "n": n, "transient": transient, "extend": extend, "nudge": nudge}
-    more = {"reach": reach, "complete": int(not interrupted)}
+    more = {"reach": reach, "complete": int(not stopped)}
     made: xr.Dataset = xarray.Dataset(
         data, coords, of_result(runner, "bifurcation diagram", {**options, **more})
     )
+    if stopped:
+        left = int((found.outcome == INTERRUPTED).sum())
+        missing = f"{left} of {places.size} runs are" if left else "telling the attractors apart is"
+        interrupted(made, f"{missing} not finished: stopped by Ctrl-C", partial)
     return made
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from udd._validate import whole
-from udd.errors import IncompleteWarning, ModelError
+from udd.errors import ModelError, interrupted
 from udd.models import Model
 from udd.outcomes import FINISHED, OUTCOMES
 
@@ -49,6 +48,7 @@ def basins(
     t_max: float | None = None,
     threads: int | None = None,
     progress: bool | None = None,
+    partial: bool = False,
 ) -> xr.Dataset:
     """Which initial states end on which attractor.
 
@@ -78,6 +78,8 @@ def basins(
         How many; by default one per core.
     progress : bool, optional
         Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -104,10 +106,13 @@ def basins(
     UddError
         The extra ``scale`` is not installed.
 
+    Interrupted
+        On Ctrl-C, with the dataset as its ``partial``: what is not finished has the outcome "interrupted".
+
     Warns
     -----
     IncompleteWarning
-        After Ctrl-C: what is finished is returned, the rest has the outcome "interrupted".
+        After Ctrl-C, where a partial result was asked for.
 
     Notes
     -----
@@ -146,22 +151,22 @@ def basins(
 
     shown = sys.stderr.isatty() if progress is None else progress
     with tqdm(total=len(starts), unit="start", disable=not shown, leave=False) as bar:
-        interrupted = crowd.run(transient, bar)
-    if interrupted:
-        left = int((crowd.outcome == INTERRUPTED).sum())
-        message = (
-            f"{left} of {len(starts)} initial states are not finished: stopped by Ctrl-C"
-            if left
-            else "stopped by Ctrl-C before the aperiodic motions were followed further"
-        )
-        warnings.warn(IncompleteWarning(message, True), stacklevel=2)
-    options = {"n": n, "transient": transient, "extend": extend, "complete": int(not interrupted)}
+        stopped = crowd.run(transient, bar)
+    options = {"n": n, "transient": transient, "extend": extend, "complete": int(not stopped)}
     attrs = of_result(runner, "basins of attraction", options)
     for k, name in enumerate(model.state_names):
         if name not in axes:
             attrs[f"start_{name}"] = float(starts[0, k])
     data, coords = _arrays(crowd, axes)
     made: xr.Dataset = xarray.Dataset(data, coords, {**attrs, "grid": " ".join(axes)})
+    if stopped:
+        left = int((crowd.outcome == INTERRUPTED).sum())
+        message = (
+            f"{left} of {len(starts)} initial states are not finished: stopped by Ctrl-C"
+            if left
+            else "stopped by Ctrl-C before the aperiodic motions were followed further"
+        )
+        interrupted(made, message, partial)
     return made
 
 

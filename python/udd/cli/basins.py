@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> Answer:
             state0=None if starts is None else starts[0],
             progress=watched(),
             **runs_of(args),
+            partial=True,
         )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)

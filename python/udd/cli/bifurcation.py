@@ -60,6 +60,7 @@ def run(args: argparse.Namespace) -> Answer:
             path=args.path,
             progress=watched(),
             **runs_of(args),
+            partial=True,
         )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from udd import _beside
-from udd.errors import UddError
 
 from .answer import Answer, telling
 from .fit import options
 from .inputs import add_input, check_early, inputs_of
 from .options import new
+from .saving import OutputFile
 
 if TYPE_CHECKING:
     from udd.discovery import Discovery
@@ -36,7 +36,9 @@ def add(commands: Any) -> None:
         metavar="SECONDS",
         help="end the search after so long, with what it has by then",
     )
-    parser.add_argument("--report", type=Path, metavar="HTML", help="page to write, pictures first")
+    parser.add_argument(
+        "--report", type=Path, action=OutputFile, metavar="HTML", help="page to write, pictures first"
+    )
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -46,8 +48,6 @@ def run(args: argparse.Namespace) -> Answer:
     from udd.discovery import discover
 
     check_early(args)
-    if args.report is not None and not args.report.parent.is_dir():
-        raise UddError(f"{args.report}: there is no folder {args.report.parent}")
     given = inputs_of(args)
     if args.report is not None:
         _beside.importing(

@@ -11,6 +11,7 @@ from udd.errors import UddError
 
 from .answer import Answer, watched
 from .options import disk, new
+from .saving import OutputFile
 from .simulate import add_run, run_model
 
 _STEP = 0.005  # s between samples of the run, short enough for the camera
@@ -19,7 +20,7 @@ _STEP = 0.005  # s between samples of the run, short enough for the camera
 def add(commands: Any) -> None:
     """Add the command."""
     parser = new(commands, "film", run, "Film a simulated run of the disk, as a camera before it would.")
-    parser.add_argument("out", type=Path, metavar="OUT.mp4", help="film to write")
+    parser.add_argument("out", type=Path, action=OutputFile, metavar="OUT.mp4", help="film to write")
     add_run(parser)
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second (default 25)")
     parser.add_argument(

@@ -13,7 +13,7 @@ from udd.errors import IncompleteWarning, UddError
 from .answer import Answer
 from .chosen import add_models, check_component, check_count, model_of
 from .options import new, numbers
-from .saving import checked, save_figure
+from .saving import OutputFile, checked, save_figure
 
 if TYPE_CHECKING:
     from udd.sections import Section
@@ -41,9 +41,15 @@ def add(commands: Any) -> None:
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
     parser.add_argument("--state", metavar="X,X,X", help="initial state omega,y,z or Omega,Y,Z,beta or ...")
-    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="file for the table instead of stdout")
-    parser.add_argument("--picture", type=Path, help="picture of the points: .png, .svg or .pdf")
-    parser.add_argument("--map", type=Path, metavar="PICTURE", help="picture of the return map")
+    parser.add_argument(
+        "--out", type=Path, action=OutputFile, metavar="FILE.csv", help="file for the table instead of stdout"
+    )
+    parser.add_argument(
+        "--picture", type=Path, action=OutputFile, help="picture of the points: .png, .svg or .pdf"
+    )
+    parser.add_argument(
+        "--map", type=Path, action=OutputFile, metavar="PICTURE", help="picture of the return map"
+    )
     parser.add_argument("--component", help="component of the state in the return map")
     add_models(parser)
 
@@ -70,6 +76,7 @@ def run(args: argparse.Namespace) -> Answer:
             t_max=args.t_max,
             rtol=args.rtol,
             atol=args.atol,
+            partial=True,
         )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)

@@ -45,8 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:
         atexit.register(gc.freeze)  # a process that ends need not be searched for garbage: half a second
     parser = make_parser()
-    args = parser.parse_args(argv)
     try:
+        args = parser.parse_args(argv)
         with warnings.catch_warnings():
             warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _warn

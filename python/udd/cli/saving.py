@@ -9,9 +9,10 @@ import tempfile
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
+from udd.files import require_writable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +22,21 @@ if TYPE_CHECKING:
 #: Endings of a labelled result's own files, and of pictures.
 DATA = (".nc", ".zarr")
 PICTURES = (".png", ".svg", ".pdf")
+
+
+class OutputFile(argparse.Action):
+    """The name of a file to write; one that cannot be written is refused before the work."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Check it and keep it."""
+        require_writable(values)
+        setattr(namespace, self.dest, values)
 
 
 def add_out(parser: argparse.ArgumentParser, data: tuple[str, ...] = DATA) -> None:
@@ -41,7 +57,9 @@ def checked(paths: list[Path], data: tuple[str, ...] = DATA) -> None:
     for path in paths:
         if path.suffix not in (*data, *PICTURES):
             raise UddError(f"{path}: the name must end in {', '.join((*data, *PICTURES))}")
-        if not path.parent.is_dir():
+        if path.suffix != ".zarr":
+            require_writable(path)
+        elif not path.parent.is_dir():
             raise UddError(f"{path}: there is no folder {path.parent}")
         if path.suffix == ".zarr" and path.exists():
             raise UddError(f"{path} exists already: Zarr needs a new folder")

@@ -12,6 +12,7 @@ from udd.errors import UddError
 
 from .answer import Answer
 from .options import add_disk, add_pendulum, disk, new, numbers, pendulum
+from .saving import OutputFile
 
 if TYPE_CHECKING:
     from udd.models import Model
@@ -32,7 +33,9 @@ def add(commands: Any) -> None:
     parser.add_argument("--dt", type=float, default=0.01, help="time between rows (default 0.01)")
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
-    parser.add_argument("--out", type=Path, metavar="CSV", help="file to write; otherwise standard output")
+    parser.add_argument(
+        "--out", type=Path, action=OutputFile, metavar="CSV", help="file to write; otherwise standard output"
+    )
     add_pendulum(parser)
 
 

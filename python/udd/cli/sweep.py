@@ -53,10 +53,10 @@ def run(args: argparse.Namespace) -> Answer:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         if args.dask is None:
-            found = sweep(spec, store=args.store, progress=watched())
+            found = sweep(spec, store=args.store, progress=watched(), partial=True)
         else:
             with _client(args.dask) as client:
-                found = sweep(spec, client.get_executor(), args.store, progress=watched())
+                found = sweep(spec, client.get_executor(), args.store, progress=watched(), partial=True)
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
     unfinished = [w.message for w in said if isinstance(w.message, IncompleteWarning)]

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
+from udd.files import require_writable
 
 from .answer import Answer, watched
 from .inputs import add_partial, is_film, whole
 from .options import new, numbers
+from .saving import OutputFile
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -39,7 +41,9 @@ def add(commands: Any) -> None:
         "--camera", type=int, metavar="N", help="record a film from webcam N (0: the first), and track that"
     )
     parser.add_argument("--seconds", type=float, metavar="S", help="with --camera: how long (default 20)")
-    parser.add_argument("--film", type=Path, metavar="MP4", help="with --camera: the film to write")
+    parser.add_argument(
+        "--film", type=Path, action=OutputFile, metavar="MP4", help="with --camera: the film to write"
+    )
     parser.add_argument("--disk-radius", type=float, metavar="M", help="sets the scale (default 0.08)")
     parser.add_argument(
         "--pivot", metavar="U,V", help="contact in the picture [pixels]; found where not given"
@@ -92,10 +96,18 @@ def add(commands: Any) -> None:
         help="with --smooth: take dY/dT = Z Omega for true, up to this standard error",
     )
     parser.add_argument(
-        "--overlay", type=Path, metavar="MP4", help="film to write, what was found drawn upon it"
+        "--overlay",
+        type=Path,
+        action=OutputFile,
+        metavar="MP4",
+        help="film to write, what was found drawn upon it",
     )
     parser.add_argument(
-        "--page", type=Path, metavar="HTML", help="page to write: what was found, and how well"
+        "--page",
+        type=Path,
+        action=OutputFile,
+        metavar="HTML",
+        help="page to write: what was found, and how well",
     )
     add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
@@ -112,8 +124,8 @@ def run(args: argparse.Namespace) -> Answer:
         number("--slip", args.slip, above=0.0)
     if args.camera is None and args.file.is_dir():
         return _folder(args)
-    if args.out is not None and not args.out.parent.is_dir():
-        raise UddError(f"{args.out}: there is no folder {args.out.parent}")
+    if args.out is not None:
+        require_writable(args.out)
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
     said, before = ("", {}) if args.camera is None else _record(args)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from udd.errors import IncompleteWarning, ModelError
+from udd.errors import IncompleteWarning, ModelError, interrupted
 
 from .dispatch import ChunksLost, Executor, here, spread
 from .memory import Memory
@@ -29,6 +29,7 @@ def sweep(
     store: str | os.PathLike[str] | zarr.Group | None = None,
     *,
     progress: bool | None = None,
+    partial: bool = False,
 ) -> xr.Dataset:
     """Compute a quantity over a grid of parameters and initial states, chunk by chunk.
 
@@ -44,6 +45,8 @@ def sweep(
         stopped goes on from there. Without one the result is held in memory.
     progress : bool, optional
         Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -56,11 +59,15 @@ def sweep(
     UddError
         The store holds another sweep or other things, or cannot be written.
 
+    Interrupted
+        On Ctrl-C, with the dataset as its ``partial``: what is not finished is NaN with the outcome -1,
+        "not_run". The store keeps what is finished.
+
     Warns
     -----
     IncompleteWarning
-        After Ctrl-C, or where a chunk's workers died again and again: what is finished is returned, the rest
-        is NaN with the outcome -1, "not_run".
+        Where a chunk's workers died again and again: what is finished is returned. After Ctrl-C, where a
+        partial result was asked for.
 
     Notes
     -----
@@ -107,7 +114,7 @@ def sweep(
     done = result.done()
     sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
     shown = sys.stderr.isatty() if progress is None else progress
-    why, interrupted = "some of the workers do not reach the store", False
+    why, stopped = "some of the workers do not reach the store", False
     with tqdm(total=sum(sizes), initial=int(done @ sizes), unit="run", disable=not shown, leave=False) as bar:
 
         def keep(chunk: int, found: Any) -> None:
@@ -121,13 +128,16 @@ def sweep(
             else:
                 spread(executor, result.work, chunks, result.arguments, keep)
         except KeyboardInterrupt:
-            why, interrupted = "stopped by Ctrl-C", True
+            why, stopped = "stopped by Ctrl-C", True
         except ChunksLost as error:
             why = str(error)
     missing = int((~result.done()).sum())
     if missing:
         message = f"{missing} of {len(grid)} chunks are not finished: {why}; {result.remedy}"
-        warnings.warn(IncompleteWarning(message, interrupted), stacklevel=2)
+        if stopped:
+            interrupted(result.dataset(), message, partial)
+        else:
+            warnings.warn(IncompleteWarning(message), stacklevel=2)
     else:
         result.tidy()
     return result.dataset()
