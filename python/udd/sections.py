@@ -333,7 +333,7 @@ def poincare(
     else:
         made = Section(
             found["t"].reshape(*shape, columns),
-            found["points"].reshape(*shape, columns, -1),
+            found["points"].reshape(*shape, columns, len(model.state_names)),
             which.reshape(*shape, columns),
             surfaces,
             words,

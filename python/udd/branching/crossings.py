@@ -92,7 +92,8 @@ class Runner:
                 self.atol,
                 self.threads,
             )
-            found.points[runs], found.t[runs] = got["points"], got["t"]
+            columns = got["t"].shape[1]  # fewer after Ctrl-C
+            found.points[runs, :columns], found.t[runs, :columns] = got["points"], got["t"]
             found.outcome[runs], found.end[runs], found.t_end[runs] = got["outcome"], got["end"], got["t_end"]
             cut = found.outcome == INTERRUPTED
             found.points[cut], found.t[cut] = np.nan, np.nan

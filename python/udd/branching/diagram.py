@@ -134,7 +134,7 @@ def bifurcation(
 
     Interrupted
         On Ctrl-C, with the dataset as its ``partial``: what is not finished is NaN with the outcome
-        "interrupted".
+        "interrupted", and attractors have neither labels nor kinds.
 
     Warns
     -----
@@ -195,7 +195,7 @@ def bifurcation(
         stopped = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
     told, kinds = Told.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
     try:
-        if attractors:
+        if attractors and (partial or not stopped):
             told = tell(judge, found, verdicts, places, reach)
         if told.differ.any() and not stopped:
             unsure = places[:, :, told.differ].ravel()
@@ -205,7 +205,7 @@ def bifurcation(
                     raise KeyboardInterrupt
             found.outcome[unsure[verdicts.period[unsure] == SETTLING]] = UNDECIDED
             told = tell(judge, found, verdicts, places, reach)
-        if attractors:
+        if attractors and (partial or not stopped):
             kinds = kinds_of(runner, judge, found, verdicts, rows, of_job)
     except KeyboardInterrupt:
         stopped = True
