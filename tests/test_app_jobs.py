@@ -7,6 +7,7 @@ import base64
 import json
 import shutil
 import time
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
@@ -197,6 +198,24 @@ def test_a_job_that_makes_no_sense_is_refused(
     assert answer.status_code == 400
     assert words in answer.text
     assert not client.app.state.jobs.jobs  # type: ignore[attr-defined]
+
+
+def test_no_more_is_read_of_a_request_than_a_message_may_have(client: TestClient) -> None:
+    answer = client.post("/api/jobs/render?seconds=5", content=iter([b" " * (1 << 15)] * 4))
+    assert (answer.status_code, answer.text) == (413, "The request is larger than 64 kB.")
+
+
+def test_a_request_that_stops_halfway_is_given_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(limits, "PAUSE", 0.05)
+
+    async def halfway() -> AsyncIterator[bytes]:
+        yield b"{"
+        await asyncio.sleep(60)
+
+    for taken in (uploads.text(halfway()), uploads.receive(halfway(), tmp_path / "made")):
+        (tmp_path / "made").mkdir(exist_ok=True)
+        with pytest.raises(udd.UddError, match="stopped halfway"):
+            asyncio.run(taken)
 
 
 def test_a_films_size_is_limited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

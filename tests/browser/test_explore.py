@@ -150,6 +150,9 @@ def test_the_keyboard_does_everything(opened: Opened) -> None:
     assert page.evaluate("udd.home.model.W") == 0.0301
     page.keyboard.press("2")
     assert page.locator("#pane-diagram").is_visible()
+    page.keyboard.press("ArrowRight")  # the drive's, still
+    assert page.locator("#pane-diagram").is_visible()
+    assert page.evaluate("udd.home.model.W") == 0.0302
     page.keyboard.press("d")
     assert page.locator("#twin").is_checked()
     page.keyboard.press("p")
@@ -164,6 +167,17 @@ def test_the_keyboard_does_everything(opened: Opened) -> None:
     y = page.evaluate("udd.last.y")
     page.keyboard.press("ArrowRight")
     assert page.evaluate("udd.home.state[1]") > y
+
+
+def test_keys_go_on_after_a_slider_and_a_preset_were_touched(opened: Opened) -> None:
+    page = opened.go()
+    page.locator("input[type=range]").first.click()
+    page.keyboard.press("2")
+    assert page.locator("#pane-diagram").is_visible()
+    page.locator("#preset").click()
+    page.locator("#preset").select_option("rotating")
+    page.keyboard.press("3")
+    assert page.locator("#pane-energy").is_visible()
 
 
 def test_the_diagram_is_jumped_onto_and_zoomed(opened: Opened) -> None:

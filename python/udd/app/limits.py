@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 MESSAGE = 1 << 16  # bytes of a message on the WebSocket
+PAUSE = 10.0  # s that a sender may take between two pieces of a request
 UPLOAD = 300 << 20  # bytes of a film or a table
 PIXELS = 4096 * 2304  # of a film's frame
 FRAMES = 40_000  # of a film

@@ -117,8 +117,7 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             shutil.copyfile(sample, folder / "sample.mp4")
         return {"kind": "loop", "file": "sample.mp4", "film": True, "W": demo.W, "R": demo.R}
     if kind == "render":
-        text = (await request.body())[: limits.MESSAGE].decode("utf-8", "replace")
-        start = from_json("the run", text)
+        start = from_json("the run", await uploads.text(request.stream()))
         seconds = _number(request, "seconds") or 0.0
         if start_of(start).model.kind != "disk":
             raise UddError("Only a run of the disk can be filmed.")

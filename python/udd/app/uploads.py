@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import shutil
 import tempfile
 from collections.abc import AsyncIterator
@@ -21,6 +22,34 @@ def private_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="udd-app-"))
 
 
+async def text(chunks: AsyncIterator[bytes]) -> str:
+    """What comes, as text, of which no more is taken than a message may have.
+
+    Raises
+    ------
+    TooLarge
+        More bytes than `limits.MESSAGE`.
+    UddError
+        The sender stopped halfway.
+    """
+    body = bytearray()
+    async for chunk in _in_time(chunks):
+        body += chunk
+        if len(body) > limits.MESSAGE:
+            raise TooLarge(f"The request is larger than {limits.MESSAGE >> 10} kB.")
+    return body.decode("utf-8", "replace")
+
+
+async def _in_time(chunks: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
+    while True:
+        try:
+            yield await asyncio.wait_for(anext(chunks), limits.PAUSE)
+        except StopAsyncIteration:
+            return
+        except TimeoutError:
+            raise UddError("The request stopped halfway.") from None
+
+
 async def receive(chunks: AsyncIterator[bytes], folder: Path) -> Path:
     """Write what comes to a file in the folder; its name is not the sender's.
 
@@ -29,12 +58,12 @@ async def receive(chunks: AsyncIterator[bytes], folder: Path) -> Path:
     TooLarge
         More bytes than `limits.UPLOAD`; the folder is gone then.
     UddError
-        Nothing came.
+        Nothing came, or the sender stopped halfway.
     """
     target, size = folder / "upload", 0
     try:
         with target.open("wb") as file:
-            async for chunk in chunks:
+            async for chunk in _in_time(chunks):
                 size += len(chunk)
                 if size > limits.UPLOAD:
                     raise TooLarge(f"The file is larger than {limits.UPLOAD >> 20} MB.")

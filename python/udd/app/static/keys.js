@@ -1,11 +1,23 @@
 // The keyboard: every key of the list in texts.json.
 const TYPED = new Set(["INPUT", "SELECT", "TEXTAREA"]);
+const SLIDES = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
+
+/** Whether a key belongs to the element that has the focus. */
+function belongs(on, key) {
+  if (!TYPED.has(on?.tagName) || on.type === "checkbox") return false;
+  return on.type !== "range" || SLIDES.has(key);
+}
 
 export function listen(actions) {
+  // Who chose from a list by mouse goes on with the page; by keyboard, with the list.
+  let mouse = false;
+  document.addEventListener("pointerdown", () => (mouse = true), true);
+  document.addEventListener("keydown", () => (mouse = false), true);
+  document.addEventListener("change", (e) => mouse && e.target.tagName === "SELECT" && e.target.blur());
   document.addEventListener("keydown", (e) => {
     if (e.ctrlKey || e.metaKey || e.altKey || e.defaultPrevented) return;
     const on = document.activeElement;
-    if (TYPED.has(on?.tagName) && on.type !== "checkbox") return;
+    if (belongs(on, e.key)) return;
     if (document.querySelector("dialog[open]")) return;
     if (e.key === " " && (on?.tagName === "BUTTON" || on?.tagName === "SUMMARY" || on?.type === "checkbox")) return;
     const act = actions[e.key.length === 1 ? e.key.toLowerCase() : e.key];

@@ -93,7 +93,10 @@ export class Sections {
 }
 
 function dots(axes, c, x, y, count) {
-  const size = count > 3000 ? 1.3 : count > 600 ? 1.8 : 3;
+  // A cycle crosses in a few places however many points there are: large dots where few places are taken.
+  const places = new Set();
+  for (let k = 0; k < count; k++) places.add(`${Math.round(axes.x(x[k]))} ${Math.round(axes.y(y[k]))}`);
+  const size = places.size > 3000 ? 1.3 : places.size > 600 ? 1.8 : places.size > 60 ? 3 : 6;
   c.fillStyle = COLOURS[0];
   for (let k = 0; k < count; k++) c.fillRect(axes.x(x[k]) - size / 2, axes.y(y[k]) - size / 2, size, size);
 }
