@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from udd._validate import number
 from udd.errors import ModelError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def text_of(what: str, expression: object) -> str:
     if isinstance(expression, str):
         return expression
     if isinstance(expression, (int, float)) and not isinstance(expression, bool):
-        return repr(float(expression))
+        return repr(number(what, expression))
     if type(expression).__module__.partition(".")[0] == "sympy" or hasattr(expression, "free_symbols"):
         return _from_sympy(what, expression)
     raise ModelError(f"{what} must be text or a SymPy expression, not {expression!r}")

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from typing import Any
 
+_WORD, _ALL = 200, 700  # characters of one word, and of a message
+
 
 class UddError(ValueError):
-    """Base class of what `udd` raises for bad input."""
+    """Base class of what `udd` raises for bad input.
+
+    Parameters
+    ----------
+    message : str
+        One sentence. What it repeats of the input is cut where that is long.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        words = re.sub(rf"\S{{{_WORD},}}", lambda word: f"{word[0][: _WORD - 3]}...", message)
+        super().__init__(words if len(words) <= _ALL else f"{words[: _ALL - 3]}...")
 
 
 class ModelError(UddError):

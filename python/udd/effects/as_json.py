@@ -39,7 +39,7 @@ def from_dict(data: Mapping[str, Any]) -> Effect:
     ModelError
         Something is missing, unknown or unusable.
     """
-    if len(data) != 1 or not data.keys() <= {"formula", "curve", "surface"}:
+    if not isinstance(data, Mapping) or len(data) != 1 or not data.keys() <= {"formula", "curve", "surface"}:
         raise ModelError(f"an effect of no library must be a formula, a curve or a surface, not {data!r}")
     ((kind, content),) = data.items()
     try:
@@ -52,11 +52,11 @@ def from_dict(data: Mapping[str, Any]) -> Effect:
         values = dict(given.pop("parameters", {}))
         limits: dict[str, Any] = {
             name: tuple(own if x is None else x for x, own in zip(pair, UNLIMITED, strict=True))
-            for name, pair in given.pop("ranges", {}).items()
+            for name, pair in dict(given.pop("ranges", {})).items()
         }
         defaults: dict[str, Any] = {"name": "formula", "title": None, "amplitudes": None}
         spec = written(**(defaults | given), ranges=limits, names=tuple(values))
         # Not `make`: fitted amplitudes may lie outside their physical ranges.
         return Effect(spec.name, tuple(values.values()), momentum, made=spec)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ModelError(f"this {kind} cannot be read: {error}") from None

@@ -461,7 +461,7 @@ def _names(names: Iterable[str]) -> tuple[str, ...]:
 def _parameter(effect: str, name: str, unit: str, linear: bool, limits: tuple[float, float]) -> Parameter:
     try:
         low, high = (float(limit) for limit in limits)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ModelError(f"the range of {name} must be two numbers, not {limits!r}") from None
     if not low <= high:
         raise ModelError(f"the range of {name} of {effect} must go upwards, not from {low} to {high}")

@@ -26,6 +26,7 @@ from .quantities import QUANTITIES
 RESULT_FORMAT = 3
 """To be raised with every change that gives other numbers or other arrays for the same spec."""
 
+_LONGEST = 10**8  # values of an axis
 _KEYS = ("quantity", "model", "over", "state0", "options", "chunk")
 
 
@@ -76,7 +77,7 @@ class SweepSpec:
     chunk: int = 1024
 
     def __post_init__(self) -> None:
-        if self.quantity not in QUANTITIES:
+        if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
             raise ModelError(f"quantity must be one of {', '.join(QUANTITIES)}, not {self.quantity!r}")
         require_model(self.model)
         model_to_dict(self.model)
@@ -125,6 +126,8 @@ class SweepSpec:
         ModelError
             Something is missing, unknown or unusable.
         """
+        if not isinstance(data, Mapping):
+            raise ModelError(f"a sweep must be a table of names and values, not {data!r}")
         for key in data:
             if key not in _KEYS:
                 raise ModelError(f"a sweep has no {key!r}; it has {', '.join(_KEYS)}")
@@ -132,7 +135,9 @@ class SweepSpec:
             if key not in data:
                 raise ModelError(f"the sweep does not say its {key}")
         over = data["over"]
-        if isinstance(over, list) and all(isinstance(axis, dict) and "name" in axis for axis in over):
+        if isinstance(over, list) and all(
+            isinstance(axis, dict) and isinstance(axis.get("name"), str) for axis in over
+        ):
             if len({axis["name"] for axis in over}) < len(over):
                 raise ModelError("over names an axis twice")
             over = {axis["name"]: {k: v for k, v in axis.items() if k != "name"} for axis in over}
@@ -153,10 +158,8 @@ class SweepSpec:
         """
         try:
             data = json.loads(text)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise ModelError(f"the sweep is not in JSON: {error}") from None
-        if not isinstance(data, dict):
-            raise ModelError("the sweep must be a table of names and values")
         return cls.from_dict(data)
 
     @classmethod
@@ -173,7 +176,7 @@ class SweepSpec:
             return cls.from_dict(tomllib.loads(text)) if Path(path).suffix == ".toml" else cls.from_json(text)
         except OSError as error:
             raise UddError(f"{path} cannot be read: {error.strerror}") from None
-        except ValueError as error:  # ours, or what is no UTF-8 or no TOML
+        except (ValueError, RecursionError) as error:  # ours, or what is no UTF-8 or no TOML
             raise UddError(f"{path}: {error}") from None
 
     @cached_property
@@ -227,7 +230,9 @@ def _values_from(name: str, data: Any) -> ArrayLike:
         return np.atleast_1d(array(f"the values of {name}", data))
     if set(data) == {"values"}:
         return array(f"the values of {name}", data["values"])
-    if set(data) != {"from", "to", "n"} or not isinstance(data["n"], int) or data["n"] < 1:
-        raise ModelError(f"the values of {name} must be a list, or from, to and n (a whole number)")
+    if set(data) != {"from", "to", "n"}:
+        raise ModelError(f"the values of {name} must be a list, or from, to and n")
+    if whole(f"over.{name}.n", data["n"], 1) > _LONGEST:
+        raise ModelError(f"over.{name}.n must be at most {_LONGEST}, not {data['n']}")
     first, last = (number(f"{name} {end}", data[end]) for end in ("from", "to"))
     return np.linspace(first, last, data["n"])

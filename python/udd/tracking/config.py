@@ -59,7 +59,11 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
 
 def as_said(config: Config) -> tuple[str, Mapping[str, Any]]:
     """The name of a config, and what stands in it, unread."""
-    return ("config", config) if isinstance(config, Mapping) else _read(Path(config))
+    if isinstance(config, Mapping):
+        return "config", config
+    if not isinstance(config, str | os.PathLike):
+        raise TrackError(f"config must be a file or a table of names and values, not {config!r}")
+    return _read(Path(config))
 
 
 def _read(path: Path) -> tuple[str, dict[str, Any]]:
@@ -67,7 +71,7 @@ def _read(path: Path) -> tuple[str, dict[str, Any]]:
         return str(path), tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise TrackError(f"{path} cannot be read: {error.strerror}") from None
-    except ValueError as error:  # no TOML, or no UTF-8
+    except (ValueError, RecursionError) as error:  # no TOML, or no UTF-8
         raise TrackError(f"{path} is not a TOML file: {error}") from None
 
 
