@@ -19,6 +19,7 @@ from udd.measurement.table import ANGLES
 from udd.models import Model
 from udd.own_models import OwnModel
 
+from .camera import camera_shows
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
 from .heldout import misses_the_motion, pace
@@ -141,6 +142,8 @@ def discover(
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
+    clock.tell("looking for a camera's faults")
+    excused = camera_shows(known.whole, end.whole) if found else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed
@@ -153,7 +156,7 @@ def discover(
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
-    elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
+    elif unexplained or doubtful or excused is not None or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     elif found:
         verdict = "effect identified"
@@ -177,6 +180,7 @@ def discover(
         thinned=thin if any(own.every > 1 for own in thin) else [],
         budget=clock.budget if stopped else None,
         stopped=stopped,
+        excused=None if excused is None else [f.title for f in found if f.effect.name in excused],
     )
 
 

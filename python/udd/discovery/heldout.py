@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -319,7 +320,9 @@ def _floor(
     film = record.film[windows[:, 1]]
     frames = np.hstack([begins[:, None] + np.arange(length), ends])
     made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
-    sd = np.minimum(fit.noise.sd(record, record.states[:, 0]), _shown(fit, record))[frames]
+    # In a search the noise stays what the first model's misfits made it; where less remains it is less.
+    sd = fit.noise.sd(record, record.states[:, 0]) * math.sqrt(min(fit.scatter, 1.0))
+    sd = np.minimum(sd, _shown(fit, record))[frames]
     made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
 
     # Windows overlap: each is laid out as frames of its own, linked to no other.
@@ -346,11 +349,19 @@ def _floor(
 
 
 def _shown(fit: Fit, record: Record) -> Array | float:
-    """The noise of a pendulum's frames as they show it themselves, (n, 1): a search may assume more."""
-    if fit.model.kind != "pendulum":
+    """The noise of a record's frames as they show it themselves, (n, m): a search may assume more.
+
+    Of a disk's film the search's is the frames' own.
+    """
+    if fit.model.kind == "disk":
         return np.inf
-    seen = [record.seen[(record.film == k) & record.observed[:, 0], 0] for k in range(len(record.origins))]
-    return np.array([reads(own)[0] if len(own) else np.inf for own in seen])[record.film][:, None]
+    result = np.full(record.seen.shape, np.inf)
+    for film in range(len(record.origins)):
+        own = record.film == film
+        for channel, there in enumerate(record.observed.T):
+            if (own & there).any():
+                result[own, channel] = reads(record.seen[own & there, channel])[0]
+    return result
 
 
 def _there(record: Record) -> NDArray[np.bool_]:

@@ -211,6 +211,9 @@ class Discovery:
         The seconds that ended the search before it was done, where they did.
     stopped : str or None
         What it was at then.
+    excused : list of str or None
+        Where the camera was held as perfect and its faults are most of what the found model leaves: titles of
+        the effects that they would explain as well.
     """
 
     verdict: str
@@ -230,6 +233,7 @@ class Discovery:
     thinned: list[Thinned] = field(default_factory=list)
     budget: float | None = None
     stopped: str | None = None
+    excused: list[str] | None = None
 
     @property
     def measurement(self) -> Measurement:
@@ -250,6 +254,12 @@ class Discovery:
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        if self.excused is not None:
+            named = f", and {' and '.join(self.excused)} with it" if self.excused else ""
+            said.append(
+                "The camera was held as perfect, but a camera's faults would explain most of what is left"
+                f"{named}: leave its parameters free (camera=True)."
+            )
         held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if held:
             said.append(

@@ -37,7 +37,7 @@ from .looks import Look, look_around, states_first, wider
 from .results import Alternative, Failing, Refused, Witness
 from .scan import Scan, Scored
 from .together import together
-from .trials import Trial, fitted_ones, of_curve, of_formula, of_library, one_of_each, same_law
+from .trials import Trial, fitted_ones, needed_in, of_curve, of_formula, of_library, one_of_each, same_law
 
 From = TypeVar("From")
 To = TypeVar("To")
@@ -410,8 +410,10 @@ class Search:
     def _prune(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
         """Leave out effects that a later one makes needless.
 
-        A wrong form of the library takes up a part of what an effect outside of it does.
+        A wrong form of the library takes up a part of what an effect outside of it does, or of what another
+        one of the library does that is found after it.
         """
+        self._leave_out(accepted, states, looks)
         for k in range(len(accepted) - 1):
             last = accepted[-1]
             if last.curve is None:
@@ -424,6 +426,27 @@ class Search:
                 continue
             if _cheaper(found, accepted[k:], states[k], states[-1]):
                 accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
+                return
+
+    def _leave_out(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+        """Leave out effects of the library that chance explains beside those found after them."""
+        whole = states[-1].whole
+        for k, step in enumerate(accepted[:-1]):
+            for one in step.candidates:
+                later = accepted[k:]
+                if any(s.curve for s in later) or needed_in(whole, one.amplitude_names):
+                    continue
+                self.tell(f"trying without {one.title}")
+                kept = [c for s in later for c in s.candidates if c is not one]
+                values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
+                trial = of_library(states[k].part, kept, values)
+                found = self._accept(states[k], fitted_ones([trial]), looks[k])
+                if found is None or not _cheaper(found, later, states[k], states[-1]):
+                    continue
+                names = {c.effect.name for c in kept}
+                others = [a for s in later for a in s.alternatives if a.instead_of in names]
+                accepted[k:] = [replace(found[0], alternatives=others)]
+                states[k + 1 :], looks[k + 1 :] = [found[1]], []
                 return
 
     def _simplify(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:

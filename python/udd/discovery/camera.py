@@ -1,0 +1,78 @@
+"""What a camera's faults would explain, where the camera was held as perfect."""
+
+from __future__ import annotations
+
+import itertools
+
+from udd import _chi2
+from udd.errors import FitError
+from udd.fitting import Fit, extend, ran_away, released
+from udd.fitting.parameters import Free, free_parameters
+from udd.fitting.sensor import is_encoder
+
+from .bearing import ALPHA, same_level
+
+_MOST = 0.5  # of chi2 that a camera takes away, from which on a form found without it is not to be trusted
+
+
+def camera_shows(known: Fit, found: Fit) -> list[str] | None:
+    """Whether a camera that was held shows in what a model with effects leaves; None where it does not.
+
+    Parameters
+    ----------
+    known, found : Fit
+        Of all data, without the effects and with them.
+
+    Returns
+    -------
+    list of str or None
+        Names of the effects that are not needed once the camera's parameters are free: without them the
+        camera explains more than they did.
+    """
+    more = _held(found)
+    effects = [e for e in found.model.effects if e not in known.problem.models[0].effects]
+    if not more or not effects:
+        return None
+    freed = _freed(found, more)
+    if freed is None:
+        return None
+    before, after = same_level(found, freed)
+    fall = (before.chi2 - after.chi2) / after.inflation(before)
+    if after.chi2 > _MOST * before.chi2 or _chi2.sf(fall, len(more)) >= ALPHA:
+        return None
+    names = [e.name for e in effects if e.name not in {own.name for own in known.model.effects}]
+    alone = _freed(known, more)
+    for size in range(len(names)):
+        for kept in itertools.combinations(names, size):
+            if alone is not None and _explains(alone, found, kept):
+                return [name for name in names if name not in kept]
+    return []
+
+
+def _held(found: Fit) -> tuple[Free, ...]:
+    """The parameters of a film's camera that are not free in a fit."""
+    if all(is_encoder(own) for own in found.measurements):
+        return ()
+    names = set(found.parameters)
+    return tuple(f for f in free_parameters(found.models, [], True) if f.name not in names)
+
+
+def _freed(fitted: Fit, more: tuple[Free, ...]) -> Fit | None:
+    """The same with the camera free; None where that goes astray."""
+    try:
+        freed = released(fitted, (*more, *fitted.problem.free))
+    except FitError:
+        return None
+    return freed if freed.converged and not ran_away(freed) else None
+
+
+def _explains(alone: Fit, found: Fit, kept: tuple[str, ...]) -> bool:
+    """Whether some of the effects and a free camera explain the data better than all without one."""
+    effects = [e for e in found.model.effects if e.name in kept]
+    values = [found.parameters.get(f"{e.name}.{p}", e.parameters[p]) for e in effects for p in e.amplitudes]
+    try:
+        some = extend(alone, effects, values) if effects else alone
+    except FitError:
+        return False
+    one, other = same_level(some, found)
+    return one.chi2 < other.chi2
