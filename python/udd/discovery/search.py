@@ -54,7 +54,7 @@ _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
 _TIED = 4 * NATS  # in chi2: forms that differ by less are compared by all data and by what they foretell
 _FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
-_EQUALS = 7  # forms between which all data decide
+_EQUALS = 10  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -475,7 +475,7 @@ class Search:
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
         paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
-        near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
+        near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
         costs = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
         near = self._foretelling(near, costs)
@@ -499,6 +499,15 @@ class Search:
                 )
                 return step, State(trial.fit, judged.whole, errors)
         return None
+
+    def _once(self, near: list[Trial]) -> list[Trial]:
+        """Without formulas that are one of the library's laws in other words."""
+        known = [t for t in near if t.curve is None]
+        return [
+            t
+            for t in near
+            if t.formula is None or not any(same_law(t.compared, other.compared) for other in known)
+        ]
 
     def _foretelling(self, near: list[Trial], costs: dict[int, float]) -> list[Trial]:
         """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""

@@ -22,7 +22,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         It would not come back the same.
     """
     if isinstance(model, OwnModel):
-        result = {
+        own = {
             "kind": model.kind,
             "states": list(model.state_names),
             "equations": model.equations,
@@ -30,7 +30,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "angles": list(model.angles),
             "effects": [_effect_to_dict(effect) for effect in model.effects],
         }
-        return result | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
+        return own | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
     if _KINDS.get(cls.kind) is cls:
