@@ -87,7 +87,7 @@ class OwnModel(Model):
                 raise ModelError(f"the angle {name!r} is no state; there are {', '.join(names)}")
         self._set(names, _equations(names, equations), values, turning)
         _core.model_parameters(self)  # which parses the equations
-        if mass is not None and len(mass):
+        if mass:
             object.__setattr__(self, "mass", _mass_matrix(self, mass))
         added = self._effects(effects)
         if added:
@@ -192,10 +192,8 @@ class OwnModel(Model):
         known, (first, *rest) = list(self.speeds), (name.strip() for name in along.split(" - "))
         for name in (first, *rest):
             if name not in known or len(rest) > 1 or name in rest[:-1] or [first] == rest:
-                raise ModelError(
-                    f"a force acts along one of {', '.join(known)} or between two of them, as in "
-                    f'"force({" - ".join(known[:2])})", not along {along!r}'
-                )
+                between = f' or between two of them, as in "force({known[1]} - {known[0]})"' if known[1:] else ""
+                raise ModelError(f"a force acts along one of {', '.join(known)}{between}, not along {along!r}")
         n, whole = len(known), _determinant(self.mass)
         result = {}
         for i, speed in enumerate(self.speeds.values()):
@@ -400,7 +398,10 @@ def _mass_matrix(model: OwnModel, given: Sequence[Sequence[Expression]]) -> tupl
     held._set(model.state_names, model.texts, model.values, model.angles, (), mass)
     # Numbers without a pattern, in which no formula is symmetric by accident.
     states = np.sin(np.arange(1.0, 3 * len(model.state_names) + 1)).reshape(3, -1)
-    at = held.mass_matrix(states)
+    try:
+        at = held.mass_matrix(states)
+    except ModelError as error:
+        raise ModelError(re.sub(r"the equation of \w+", "the mass matrix", str(error))) from None
     at = at[np.isfinite(at).all(axis=(1, 2))]
     if not np.allclose(at, np.swapaxes(at, 1, 2), rtol=1e-9, atol=0.0):
         raise ModelError("the mass matrix must be symmetric")

@@ -143,6 +143,7 @@ def discover(
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
     clock.tell("looking for a camera's faults")
+    left = bool(found) and final.scatter > UNEXPLAINED
     excused = camera_shows(known.whole, end.whole) if found else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
@@ -156,7 +157,7 @@ def discover(
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
-    elif unexplained or doubtful or excused is not None or any(is_spline(f.effect) for f in found):
+    elif unexplained or doubtful or left or excused is not None or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     elif found:
         verdict = "effect identified"
