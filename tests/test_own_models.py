@@ -241,7 +241,10 @@ def cart(mass: Any) -> Any:
         ),
         (lambda: lorenz().replace(mass=[["1"]]), "a mass matrix needs coordinates"),
         (lambda: lorenz().with_effects([effects.formula("force(x)", "c", c=1.0)]), "needs the model's mass"),
-        (lambda: cart([["m"]]).with_effects([effects.formula("force(v)", "c", c=1.0)]), "acts along one of x"),
+        (
+            lambda: cart([["m"]]).with_effects([effects.formula("force(v)", "c", c=1.0)]),
+            "acts along one of x",
+        ),
         (lambda: cart([["m"]]).mass_matrix([1.0]), "must have 2 components"),
         (lambda: cart(None).mass_matrix([1.0, 2.0]), "was given no mass matrix"),
         (lambda: lorenz().with_term("w", "x", c=1.0), "there is no equation of 'w'"),

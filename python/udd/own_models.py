@@ -192,8 +192,12 @@ class OwnModel(Model):
         known, (first, *rest) = list(self.speeds), (name.strip() for name in along.split(" - "))
         for name in (first, *rest):
             if name not in known or len(rest) > 1 or name in rest[:-1] or [first] == rest:
-                between = f' or between two of them, as in "force({known[1]} - {known[0]})"' if known[1:] else ""
-                raise ModelError(f"a force acts along one of {', '.join(known)}{between}, not along {along!r}")
+                between = (
+                    f' or between two of them, as in "force({known[1]} - {known[0]})"' if known[1:] else ""
+                )
+                raise ModelError(
+                    f"a force acts along one of {', '.join(known)}{between}, not along {along!r}"
+                )
         n, whole = len(known), _determinant(self.mass)
         result = {}
         for i, speed in enumerate(self.speeds.values()):

@@ -233,8 +233,6 @@ class Search:
             states.append(found[1])
             self._prune(accepted, states, looks)
             states[-1] = self._released(states[-1])
-        self._simplify(accepted, states, looks)
-        states[-1] = self._released(states[-1])
 
     def _confirmed(self, known: State, states: list[State]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
@@ -372,7 +370,11 @@ class Search:
         for one in scored:
             if one.candidate.usual:
                 first.setdefault(one.candidate.effect.name, one.candidate)
-        pairs = [list(pair) for pair in itertools.combinations(list(first.values())[:_PAIRED], 2)]
+        best = list(first.values())[:_PAIRED]
+        pairs = [list(pair) for pair in itertools.combinations(best, 2)]
+        # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
+        alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
+        pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
         self._trying([" with ".join(c.title for c in pair) for pair in pairs])
 
         def tried(pair: list[Candidate]) -> Trial | None:
@@ -448,18 +450,6 @@ class Search:
                 accepted[k:] = [replace(found[0], alternatives=others)]
                 states[k + 1 :], looks[k + 1 :] = [found[1]], []
                 return
-
-    def _simplify(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
-        """Put one curve, or a formula for it, in the place of effects that explain the data no better.
-
-        Where no effect of the library is right, some of them together may come near.
-        """
-        if len(accepted) < 2 or any(step.curve for step in accepted):
-            return
-        self.tell(f"trying one law instead of {len(accepted)}")
-        found = self._located(states[0], looks[0])
-        if found is not None and _cheaper(found, accepted, states[0], states[-1]):
-            accepted[:], states[1:], looks[1:] = [found[0]], [found[1]], []
 
     def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""

@@ -96,7 +96,8 @@ def _machines(model: OwnModel, along: str) -> list[Candidate]:
         title = f"{kind} {where}"
         name = _name(f"{kind} {where}")
         spec = written(f"force({along})", text, name, title, [c], {c: limits}, (c,))
-        result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title))
+        form = kind if limits is brake else ""
+        result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title, form=form))
     return result
 
 
@@ -168,7 +169,7 @@ def _dry_forces(model: OwnModel, states: NDArray[np.float64]) -> list[Candidate]
         typical = float(np.sqrt((reduce(np.subtract, columns) ** 2).mean()))
         name, title = _name(f"dry {where}"), f"dry friction {where}"
         made = (model, f"force({along})", v, name, title, typical, (-np.inf, 0.0))
-        result += _dry(*made) if typical > 0 else []
+        result += [replace(c, form="dry") for c in _dry(*made)] if typical > 0 else []
     return result
 
 
