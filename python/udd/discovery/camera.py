@@ -26,27 +26,26 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     Returns
     -------
     list of str or None
-        Names of the effects that are not needed once the camera's parameters are free: without them the
-        camera explains more than they did.
+        Names of the effects that are not needed once the camera's parameters are free: without them a
+        camera explains the data better than they did.
     """
     more = _held(found)
-    effects = [e for e in found.model.effects if e not in known.problem.models[0].effects]
+    there = {e.name for e in known.model.effects}
+    effects = [e for e in found.model.effects if e.name not in there]
     if not more or not effects:
         return None
+    names = [e.name for e in effects]
+    alone = _freed(known, more)
+    for kept in (some for size in range(len(names)) for some in itertools.combinations(names, size)):
+        if alone is not None and _explains(alone, found, kept):
+            return [name for name in names if name not in kept]
     freed = _freed(found, more)
     if freed is None:
         return None
     before, after = same_level(found, freed)
     fall = (before.chi2 - after.chi2) / after.inflation(before)
-    if after.chi2 > _MOST * before.chi2 or _chi2.sf(fall, len(more)) >= ALPHA:
-        return None
-    names = [e.name for e in effects if e.name not in {own.name for own in known.model.effects}]
-    alone = _freed(known, more)
-    for size in range(len(names)):
-        for kept in itertools.combinations(names, size):
-            if alone is not None and _explains(alone, found, kept):
-                return [name for name in names if name not in kept]
-    return []
+    shows = after.chi2 < _MOST * before.chi2 and _chi2.sf(fall, len(more)) < ALPHA
+    return [] if shows else None
 
 
 def _held(found: Fit) -> tuple[Free, ...]:

@@ -22,7 +22,7 @@ from udd.own_models import OwnModel
 from .camera import camera_shows
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
-from .heldout import misses_the_motion, pace
+from .heldout import lacks_more, misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
 from .terms import given_terms
@@ -143,7 +143,7 @@ def discover(
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
     clock.tell("looking for a camera's faults")
-    left = bool(found) and final.scatter > UNEXPLAINED
+    left = bool(found) and lacks_more(final, end.errors)
     excused = camera_shows(known.whole, end.whole) if found else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)

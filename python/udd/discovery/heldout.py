@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import FitError
-from udd.fitting import Fit, Record, filtered, predicted
+from udd.fitting import UNEXPLAINED, Fit, Record, filtered, predicted
 from udd.fitting.sensor import reads
 
 Array = NDArray[np.float64]
@@ -229,6 +229,18 @@ def at_the_floor(errors: Errors, horizon: float) -> bool:
     """Whether errors are no larger than noise makes them, give or take a half."""
     median, low, _high, floor = errors.at(horizon)
     return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
+
+
+def lacks_more(fit: Fit, errors: Errors) -> bool:
+    """Whether something is missing beside the effects that were found.
+
+    They leave more than noise; or, of a user's own model, whose terms may together pass for what is none of
+    them, innovations are not white and free runs not as good as noise allows.
+    """
+    if fit.scatter > UNEXPLAINED:
+        return True
+    own = fit.model.kind == "own"
+    return own and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
 
 
 def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -> bool:

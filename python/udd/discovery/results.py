@@ -8,14 +8,14 @@ from functools import cached_property
 from typing import Any, Literal
 
 from udd.effects import Effect
-from udd.fitting import UNEXPLAINED, Fit
+from udd.fitting import Fit
 from udd.fitting.doubts import ran_off
 from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
 
 from .curves import Curve
-from .heldout import Errors, Ratio, comparison_horizon
+from .heldout import Errors, Ratio, comparison_horizon, lacks_more
 from .hint import Hint, hints
 from .scan import Scored
 
@@ -254,11 +254,8 @@ class Discovery:
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
-        if self.effects and self.fit.scatter > UNEXPLAINED:
-            said.append(
-                f"The model as found leaves chi2 per degree of freedom at {self.fit.scatter:.3g}: something "
-                "more is missing."
-            )
+        if self.effects and lacks_more(self.fit, self.error_after):
+            said.append("Something is missing beside what was found: it leaves more than noise does.")
         if self.excused is not None:
             named = f", and {' and '.join(self.excused)} with it" if self.excused else ""
             said.append(
