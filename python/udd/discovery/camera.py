@@ -29,7 +29,7 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
         Names of the effects that are not needed once the camera's parameters are free: without them a
         camera explains the data better than they did.
     """
-    more = _held(found)
+    more = _held(known)
     there = {e.name for e in known.model.effects}
     effects = [e for e in found.model.effects if e.name not in there]
     if not more or not effects:
@@ -48,12 +48,12 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     return [] if shows else None
 
 
-def _held(found: Fit) -> tuple[Free, ...]:
-    """The parameters of a film's camera that are not free in a fit."""
-    if all(is_encoder(own) for own in found.measurements):
+def _held(known: Fit) -> tuple[Free, ...]:
+    """The parameters of a film's camera that were not to be free."""
+    if all(is_encoder(own) for own in known.measurements):
         return ()
-    names = set(found.parameters)
-    return tuple(f for f in free_parameters(found.models, [], True) if f.name not in names)
+    names = set(known.parameters)
+    return tuple(f for f in free_parameters(known.models, [], True) if f.name not in names)
 
 
 def _freed(fitted: Fit, more: tuple[Free, ...]) -> Fit | None:

@@ -142,9 +142,8 @@ def discover(
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    clock.tell("looking for a camera's faults")
     left = bool(found) and lacks_more(final, end.errors)
-    excused = camera_shows(known.whole, end.whole) if found else None
+    excused = camera_shows(known.whole, end.whole) if found and not end.stopped else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed

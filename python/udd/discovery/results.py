@@ -257,10 +257,10 @@ class Discovery:
         if self.effects and lacks_more(self.fit, self.error_after):
             said.append("Something is missing beside what was found: it leaves more than noise does.")
         if self.excused is not None:
-            named = f", and {' and '.join(self.excused)} with it" if self.excused else ""
+            what = f"{' and '.join(self.excused)} as well" if self.excused else "most of what is left"
             said.append(
-                "The camera was held as perfect, but a camera's faults would explain most of what is left"
-                f"{named}: leave its parameters free (camera=True)."
+                f"Parameters of the camera were held, whose faults would explain {what}: leave all of them "
+                "free (camera=True)."
             )
         held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if held:

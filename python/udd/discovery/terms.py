@@ -94,7 +94,7 @@ def _machines(model: OwnModel, along: str) -> list[Candidate]:
     result = []
     for kind, text, limits in listed:
         title = f"{kind} {where}"
-        name = _name(f"{kind} {where}")
+        name = _name(title)
         spec = written(f"force({along})", text, name, title, [c], {c: limits}, (c,))
         form = kind if limits is brake else ""
         result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title, form=form))
