@@ -18,6 +18,7 @@ from udd.discovery.discover import TRAIN
 from udd.discovery.heldout import pace
 from udd.discovery.looks import look_around
 from udd.discovery.search import Search, State
+from udd.discovery.terms import given_terms
 from udd.discovery.trials import fitted_ones, of_library
 from udd.errors import FitError, ModelError
 from udd.fitting import fit_record, record_of
@@ -163,6 +164,10 @@ def test_forces_of_machines_come_before_products() -> None:
     # No force has two names: v in force(x) is the viscous friction along x.
     assert not {"v in force(x)", "abs(w)*w in force(y)", "1 in force(x)"} & {c.title for c in listed}
     assert "w in force(x)" in {c.title for c in listed} - usual
+    (given,) = given_terms(mechanism(), [("force(y - x)", "v*w")])
+    assert given.title == "v*w in force(y - x)" and given.effect.slots == ("force(y - x)",)
+    with pytest.raises(ModelError, match="acts along one of x, y"):
+        given_terms(mechanism(), [("force(v)", "w")])
     cart = udd.Model(["x", "v"], ["v", "-k*x"], {"k": 1.0}, mass=[["1"]])
     assert {"spring along x", "cubic spring along x"} <= {c.title for c in library(cart)}
 

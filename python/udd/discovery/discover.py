@@ -79,7 +79,8 @@ def discover(
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
         Terms to try in a user's own model beside those made of its states: the state in whose equation it
-        stands and the term, as in ``("v", "abs(v)*v")``.
+        stands and the term, as in ``("v", "abs(v)*v")``; of a model with a mass matrix also a force, as in
+        ``("force(b - a)", "q^5")``.
     budget : float, optional
         Seconds after which the search ends with what it has, which the verdict then says. The known model's
         fit, which comes first, and the last one are made in any case.

@@ -203,12 +203,13 @@ def given_terms(model: OwnModel, given: Iterable[tuple[str, Expression]]) -> lis
         if isinstance(one, str) or not isinstance(one, (tuple, list)) or len(one) != 2:
             raise ModelError(f"a candidate is a state and a term, as in ('v', 'abs(v)*v'), not {one!r}")
         state, term = str(one[0]).removesuffix("'"), text_of("a candidate", one[1])
-        if state not in model.state_names:
+        slot = state if along_of(state) else f"{state}'"
+        if slot != state and state not in model.state_names:
             raise ModelError(
                 f"there is no equation of {state!r} for the candidate {term!r}; there are "
                 f"{', '.join(model.state_names)}"
             )
-        candidate = _candidate(model, f"{state}'", f"({term})", _name(term), term)
+        candidate = _candidate(model, slot, f"({term})", _name(term), term)
         candidate.added_to(model)  # which parses it
         result.append(candidate)
     return result
