@@ -11,8 +11,11 @@ from udd.fitting.parameters import Free, free_parameters
 from udd.fitting.sensor import is_encoder
 
 from .bearing import ALPHA, same_level
+from .looks import look_around
+from .trials import of_library, price_of
 
 _MOST = 0.5  # of chi2 that a camera takes away, from which on a form found without it is not to be trusted
+_TRIED = 2  # effects of the library beside a free camera, where a formula was found without it
 
 
 def camera_shows(known: Fit, found: Fit) -> list[str] | None:
@@ -39,6 +42,8 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     for kept in (some for size in range(len(names)) for some in itertools.combinations(names, size)):
         if alone is not None and _explains(alone, found, kept):
             return [name for name in names if name not in kept]
+    if alone is not None and any(e.made for e in effects) and _known_explains(alone, found, len(more)):
+        return []
     freed = _freed(found, more)
     if freed is None:
         return None
@@ -75,3 +80,15 @@ def _explains(alone: Fit, found: Fit, kept: tuple[str, ...]) -> bool:
         return False
     one, other = same_level(some, found)
     return one.chi2 < other.chi2
+
+
+def _known_explains(alone: Fit, found: Fit, freedom: int) -> bool:
+    """Whether one of the library's effects and a free camera explain the data better than formulas."""
+    price = freedom * price_of(alone)
+    for scored in look_around(alone).usable()[:_TRIED]:
+        trial = of_library(alone, [scored.candidate], list(scored.amplitudes))
+        if trial:
+            one, other = same_level(trial.fit, found)
+            if one.chi2 + trial.price + price < other.chi2:
+                return True
+    return False

@@ -212,8 +212,8 @@ class Discovery:
     stopped : str or None
         What it was at then.
     excused : list of str or None
-        Where the camera was held as perfect and its faults are most of what the found model leaves: titles of
-        the effects that they would explain as well.
+        Where parameters of the camera were held and its faults would explain most of what the found model
+        leaves, or a part of what was found: titles of the effects that they would explain as well.
     """
 
     verdict: str
@@ -257,7 +257,9 @@ class Discovery:
         if self.effects and lacks_more(self.fit, self.error_after):
             said.append("Something is missing beside what was found: it leaves more than noise does.")
         if self.excused is not None:
-            what = f"{' and '.join(self.excused)} as well" if self.excused else "most of what is left"
+            what = (
+                f"{' and '.join(self.excused)} as well" if self.excused else "what is left, or a part of this"
+            )
             said.append(
                 f"Parameters of the camera were held, whose faults would explain {what}: leave all of them "
                 "free (camera=True)."
