@@ -131,7 +131,7 @@ def test_a_force_enters_every_acceleration_through_the_mass_matrix() -> None:
     push = effects.formula("force(c)", "f", name="push", f=2.0)
     added = free.with_effects([joint, push, effects.formula("q'", "d", name="plain", d=10.0)])
     torque = -0.5 * (x[4] - x[3])
-    expected = [*np.linalg.solve(m, [-torque, torque, 2.0]), 0.0, 10.0, 0.0]
+    expected = np.linalg.solve(m, [-torque, torque, 2.0]) + np.array([0.0, 10.0, 0.0])
     np.testing.assert_allclose((added.rates(0.0, x) - free.rates(0.0, x))[3:], expected, rtol=1e-13)
     assert joint.expression == "force(b - a) = -0.5*(q - p)"
     for model in (free, added, added.with_parameters({"joint.m": 1.0}), free.with_term("p", "a", z=1.0)):
