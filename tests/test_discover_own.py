@@ -13,7 +13,15 @@ import pytest
 import udd
 from udd.cli import main
 from udd.discovery.candidates import library
+from udd.discovery.clock import Clock
+from udd.discovery.discover import TRAIN
+from udd.discovery.heldout import pace
+from udd.discovery.looks import look_around
+from udd.discovery.search import Search, State
+from udd.discovery.terms import given_terms
+from udd.discovery.trials import fitted_ones, of_library
 from udd.errors import FitError, ModelError
+from udd.fitting import fit_record, record_of
 
 DRIVEN = {"theta": "v", "v": "-w2*sin(theta) - g*v + F*cos(1.4*t)"}
 DRIVEN_VALUES = {"w2": 4.0, "g": 0.05, "F": 2.0}
@@ -105,6 +113,85 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
     assert len(found.effects) == 1 and found.effects[0].title.startswith(title)
     for name, value in values.items():
         within(found, name, value)
+
+
+#: Two bodies on a double pendulum's angles, the force of which goes through their mass matrix.
+COUPLED = [["2", "0.6*cos(x - y)"], ["0.6*cos(x - y)", "1"]]
+_F, _H = "(-k*sin(x) - 0.6*sin(x - y)*w^2)", "(-0.5*k*sin(y) + 0.6*sin(x - y)*v^2)"
+_DET = "(2 - 0.36*cos(x - y)^2)"
+MECHANISM = {
+    "x": "v",
+    "y": "w",
+    "v": f"({_F} - 0.6*cos(x - y)*{_H})/{_DET}",
+    "w": f"(2*{_H} - 0.6*cos(x - y)*{_F})/{_DET}",
+}
+
+
+def mechanism(*forces: udd.effects.Effect) -> Any:
+    known = udd.Model(list("xyvw"), MECHANISM, {"k": 10.0}, angles=["x", "y"], mass=COUPLED)
+    return known.with_effects(forces)
+
+
+def test_friction_in_both_joints_is_found_by_joint(tmp_path: Path) -> None:
+    """One coefficient each, which enters both equations."""
+    truth = mechanism(
+        udd.effects.formula("force(x)", "-c*v", name="first", c=0.04),
+        udd.effects.formula("force(y - x)", "-c*(w - v)", name="second", c=0.05),
+    )
+    t = np.arange(0, 12, 0.06)
+    run = udd.simulate(truth, t, [1.2, -0.5, 0.0, 0.0]).state
+    noise = 3e-3 * np.random.default_rng(0).standard_normal((len(t), 2))
+    record = udd.Measurement(t, run[:, :2] + noise, names=("x", "y"))
+    found = udd.discover(record, mechanism().replace(k=9.9))
+    assert found.verdict == "effect identified"
+    assert {e.title for e in found.effects} == {
+        "viscous friction along x",
+        "viscous friction between x and y",
+    }
+    within(found, "viscous_friction_along_x.c", 0.04)
+    within(found, "viscous_friction_between_x_and_y.c", 0.05)
+    found.report(tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "a force that enters every acceleration through the mass matrix" in page.lower()
+
+
+def test_forces_of_machines_come_before_products() -> None:
+    motion = np.random.default_rng(0).normal(size=(50, 4))
+    listed = library(mechanism(), (), motion)
+    usual = {c.title for c in listed if c.usual}
+    assert {"viscous friction along x", "quadratic drag between x and y", "dry friction along y"} <= usual
+    assert {c.effect.slots[0] for c in listed} == {"force(x)", "force(y)", "force(y - x)"}
+    # No force has two names: v in force(x) is the viscous friction along x.
+    assert not {"v in force(x)", "abs(w)*w in force(y)", "1 in force(x)"} & {c.title for c in listed}
+    assert "w in force(x)" in {c.title for c in listed} - usual
+    (given,) = given_terms(mechanism(), [("force(y - x)", "v*w")])
+    assert given.title == "v*w in force(y - x)" and given.effect.slots == ("force(y - x)",)
+    with pytest.raises(ModelError, match="acts along one of x, y"):
+        given_terms(mechanism(), [("force(v)", "w")])
+    cart = udd.Model(["x", "v"], ["v", "-k*x"], {"k": 1.0}, mass=[["1"]])
+    assert {"spring along x", "cubic spring along x"} <= {c.title for c in library(cart)}
+
+
+def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
+    equations = {"x": "v", "v": "-k*x"}
+    known = udd.Model(["x", "v"], equations, {"k": 1.0})
+    record = seen(known.with_term("v", "v", c=-0.1), np.arange(0, 30, 0.05), [1.5, 0.0], 0.01, ["x"])
+    frames = record_of(record, known)
+    train = frames.first(TRAIN)
+    part, whole = (fit_record(record, some, known, search=True) for some in (frames.part(train), frames))
+    search = Search(frames, ~train, Clock(None, lambda _text: None), pace(part))
+    states, accepted, looks = [State(part, whole, search.errors(part))], [], []
+    for title in ("v^3 in v'", "v in v'"):
+        looks.append(look_around(states[-1].part))
+        (wanted,) = (s for s in looks[-1].library.scored if s.candidate.title == title)
+        trial = of_library(states[-1].part, [wanted.candidate], list(wanted.amplitudes))
+        step = search._accept(states[-1], fitted_ones([trial]), looks[-1])
+        assert step
+        accepted.append(step[0])
+        states.append(step[1])
+    search._leave_out(accepted, states, looks)
+    assert [[c.title for c in step.candidates] for step in accepted] == [["v in v'"]]
+    assert len(states) == 2 and len(looks) == 1
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import copy
 import json
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,6 +107,41 @@ def test_the_double_pendulum_keeps_its_energy() -> None:
     np.testing.assert_allclose(energy, energy[0], atol=1e-11)
 
 
+def test_a_force_enters_every_acceleration_through_the_mass_matrix() -> None:
+    x = np.array([0.3, 1.2, -0.4, 0.7, -1.1, 2.0])
+    mass = [
+        ["3 + m", "m*cos(a - b)", "0.3"],
+        ["m*cos(a - b)", "2", "0.4*sin(c)"],
+        ["0.3", "0.4*sin(c)", "1 + c^2"],
+    ]
+    free = udd.Model(
+        list("abcpqr"), ["p", "q", "r", "0", "0", "-c"], {"m": 0.8}, angles=["a", "b"], mass=mass
+    )
+    m = np.array(
+        [
+            [3.8, 0.8 * np.cos(x[0] - x[1]), 0.3],
+            [0.8 * np.cos(x[0] - x[1]), 2.0, 0.4 * np.sin(x[2])],
+            [0.3, 0.4 * np.sin(x[2]), 1 + x[2] ** 2],
+        ]
+    )
+    assert free.speeds == {"a": "p", "b": "q", "c": "r"}
+    np.testing.assert_allclose(free.mass_matrix(np.array([x, x]))[1], m, rtol=1e-15)
+    # A force on b with its reaction on a, beside one along c, and a term of an equation that knows no mass.
+    joint = effects.formula("force(b - a)", "-m*(q - p)", name="joint", m=0.5)
+    push = effects.formula("force(c)", "f", name="push", f=2.0)
+    added = free.with_effects([joint, push, effects.formula("q'", "d", name="plain", d=10.0)])
+    torque = -0.5 * (x[4] - x[3])
+    expected = np.linalg.solve(m, [-torque, torque, 2.0]) + np.array([0.0, 10.0, 0.0])
+    np.testing.assert_allclose((added.rates(0.0, x) - free.rates(0.0, x))[3:], expected, rtol=1e-13)
+    assert joint.expression == "force(b - a) = -0.5*(q - p)"
+    for model in (free, added, added.with_parameters({"joint.m": 1.0}), free.with_term("p", "a", z=1.0)):
+        assert model.mass == free.mass == tuple(map(tuple, mass))
+        assert eval(repr(model), {"Model": udd.Model, "formula": effects.formula}) == model
+        assert pickle.loads(pickle.dumps(model)) == model.replace() == model
+        assert model_from_dict(json.loads(json.dumps(model_to_dict(model)))) == model
+    assert "mass" not in model_to_dict(lorenz())
+
+
 def test_own_models_are_values() -> None:
     model = lorenz()
     assert isinstance(model, udd.Model) and isinstance(udd.DLE(1.0), udd.Model)
@@ -163,6 +199,10 @@ def test_expressions_of_sympy_serve_as_text() -> None:
     )
 
 
+def cart(mass: Any) -> Any:
+    return udd.Model(["x", "v"], ["v", "-x"], {"m": 2.0}, mass=mass)
+
+
 @pytest.mark.parametrize(
     ("make", "named"),
     [
@@ -191,6 +231,22 @@ def test_expressions_of_sympy_serve_as_text() -> None:
         (lambda: lorenz().with_parameters({"c": 1.0}), "has no parameter 'c'; it has sigma, rho, beta"),
         (lambda: lorenz().replace(w=1.0), "the model has no 'w'"),
         (lambda: lorenz().with_effects([effects.slip()]), "takes a term: with_term"),
+        (lambda: cart([["1", "0"], ["0", "1"]]), "a row and a column for each of x"),
+        (lambda: cart("m"), "a row and a column for each of x"),
+        (lambda: cart([["-m"]]), "must be positive definite"),
+        (lambda: cart([["k"]]), "the mass matrix has the unknown name k"),
+        (
+            lambda: udd.Model(list("xyvw"), ["v", "w", "-x", "-y"], mass=[["2", "x"], ["y", "2"]]),
+            "must be symmetric",
+        ),
+        (lambda: lorenz().replace(mass=[["1"]]), "a mass matrix needs coordinates"),
+        (lambda: lorenz().with_effects([effects.formula("force(x)", "c", c=1.0)]), "needs the model's mass"),
+        (
+            lambda: cart([["m"]]).with_effects([effects.formula("force(v)", "c", c=1.0)]),
+            "acts along one of x",
+        ),
+        (lambda: cart([["m"]]).mass_matrix([1.0]), "must have 2 components"),
+        (lambda: cart(None).mass_matrix([1.0, 2.0]), "was given no mass matrix"),
         (lambda: lorenz().with_term("w", "x", c=1.0), "there is no equation of 'w'"),
         (lambda: lorenz().with_term("x", "x"), "a term has one factor"),
         (lambda: lorenz().with_term("x", "x", rho=1.0), "has a parameter 'rho' already"),

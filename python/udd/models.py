@@ -56,11 +56,17 @@ class Model:
         The parameters' values.
     angles : iterable of str
         The states that are angles in rad: they may grow without end.
+    mass : sequence of sequence of formula, optional
+        The mass matrix of a mechanical model, with a row and a column for each coordinate (a state whose
+        equation is another state), in their order: formulas of the states and parameters. The equations are
+        stated in full all the same; with it, what :func:`udd.discover` finds missing is a force that enters
+        every acceleration, such as friction in a joint.
 
     Raises
     ------
     ModelError
-        A name that a formula may not use, a state without an equation, a value that is not finite.
+        A name that a formula may not use, a state without an equation, a value that is not finite, a mass
+        matrix that is not symmetric and positive definite.
 
     Notes
     -----
@@ -106,6 +112,7 @@ class Model:
         parameters: Mapping[str, float] | None = None,
         *,
         angles: Iterable[str] = (),
+        mass: Sequence[Sequence[Expression]] | None = None,
     ) -> OwnModel:
         """A user's own model is one of a subclass, like those that are built in."""
         from udd.own_models import OwnModel

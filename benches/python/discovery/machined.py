@@ -19,7 +19,7 @@ import udd
 _MEANS = {
     "dry": r"coulomb|stribeck|dry_.*|tanh_.*",
     "viscous": r"[vw]_in_[vw]|.*viscous.*",
-    "joints": r".*(joint|viscous|[pq]_.*_in_[pq]|[pq]_in_[pq]).*",
+    "joints": r"viscous_friction_(along_a|between_a_and_b)",
     "quadratic": r"quadratic_drag|abs_v_v_in_v|v2_in_v",
     "cubic": r"cubic_drag|v3_in_v",
     "cubic spring": r"y3_in_v",
@@ -97,8 +97,8 @@ def _judge(result: MachineScore, found: udd.Discovery, sigma: dict[str, float]) 
 
 def _matches(lacks: Sequence[str], names: Sequence[str]) -> bool:
     """Whether each effect is one of what is missing, and nothing is left over."""
-    if lacks and set(lacks) <= {"joints", "viscous"}:  # one in each equation
-        return bool(names) and all(re.fullmatch(_MEANS[lacks[0]], name) for name in names)
+    if lacks in (["joints"], ["viscous"]):  # one in each joint or equation
+        return len(set(names)) == 2 and all(re.fullmatch(_MEANS[lacks[0]], name) for name in names)
     if len(lacks) != len(names):
         return False
     left = list(names)

@@ -205,6 +205,13 @@ def double(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> 
     return Machine(known, udd.Measurement(t, values), lacks, False, dict.fromkeys(values, sensor.sigma))
 
 
+def weighed(lacks: tuple[str, ...], encoder: bool, rng: np.random.Generator) -> Machine:
+    """The same double pendulum, of which the mass matrix is known too."""
+    machine = double(lacks, encoder, rng)
+    off = "m*l1*l2*cos(a - b)"
+    return replace(machine, known=machine.known.replace(mass=[["l1^2", off], [off, "m*l2^2"]]))
+
+
 def track(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Machine:
     """Two carts on an air track between springs."""
     k1, k2, k3 = rng.uniform(20, 40, 3)
@@ -305,10 +312,12 @@ KINDS: dict[str, tuple[Callable[..., Machine], tuple[str, ...], bool]] = _PENDUL
     "slider: dry + viscous": (slider, ("dry", "viscous"), False),
     "circuit: cubic spring": (circuit, ("cubic spring",), True),
     "double: viscous joints": (double, ("joints",), False),
+    "double: viscous joints with mass": (weighed, ("joints",), False),
     "air track: viscous": (track, ("viscous",), False),
     "ball: quadratic": (ball, ("quadratic",), False),
     "circuit: nothing": (circuit, (), True),
     "double: nothing": (double, (), False),
+    "double: nothing with mass": (weighed, (), False),
     "air track: nothing": (track, (), False),
     "ball: nothing": (ball, (), False),
     "phone: nothing": (phone, (), False),
@@ -338,6 +347,7 @@ def machine_cases(records: int) -> Iterator[MachineCase]:
 
 
 def drawn(case: MachineCase, seed: int) -> Machine:
-    """The record of a case; the same for the same seed, whatever the options."""
+    """The record of a case; the same for the same seed, whatever the options and what is known."""
     make, lacks, encoder = KINDS[case.title]
-    return make(lacks, encoder, np.random.default_rng([seed, zlib.crc32(case.title.encode()), case.number]))
+    title = case.title.removesuffix(" with mass").encode()
+    return make(lacks, encoder, np.random.default_rng([seed, zlib.crc32(title), case.number]))

@@ -26,11 +26,14 @@ class Candidate:
         What a reader calls it.
     usual : bool
         Whether machines have such a term; a product of states that merely could be must explain more.
+    form : str
+        What kind of friction it is that every joint may have; empty for anything else.
     """
 
     effect: effects.Effect
     title: str
     usual: bool = True
+    form: str = ""
 
     def added_to(self, model: Model) -> Model:
         """The model with this effect added, all its amplitudes zero."""

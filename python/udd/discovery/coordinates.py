@@ -48,7 +48,8 @@ class Slot:
     Attributes
     ----------
     name : str
-        ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``, or the rate of a state: ``"v'"``.
+        ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``, the rate of a state: ``"v'"``, or a
+        force: ``"force(x)"``.
     momentum : str or None
         For the contact's velocities: whether the momentum follows. See :class:`udd.effects.Spec`.
     equation : str
@@ -166,8 +167,11 @@ def slots(model: Model) -> tuple[Slot, ...]:
     if isinstance(model, Pendulum):
         return (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
     known = model.kinematic if isinstance(model, OwnModel) else ()
+    along = {v: x for x, v in model.speeds.items()} if isinstance(model, OwnModel) and model.mass else {}
     return tuple(
-        Slot(f"{name}'", None, name, partial(_direct, k))
+        Slot(f"force({along[name]})", None, name, partial(_force, name))
+        if name in along
+        else Slot(f"{name}'", None, name, partial(_direct, k))
         for k, name in enumerate(model.state_names)
         if name not in known
     )
@@ -204,4 +208,14 @@ def _moving(equation: str, momentum: str, model: Model, x: Array, value: Array, 
 def _direct(k: int, _model: Model, x: Array, value: Array, _rate: Array) -> Array:
     result = np.zeros(x.shape)
     result[..., k] = value
+    return result
+
+
+def _force(speed: str, model: Model, x: Array, value: Array, _rate: Array) -> Array:
+    assert isinstance(model, OwnModel)
+    speeds = list(model.speeds.values())
+    unit = np.eye(len(speeds))[:, [speeds.index(speed)]]
+    result = np.zeros(x.shape)
+    at = [model.state_names.index(name) for name in speeds]
+    result[..., at] = np.linalg.solve(model.mass_matrix(x), unit)[..., 0] * value[..., None]
     return result

@@ -19,9 +19,10 @@ from udd.measurement.table import ANGLES
 from udd.models import Model
 from udd.own_models import OwnModel
 
+from .camera import camera_shows
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
-from .heldout import misses_the_motion, pace
+from .heldout import lacks_more, misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
 from .terms import given_terms
@@ -78,7 +79,8 @@ def discover(
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
         Terms to try in a user's own model beside those made of its states: the state in whose equation it
-        stands and the term, as in ``("v", "abs(v)*v")``.
+        stands and the term, as in ``("v", "abs(v)*v")``; of a model with a mass matrix also a force, as in
+        ``("force(b - a)", "q^5")``.
     budget : float, optional
         Seconds after which the search ends with what it has, which the verdict then says. The known model's
         fit, which comes first, and the last one are made in any case.
@@ -141,6 +143,8 @@ def discover(
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
+    left = bool(found) and lacks_more(final, end.errors)
+    excused = camera_shows(known.whole, end.whole) if found and not end.stopped else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed
@@ -153,7 +157,7 @@ def discover(
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
-    elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
+    elif unexplained or doubtful or left or excused is not None or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     elif found:
         verdict = "effect identified"
@@ -177,6 +181,7 @@ def discover(
         thinned=thin if any(own.every > 1 for own in thin) else [],
         budget=clock.budget if stopped else None,
         stopped=stopped,
+        excused=None if excused is None else [f.title for f in found if f.effect.name in excused],
     )
 
 

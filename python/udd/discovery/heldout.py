@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import FitError
-from udd.fitting import Fit, Record, filtered, predicted
+from udd.fitting import UNEXPLAINED, Fit, Record, filtered, predicted
 from udd.fitting.sensor import reads
 
 Array = NDArray[np.float64]
@@ -230,6 +231,18 @@ def at_the_floor(errors: Errors, horizon: float) -> bool:
     return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
 
 
+def lacks_more(fit: Fit, errors: Errors) -> bool:
+    """Whether something is missing beside the effects that were found.
+
+    They leave more than noise; or, of a user's own model, whose terms may together pass for what is none of
+    them, innovations are not white and free runs not as good as noise allows.
+    """
+    if fit.scatter > UNEXPLAINED:
+        return True
+    own = fit.model.kind == "own"
+    return own and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
+
+
 def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -> bool:
     """Whether free runs miss by the size of the motion, where noise does not: no such model is complete.
 
@@ -319,7 +332,9 @@ def _floor(
     film = record.film[windows[:, 1]]
     frames = np.hstack([begins[:, None] + np.arange(length), ends])
     made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
-    sd = np.minimum(fit.noise.sd(record, record.states[:, 0]), _shown(fit, record))[frames]
+    # In a search the noise stays what the first model's misfits made it; where less remains it is less.
+    sd = fit.noise.sd(record, record.states[:, 0]) * math.sqrt(min(fit.scatter, 1.0))
+    sd = np.minimum(sd, _shown(fit, record))[frames]
     made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
 
     # Windows overlap: each is laid out as frames of its own, linked to no other.
@@ -346,11 +361,19 @@ def _floor(
 
 
 def _shown(fit: Fit, record: Record) -> Array | float:
-    """The noise of a pendulum's frames as they show it themselves, (n, 1): a search may assume more."""
-    if fit.model.kind != "pendulum":
+    """The noise of a record's frames as they show it themselves, (n, m): a search may assume more.
+
+    Of a disk's film the search's is the frames' own.
+    """
+    if fit.model.kind == "disk":
         return np.inf
-    seen = [record.seen[(record.film == k) & record.observed[:, 0], 0] for k in range(len(record.origins))]
-    return np.array([reads(own)[0] if len(own) else np.inf for own in seen])[record.film][:, None]
+    result = np.full(record.seen.shape, np.inf)
+    for film in range(len(record.origins)):
+        own = record.film == film
+        for channel, there in enumerate(record.observed.T):
+            if (own & there).any():
+                result[own, channel] = reads(record.seen[own & there, channel])[0]
+    return result
 
 
 def _there(record: Record) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from udd.measurement import Measurement
 from udd.models import Model
 
 from .curves import Curve
-from .heldout import Errors, Ratio, comparison_horizon
+from .heldout import Errors, Ratio, comparison_horizon, lacks_more
 from .hint import Hint, hints
 from .scan import Scored
 
@@ -211,6 +211,9 @@ class Discovery:
         The seconds that ended the search before it was done, where they did.
     stopped : str or None
         What it was at then.
+    excused : list of str or None
+        Where parameters of the camera were held and its faults would explain most of what the found model
+        leaves, or a part of what was found: titles of the effects that they would explain as well.
     """
 
     verdict: str
@@ -230,6 +233,7 @@ class Discovery:
     thinned: list[Thinned] = field(default_factory=list)
     budget: float | None = None
     stopped: str | None = None
+    excused: list[str] | None = None
 
     @property
     def measurement(self) -> Measurement:
@@ -250,6 +254,16 @@ class Discovery:
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        if self.effects and lacks_more(self.fit, self.error_after):
+            said.append("Something is missing beside what was found: it leaves more than noise does.")
+        if self.excused is not None:
+            what = (
+                f"{' and '.join(self.excused)} as well" if self.excused else "what is left, or a part of this"
+            )
+            said.append(
+                f"Parameters of the camera were held, whose faults would explain {what}: leave all of them "
+                "free (camera=True)."
+            )
         held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if held:
             said.append(

@@ -176,14 +176,14 @@ def _scan_waves(fit: Fit, model: OwnModel) -> list[Scored]:
     frequencies = frequencies[~belongs(frequencies, fit)]
     there = {effect.name for effect in model.effects}
     candidates = [c for c in waves(model, frequencies) if c.effect.name not in there]
-    by_state = {slot.equation: slot for slot in slots(model)}
+    by_name = {slot.name: slot for slot in slots(model)}
     scatter = max(fit.scatter, 1.0)
     result: list[Scored] = []
     for first in range(0, len(candidates), _WAVES):
         some, columns = candidates[first : first + _WAVES], []
         for one in some:
             phase = 2 * np.pi * one.effect.values[-1] * moved.t
-            slot = by_state[one.effect.slots[0].removesuffix("'")]
+            slot = by_name[one.effect.slots[0]]
             value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
             columns.append(moved.columns(slot, value, np.zeros(value.shape)))
         for one, score in zip(some, score_forcings(fit, columns), strict=True):

@@ -37,7 +37,7 @@ from .looks import Look, look_around, states_first, wider
 from .results import Alternative, Failing, Refused, Witness
 from .scan import Scan, Scored
 from .together import together
-from .trials import Trial, fitted_ones, of_curve, of_formula, of_library, one_of_each, same_law
+from .trials import Trial, fitted_ones, needed_in, of_curve, of_formula, of_library, one_of_each, same_law
 
 From = TypeVar("From")
 To = TypeVar("To")
@@ -54,7 +54,7 @@ _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
 _TIED = 4 * NATS  # in chi2: forms that differ by less are compared by all data and by what they foretell
 _FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
-_EQUALS = 7  # forms between which all data decide
+_EQUALS = 10  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -233,8 +233,6 @@ class Search:
             states.append(found[1])
             self._prune(accepted, states, looks)
             states[-1] = self._released(states[-1])
-        self._simplify(accepted, states, looks)
-        states[-1] = self._released(states[-1])
 
     def _confirmed(self, known: State, states: list[State]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
@@ -372,7 +370,11 @@ class Search:
         for one in scored:
             if one.candidate.usual:
                 first.setdefault(one.candidate.effect.name, one.candidate)
-        pairs = [list(pair) for pair in itertools.combinations(list(first.values())[:_PAIRED], 2)]
+        best = list(first.values())[:_PAIRED]
+        pairs = [list(pair) for pair in itertools.combinations(best, 2)]
+        # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
+        alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
+        pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
         self._trying([" with ".join(c.title for c in pair) for pair in pairs])
 
         def tried(pair: list[Candidate]) -> Trial | None:
@@ -410,8 +412,10 @@ class Search:
     def _prune(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
         """Leave out effects that a later one makes needless.
 
-        A wrong form of the library takes up a part of what an effect outside of it does.
+        A wrong form of the library takes up a part of what an effect outside of it does, or of what another
+        one of the library does that is found after it.
         """
+        self._leave_out(accepted, states, looks)
         for k in range(len(accepted) - 1):
             last = accepted[-1]
             if last.curve is None:
@@ -426,17 +430,26 @@ class Search:
                 accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
                 return
 
-    def _simplify(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
-        """Put one curve, or a formula for it, in the place of effects that explain the data no better.
-
-        Where no effect of the library is right, some of them together may come near.
-        """
-        if len(accepted) < 2 or any(step.curve for step in accepted):
-            return
-        self.tell(f"trying one law instead of {len(accepted)}")
-        found = self._located(states[0], looks[0])
-        if found is not None and _cheaper(found, accepted, states[0], states[-1]):
-            accepted[:], states[1:], looks[1:] = [found[0]], [found[1]], []
+    def _leave_out(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+        """Leave out effects of the library that chance explains beside those found after them."""
+        whole = states[-1].whole
+        for k, step in enumerate(accepted[:-1]):
+            for one in step.candidates:
+                later = accepted[k:]
+                if any(s.curve for s in later) or needed_in(whole, one.amplitude_names):
+                    continue
+                self.tell(f"trying without {one.title}")
+                kept = [c for s in later for c in s.candidates if c is not one]
+                values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
+                trial = of_library(states[k].part, kept, values)
+                found = self._accept(states[k], fitted_ones([trial]), looks[k])
+                if found is None or not _cheaper(found, later, states[k], states[-1]):
+                    continue
+                names = {c.effect.name for c in kept}
+                others = [a for s in later for a in s.alternatives if a.instead_of in names]
+                accepted[k:] = [replace(found[0], alternatives=others)]
+                states[k + 1 :], looks[k + 1 :] = [found[1]], []
+                return
 
     def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
         """The best trial that passes all tests."""
@@ -452,7 +465,7 @@ class Search:
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
         paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
-        near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
+        near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
         costs = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
         near = self._foretelling(near, costs)
@@ -476,6 +489,15 @@ class Search:
                 )
                 return step, State(trial.fit, judged.whole, errors)
         return None
+
+    def _once(self, near: list[Trial]) -> list[Trial]:
+        """Without formulas that are one of the library's laws in other words."""
+        known = [t for t in near if t.curve is None]
+        return [
+            t
+            for t in near
+            if t.formula is None or not any(same_law(t.compared, other.compared) for other in known)
+        ]
 
     def _foretelling(self, near: list[Trial], costs: dict[int, float]) -> list[Trial]:
         """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""

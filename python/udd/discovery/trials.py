@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from udd import _chi2
+from udd.effects.own import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, extend
 from udd.own_models import OwnModel
@@ -20,6 +22,17 @@ from .located import fit_curve, fit_formula
 from .scan import physical
 
 _DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
+
+
+def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
+    """Whether the amplitudes of an effect are beyond chance beside all else that is free (Wald's test)."""
+    order = list(fitted.parameters)
+    own = [order.index(name) for name in names]
+    a = np.array([fitted.parameters[name] for name in names])
+    block = fitted.covariance[np.ix_(own, own)] * fitted.shown
+    if np.linalg.matrix_rank(block) < len(own):
+        return False  # its amplitudes trade for each other: it says less than it has numbers
+    return bool(a @ np.linalg.solve(block, a) >= _chi2.isf(ALPHA, len(own)))
 
 
 def price_of(fitted: Fit) -> float:
@@ -85,25 +98,18 @@ class Trial:
     @property
     def needed(self) -> bool:
         """Whether each of several candidates is needed beside the others."""
-        if len(self.candidates) < 2:
-            return True
-        names = list(self.fit.parameters)
-        for candidate in self.candidates:
-            own = [names.index(name) for name in candidate.amplitude_names]
-            a = np.array([self.fit.parameters[names[k]] for k in own])
-            block = self.fit.covariance[np.ix_(own, own)] * max(self.fit.scatter, 1.0)
-            if np.linalg.matrix_rank(block) < len(own):
-                return False  # its amplitudes trade for each other: it says less than it has numbers
-            if a @ np.linalg.solve(block, a) < _chi2.isf(ALPHA, len(own)):
-                return False
-        return True
+        return len(self.candidates) < 2 or all(
+            needed_in(self.fit, c.amplitude_names) for c in self.candidates
+        )
 
     @property
     def physical(self) -> bool:
-        """Whether all amplitudes lie in their ranges."""
+        """Whether all amplitudes lie in their ranges, and a pendulum's own friction still brakes."""
+        values, errors = self.fit.parameters, self.fit.errors
+        if self.fit.model.kind == "pendulum" and "k0" in values and values["k0"] < -2 * errors["k0"]:
+            return False  # two forms that take from each other what a third would do alone
         if self.curve is not None:
             return True
-        values, errors = self.fit.parameters, self.fit.errors
         return all(
             physical(c, [values[n] for n in c.amplitude_names], [errors[n] for n in c.amplitude_names])
             for c in self.candidates
@@ -143,9 +149,13 @@ def _excess(current: Fit, curve: Curve) -> float:
     """
     if not isinstance(current.model, OwnModel):
         return 0.0  # whose curves the disk's own tests keep within bounds
-    k = current.model.state_names.index(curve.slot.equation)
-    linked = current.record.linked
-    shown = np.diff(current.states[:, k])[linked] / np.diff(current.record.t)[linked]
+    model, linked = current.model, current.record.linked
+    rates = np.diff(current.states, axis=0)[linked] / np.diff(current.record.t)[linked, None]
+    shown = rates[:, model.state_names.index(curve.slot.equation)]
+    if along_of(curve.slot.name):
+        speeds = list(model.speeds.values())
+        forces = model.mass_matrix(current.states[:-1][linked])[:, speeds.index(curve.slot.equation)]
+        shown = (forces * rates[:, [model.state_names.index(name) for name in speeds]]).sum(axis=1)
     most = float(np.abs(curve.values(*curve.places)).max())
     ratio = most / max(float(np.abs(shown).max()), 1e-300)
     return 2 * curve.df * math.log(max(ratio, 1.0))
@@ -162,7 +172,7 @@ def of_formula(current: Fit, curve: Curve, written: Formula) -> Trial | None:
     names = [f"{name}.{p}" for p in effect.parameters]
     price, free = price_of(fitted) * len(names), len(names)
     trial = Trial([Candidate(effect, effect.title)], fitted, fitted, names, price, free, curve, written)
-    return trial if fitted.converged else None
+    return trial if trial.physical and fitted.converged else None
 
 
 def fitted_ones(trials: list[Trial | None]) -> list[Trial]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -185,10 +186,12 @@ def formula(
 
     Parameters
     ----------
-    slot : {"torque", "friction", "lateral", "vertical"} or the rate of a state
+    slot : {"torque", "friction", "lateral", "vertical"}, the rate of a state, or a force
         What the formula adds to: the torque [m^2/s^2], the friction coefficient k [m^2/s], the contact's
         lateral velocity u or its vertical velocity W_c [m/s]. Of a user's own model, the rate of a state:
-        ``"v'"``; its formula may use the model's states and parameters.
+        ``"v'"``; its formula may use the model's states and parameters. Where that model has a mass matrix,
+        also a force along a coordinate, ``"force(x)"``, or between two, ``"force(b - a)"``: on b, and its
+        reaction on a.
     expression : str or SymPy expression
         Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
         friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
@@ -435,7 +438,10 @@ def _described(
         raise ModelError(f"an effect's name must be a single word, not {name!r}")
     if name in _specs():
         raise ModelError(f"the library has an effect called {name!r} already: give the formula another name")
-    left, _unit, meaning = _SLOTS.get(slot, (f"{slot} = ... + ", "", f"the rate {slot} has one more term"))
+    known = _SLOTS.get(slot)
+    left, _unit, meaning = known or (f"{slot} = ... + ", "", f"the rate {slot} has one more term")
+    if along_of(slot):
+        left, meaning = f"{slot} = ", "a force that enters every acceleration through the mass matrix"
     names = [p.name for p in parameters]
     linear = [p.name for p in parameters if p.role == "amplitude"]
     # Of a user's own model only the model knows the states.
@@ -445,11 +451,17 @@ def _described(
 
 def _slot(slot: str) -> None:
     rate = isinstance(slot, str) and slot.endswith("'") and slot[:-1].isidentifier()
-    if slot not in _SLOTS and not rate:
+    if slot not in _SLOTS and not rate and not along_of(slot):
         raise ModelError(
             f"the slot must be one of {', '.join(_SLOTS)}, or for a model of your own the rate of a state as "
-            f'in "v\'", not {slot!r}'
+            f'in "v\'" or a force as in "force(x)", not {slot!r}'
         )
+
+
+def along_of(slot: object) -> str | None:
+    """What a slot that is a force acts along: a coordinate, or the difference of two; None for any other."""
+    match = re.fullmatch(r"force\((\w+(?: - \w+)?)\)", slot) if isinstance(slot, str) else None
+    return match[1] if match else None
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from udd.errors import FitError
 from udd.own_models import OwnModel
 
+from .sensor import roughness
+
 Array = NDArray[np.float64]
 
 #: The model's assumed error over a frame, from loose to tight, in units of the loosest. That is, as for disk
@@ -100,12 +102,8 @@ def checked_start(model: OwnModel | None, state0: object) -> dict[str, float]:
 
 
 def typical_noise(values: Array) -> Array:
-    """A measurement's noise as its roughness shows it, where it does not say.
-
-    The third differences of a smooth motion are small, those of noise have 20 times its variance.
-    """
-    rough = np.median(np.abs(np.diff(values, 3, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
-    result: Array = np.maximum(rough, 1e-6 * np.ptp(values, axis=0) + 1e-300)
+    """A measurement's noise as its roughness shows it, where it does not say."""
+    result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + 1e-300)
     return result
 
 

@@ -266,12 +266,17 @@ class Fit:
         return max(self.scatter, 1.0) * self._colour(before)
 
     def unit(self, before: Fit) -> float:
-        """The same for choosing between forms: the scatter counts as it is where the noise was not known.
+        """The same for choosing between forms: the scatter counts as it shows, see :attr:`shown`."""
+        return self.shown * self._colour(before)
+
+    @property
+    def shown(self) -> float:
+        """The scatter, at least 1 where the noise was known; how forms are told apart.
 
         A pendulum's film is not taken for better than its geometry, which many are.
         """
         assumed = self.model.kind == "pendulum" and self.measurement.sigma is None
-        return (self.scatter if assumed else max(self.scatter, 1.0)) * self._colour(before)
+        return self.scatter if assumed else max(self.scatter, 1.0)
 
     def _colour(self, before: Fit) -> float:
         sd = self.noise.sd(self.record, self.states[:, 0])

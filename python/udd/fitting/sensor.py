@@ -54,7 +54,7 @@ def roughness(values: Array) -> Array:
     variance as the middle binomial coefficient says.
     """
     shown = []
-    for order in _ORDERS:
+    for order in _ORDERS[: max(len(values) - _ORDERS[0], 1)]:
         scale = math.sqrt(math.comb(2 * order, order))
         shown.append(np.median(np.abs(np.diff(values, order, axis=0)), axis=0) / 0.6745 / scale)
     result: Array = np.min(shown, axis=0)

@@ -100,7 +100,7 @@ def _axis(name: str) -> tuple[str, float]:
 
 def _value(curve: Any) -> tuple[str, float]:
     """What a curve adds to, with its unit, and by what its SI value is multiplied."""
-    slot, unit, up = _SLOTS.get(curve.slot.name, (f"d{curve.slot.name}/dt", "", 1.0))
+    slot, unit, up = _SLOTS.get(curve.slot.name, (curve.slot.name, "", 1.0))
     return f"{slot} [{unit}]" if unit else slot, up
 
 

@@ -22,7 +22,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         It would not come back the same.
     """
     if isinstance(model, OwnModel):
-        return {
+        own = {
             "kind": model.kind,
             "states": list(model.state_names),
             "equations": model.equations,
@@ -30,6 +30,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "angles": list(model.angles),
             "effects": [_effect_to_dict(effect) for effect in model.effects],
         }
+        return own | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
     if _KINDS.get(cls.kind) is cls:
@@ -58,7 +59,7 @@ def model_from_dict(data: object) -> Model:
         try:
             return OwnModel(**given | {"parameters": dict(given.get("parameters", {}))})
         except (TypeError, ValueError):
-            has = "states, equations, parameters, angles and effects"
+            has = "states, equations, parameters, angles, effects and mass"
             raise ModelError(f"a model of your own has {has}, not {', '.join(given)}") from None
     if not isinstance(kind, str) or kind not in _KINDS:
         raise ModelError(
