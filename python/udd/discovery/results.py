@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
 from udd.effects import Effect
 from udd.fitting import Fit
-from udd.fitting.doubts import ran_off
+from udd.fitting.doubts import Reading, ran_off, readings
 from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
@@ -247,6 +247,15 @@ class Discovery:
         return self.fit.model
 
     @property
+    def noise(self) -> list[Reading]:
+        """What the frames of each channel are good to, as the record shows it; of means where it was thinned.
+
+        See :class:`udd.fitting.doubts.Reading`.
+        """
+        steps = self.thinned[0].steps if self.thinned else {}
+        return [replace(one, step=steps.get(one.name, one.step)) for one in readings(self.fit)]
+
+    @property
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
@@ -280,6 +289,7 @@ class Discovery:
             "verdict": self.verdict,
             "stopped": self.stopped,
             "remarks": self.remarks,
+            "noise": [vars(one) for one in self.noise],
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],
             "refused": [near.to_dict() for near in self.refused],
