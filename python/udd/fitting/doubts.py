@@ -11,7 +11,7 @@ from udd import _core
 from udd.own_models import OwnModel
 
 from .parameters import Free
-from .sensor import lattice
+from .sensor import lattice, moving
 
 if TYPE_CHECKING:
     from .problem import Fit
@@ -119,6 +119,8 @@ class Doubts:
         By what the standard errors are multiplied: 1 where nothing is missing.
     sensor : list of Reading
         The noise of each channel and the steps that it was read in.
+    rests : float or None
+        Time from which a film shows its disk at rest, which is left out, s.
     """
 
     missed: list[Missed]
@@ -127,6 +129,7 @@ class Doubts:
     ran_off: list[RanOff]
     factor: float
     sensor: list[Reading]
+    rests: float | None = None
 
     @property
     def coloured(self) -> list[str]:
@@ -167,6 +170,10 @@ class Doubts:
         said += [f"warning: {one.text}" for one in self.ran_off]
         if self.sensor:
             said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
+        if self.rests is not None:
+            said.append(
+                f"from {self.rests:.4g} s on the disk rests and the film repeats its picture: left out"
+            )
         if self.factor > 1:
             said.append(
                 f"standard errors are {self.factor:.0f} times those of a right model: what is missing may "
@@ -196,7 +203,12 @@ def doubts(fit: Fit) -> Doubts:
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if missing and not tight else 1.0
-    return Doubts(_missed(fit), tight, white, ran_off(fit), factor, readings(fit))
+    return Doubts(_missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit))
+
+
+def _rests(fit: Fit) -> float | None:
+    end = moving(fit.measurement)
+    return float(fit.measurement.t[end - 1]) if end < len(fit.measurement) else None
 
 
 def readings(fit: Fit) -> list[Reading]:
