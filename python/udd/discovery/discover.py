@@ -21,6 +21,7 @@ from udd.own_models import OwnModel
 
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
+from .drift import as_random
 from .heldout import misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
@@ -62,12 +63,14 @@ def discover(
     gains far more than the whole library comes before it. Two effects at once compete with one, and with
     formulas. Between forms that explain the first part about as well all data decide, and what each foretells
     of the rest; those that the data cannot tell apart are named. What a slow drift of the sensor's zero
-    explains about as well is no effect. Records of more than 8000 frames are averaged in blocks as far as
-    their motion and noise allow. Where no effect passes but the model does not explain the data (chi2 per
-    degree of freedom above 2.5, or free runs that miss by the size of the motion), an effect is present that
-    these data do not name; what comes nearest is listed with its held-out error, but not added. Nor is what
-    passes all this while free runs over the last 40 % do not get better beyond doubt, where they are not as
-    good as noise allows already: that fits the first part, and is not confirmed.
+    explains about as well is no effect; what forces that push at random, like those of a support that moves,
+    explain about as well is not identified (but of a disk, whose film shows such). Records of more than 8000
+    frames are averaged in blocks as far as their motion and noise allow. Where no effect passes but the model
+    does not explain the data (chi2 per degree of freedom above 2.5, or free runs that miss by the size of the
+    motion), an effect is present that these data do not name; what comes nearest is listed with its held-out
+    error, but not added. Nor is what passes all this while free runs over the last 40 % do not get better
+    beyond doubt, where they are not as good as noise allows already: that fits the first part, and is not
+    confirmed.
 
     Parameters
     ----------
@@ -141,6 +144,7 @@ def discover(
     found = [f for step in end.accepted for f in _describe(step, final)]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
+    random = as_random(baseline, end.whole) if found else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed
@@ -153,7 +157,7 @@ def discover(
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
-    elif unexplained or doubtful or any(is_spline(f.effect) for f in found):
+    elif unexplained or doubtful or random or any(is_spline(f.effect) for f in found):
         verdict = "effect present, form not identified"
     elif found:
         verdict = "effect identified"
@@ -177,6 +181,7 @@ def discover(
         thinned=thin if any(own.every > 1 for own in thin) else [],
         budget=clock.budget if stopped else None,
         stopped=stopped,
+        random=random.doubts.missed if random else [],
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from udd.effects import Effect
 from udd.fitting import Fit
-from udd.fitting.doubts import Reading, ran_off, readings
+from udd.fitting.doubts import Missed, Reading, ran_off, rate_of, readings
 from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
@@ -211,6 +211,9 @@ class Discovery:
         The seconds that ended the search before it was done, where they did.
     stopped : str or None
         What it was at then.
+    random : list of Missed
+        The random forces that the model needs beside the effects, where such forces alone, like those of a
+        support that moves, explain the data about as well: the effects are not identified then.
     """
 
     verdict: str
@@ -230,6 +233,7 @@ class Discovery:
     thinned: list[Thinned] = field(default_factory=list)
     budget: float | None = None
     stopped: str | None = None
+    random: list[Missed] = field(default_factory=list)
 
     @property
     def measurement(self) -> Measurement:
@@ -259,6 +263,12 @@ class Discovery:
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        if self.random:
+            needed = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.random)
+            said.append(
+                "Forces that push at random, like those of a support that moves, explain this record about "
+                f"as well; beside what was found it still needs {needed}, r.m.s. over a frame."
+            )
         held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if held:
             said.append(

@@ -22,7 +22,7 @@ from .bearing import ALPHA, Pair, borne_out, same_level
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
 from .curves import NATS, Curve
-from .drift import drift_gain
+from .drift import as_random, drift_gain
 from .foretelling import Foretelling
 from .formulas import Formula, formulas_for
 from .heldout import (
@@ -242,7 +242,11 @@ class Search:
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
             one_more = self.improvement(states[number - 1].errors, errors)
-            if confirmed(known.errors, self.improvement(known.errors, errors)) and not one_more[1] > 1.0:
+            ratio = self.improvement(known.errors, errors)
+            if not confirmed(known.errors, ratio) or one_more[1] > 1.0:
+                continue
+            # Runs that are too short to show it do not confirm what forces at random do as well.
+            if ratio[2] < 1.0 or as_random(known.whole, states[number].whole) is None:
                 return number
         return 0
 

@@ -11,7 +11,7 @@ from udd import _core
 from udd.own_models import OwnModel
 
 from .parameters import Free
-from .sensor import lattice, moving
+from .sensor import is_film, lattice, moving
 
 if TYPE_CHECKING:
     from .problem import Fit
@@ -121,6 +121,8 @@ class Doubts:
         The noise of each channel and the steps that it was read in.
     rests : float or None
         Time from which a film shows its disk at rest, which is left out, s.
+    filmed : bool
+        Whether it is a film, whose own faults leave a right model's innovations coloured.
     """
 
     missed: list[Missed]
@@ -130,6 +132,7 @@ class Doubts:
     factor: float
     sensor: list[Reading]
     rests: float | None = None
+    filmed: bool = False
 
     @property
     def coloured(self) -> list[str]:
@@ -138,21 +141,26 @@ class Doubts:
 
     @property
     def missing(self) -> bool:
-        """Whether the model lacks something."""
-        return not self.tight or bool(self.coloured)
+        """Whether the model lacks something.
+
+        Of a film colour alone does not tell: its faults, like those of a lens, make some.
+        """
+        return not self.tight or (bool(self.coloured) and not self.filmed)
 
     @property
     def verdict(self) -> str:
         """In a sentence."""
         if self.missing:
             return "something is missing: run udd discover"
+        if self.coloured:
+            return "what is left is not white, by a fault of the film or something small: run udd discover"
         return "nothing shows that something is missing"
 
     @property
     def sentences(self) -> list[str]:
         """All of it in words, the verdict first."""
         said = [self.verdict]
-        rates = ", ".join(f"{_rate(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.missed)
+        rates = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.missed)
         right = ", ".join(f"{m.right:.2g} {m.unit}".rstrip() for m in self.missed)
         if not self.tight:
             said.append(
@@ -203,7 +211,9 @@ def doubts(fit: Fit) -> Doubts:
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if missing and not tight else 1.0
-    return Doubts(_missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit))
+    return Doubts(
+        _missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit), is_film(fit.measurement)
+    )
 
 
 def _rests(fit: Fit) -> float | None:
@@ -235,7 +245,7 @@ def units(fit: Fit) -> dict[str, str]:
     return {name: known.get(name.partition("[")[0], "") for name in fit.parameters}
 
 
-def _rate(state: str) -> str:
+def rate_of(state: str) -> str:
     """What an error of an equation is called."""
     return {"Omega": "angular accelerations", "Y": "velocities of Y", "Z": "velocities of Z"}.get(
         state, f"{state}'"

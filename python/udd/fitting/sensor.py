@@ -87,6 +87,11 @@ def frame_noise(values: Array) -> Array:
     return result
 
 
+def is_film(measurement: Measurement) -> bool:
+    """Whether a measurement was tracked in a film."""
+    return "px_per_m" in measurement.meta
+
+
 def moving(measurement: Measurement) -> int:
     """The number of rows until a film's disk has come to rest for good, or all of them.
 
@@ -94,7 +99,7 @@ def moving(measurement: Measurement) -> int:
     their scatter says nothing of the noise.
     """
     n = len(measurement)
-    if "px_per_m" not in measurement.meta or measurement.sigma is None:
+    if not is_film(measurement) or measurement.sigma is None:
         return n
     seen = np.flatnonzero(measurement.seen)
     steps = np.abs(np.diff(measurement.values[seen], axis=0)) > _MOVES * measurement.sigma[seen[1:]]
