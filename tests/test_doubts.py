@@ -135,6 +135,19 @@ def test_a_film_whose_disk_has_come_to_rest_repeats_its_picture():
     assert len(udd.fit(film.slice(0, t[last - 5]), udd.Disk(0.0)).record.t) == last - 5
 
 
+def test_colour_alone_does_not_tell_a_film_s_faults_from_what_is_missing():
+    """An error of half the noise that comes and goes three times a second, as marks on a wheel would."""
+    clean, _states = simulated.film(udd.Disk(DRIVE), np.random.default_rng(2), 60.0)
+    fault = 2.5e-4 * np.sin(2 * np.pi * 3.1 * clean.t)[:, None] * [1.0, 1.0, 0.0]
+    told = []
+    for meta in ({}, {"px_per_m": 1750.0}):
+        seen = udd.Measurement(clean.t, clean.values + fault, meta=meta)
+        doubts = udd.fit(seen, udd.Disk(DRIVE)).doubts
+        told.append((doubts.tight, bool(doubts.coloured), doubts.missing, doubts.verdict.split(",")[0]))
+    assert told[0] == (True, True, True, "something is missing: run udd discover")
+    assert told[1] == (True, True, False, "what is left is not white")
+
+
 def test_an_encoder_has_a_zero_but_no_perspective():
     t = np.arange(0, 20, 0.04)
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]

@@ -207,10 +207,9 @@ def doubts(fit: Fit) -> Doubts:
     last = len(fit.problem.schedule) - 1
     tight = fit.level >= last - _NEARLY
     white = _white(fit)
-    missing = not tight or any(p < _COLOURED for p in white.values())
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
-    factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if missing and not tight else 1.0
+    factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if not tight else 1.0
     return Doubts(
         _missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit), is_film(fit.measurement)
     )

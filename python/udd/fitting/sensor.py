@@ -88,8 +88,8 @@ def frame_noise(values: Array) -> Array:
 
 
 def is_film(measurement: Measurement) -> bool:
-    """Whether a measurement was tracked in a film."""
-    return "px_per_m" in measurement.meta
+    """Whether a measurement is one of the disk, tracked in a film."""
+    return measurement.kind == "disk" and "px_per_m" in measurement.meta
 
 
 def moving(measurement: Measurement) -> int:
