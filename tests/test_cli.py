@@ -195,15 +195,19 @@ def test_discover_tells_the_verdict_first(
     assert out.startswith("effect ")
     assert "quadratic drag" in out
     assert "noise floor" in out
+    assert "\n  noise: theta 0.0" in out
     assert out.isascii()  # for terminals of every locale
     assert err == ""  # no progress where nobody watches
-    assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    written = page.read_text(encoding="utf-8")
+    assert written.startswith("<!DOCTYPE html>")
+    assert "A frame is good to: theta 0.0" in written
 
 
 def test_discover_as_json(swing: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = data(["discover", swing, "--pendulum", "0.6"], capsys)
     assert found["verdict"] == discovered.pendulum().verdict
     assert found["effects"]
+    assert [one["name"] for one in found["noise"]] == ["theta"]
 
 
 # --- bad input: one sentence, exit code 1, nothing written

@@ -268,4 +268,6 @@ def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most
     assert found.ratio[2] < 1.0
     assert found.ratio[0] < most
     drag = found.effects[0].parameters["c"] / found.model.parameters["inertia"] / length
+    if name == "b":  # whose pivot is off by a tenth of its length: 1.56 mrad where that is held as stated
+        assert found.error_after.whole < 1.4e-3
     assert 0.013 < drag < 0.022  # one aerodynamic constant for all lengths, 0.014 to 0.021 there

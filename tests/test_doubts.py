@@ -115,6 +115,39 @@ def test_a_pendulum_is_doubted_where_it_lacks_something(seed, drag):
     assert found.doubts.missing == bool(drag)
 
 
+def test_a_film_whose_disk_has_come_to_rest_repeats_its_picture():
+    """From there on it shows no noise, and by that none of the frames before would be as good as they are."""
+    t = np.arange(0, 6, 0.04)
+    states = udd.simulate(udd.Disk(0.0), t, [1.17, 0.0425, -0.0395, 1.415]).state
+    rng = np.random.default_rng(3)
+    sigma = np.array([5e-6, 5e-6, 6e-5])
+    seen = states[:, 1:] + sigma * rng.standard_normal((len(t), 3))
+    last = int(np.flatnonzero(np.abs(states[:, 0]) > 0.1)[-1])
+    seen[last:] = seen[last] + 0.1 * sigma * rng.standard_normal((len(t) - last, 3))
+    errors = np.tile(sigma, (len(t), 1))
+    film = udd.Measurement(t, seen, sigma=errors, meta={"px_per_m": 1750.0})
+    fitted = udd.fit(film, udd.Disk(0.0))
+    assert len(fitted.record.t) == last + 1
+    assert not fitted.doubts.missing
+    assert f"from {t[last]:.4g} s on the disk rests" in fitted.summary()
+    assert abs(fitted.parameters["k0"] - 0.012) < 4 * fitted.errors["k0"]
+    # A film that ends before that is taken whole.
+    assert len(udd.fit(film.slice(0, t[last - 5]), udd.Disk(0.0)).record.t) == last - 5
+
+
+def test_colour_alone_does_not_tell_a_film_s_faults_from_what_is_missing():
+    """An error of half the noise that comes and goes three times a second, as marks on a wheel would."""
+    clean, _states = simulated.film(udd.Disk(DRIVE), np.random.default_rng(2), 60.0)
+    fault = 2.5e-4 * np.sin(2 * np.pi * 3.1 * clean.t)[:, None] * [1.0, 1.0, 0.0]
+    told = []
+    for meta in ({}, {"px_per_m": 1750.0}):
+        seen = udd.Measurement(clean.t, clean.values + fault, meta=meta)
+        doubts = udd.fit(seen, udd.Disk(DRIVE)).doubts
+        told.append((doubts.tight, bool(doubts.coloured), doubts.missing, doubts.verdict.split(",")[0]))
+    assert told[0] == (True, True, True, "something is missing: run udd discover")
+    assert told[1] == (True, True, False, "what is left is not white")
+
+
 def test_an_encoder_has_a_zero_but_no_perspective():
     t = np.arange(0, 20, 0.04)
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import udd
-from udd.discovery.drift import drift_gain
+from udd.discovery.drift import as_random, drift_gain
+from udd.discovery.foretelling import Foretelling
 from udd.discovery.looks import Look
 from udd.discovery.scan import Scan
 from udd.fitting import annealing, fit_record, record_of
@@ -37,6 +38,46 @@ def test_a_steady_sensor_gains_nothing_by_a_drift():
     assert drift_gain(fit_record(measured, record_of(measured), KNOWN, search=True)) == 0.0
     short = measured.rows(np.arange(150))  # too short to tell a drift from the swing
     assert drift_gain(fit_record(short, record_of(short), KNOWN, search=True)) == 0.0
+
+
+def swinging(shake: float, drag: float) -> udd.Measurement:
+    """A pendulum that hardly loses energy, with a support that shakes or a drag."""
+    rng = np.random.default_rng(11)
+    t = np.arange(0, 60, 0.02)
+    waves = [(rng.normal(), f, rng.uniform(0, 6)) for f in np.linspace(0.3, 3.0, 60)]
+    pushes = " + ".join(f"{a:.4f}*sin({2 * np.pi * f:.5f}*t + {phase:.3f})" for a, f, phase in waves)
+    effects = [udd.effects.formula("torque", f"{shake}*({pushes})", name="pushes")] if shake else []
+    effects += [udd.effects.quadratic_drag(c=drag)] if drag else []
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.004, effects=effects), t, [0.0, 0.8]).state[:, 1]
+    return udd.Measurement(t, {"theta": theta + 2e-3 * rng.standard_normal(len(t))})
+
+
+@pytest.mark.parametrize(("shake", "drag"), [(2e-3, 0.0), (0.0, 3e-3)])
+def test_what_forces_at_random_explain_as_well_is_told_from_a_drag(shake, drag):
+    measured = swinging(shake, drag)
+    record = record_of(measured)
+    braked = udd.Pendulum(0.8, k0=0.004, effects=[udd.effects.quadratic_drag(c=1e-3)])
+    known, found = (
+        fit_record(measured, record, model, search=True) for model in (udd.Pendulum(0.8, k0=0.004), braked)
+    )
+    assert known.level == found.level and known.chi2 - found.chi2 > 30  # either looks like a finding
+    assert (as_random(known, found) is not None) == bool(shake)
+
+
+def test_several_splits_of_time_part_a_drag_from_another():
+    measured = swinging(0.0, 3e-2)
+    record = record_of(measured)
+    laws = [udd.effects.quadratic_drag(c=1e-2), udd.effects.cubic_drag(c=1e-2)]
+    models = [udd.Pendulum(0.8, k0=0.004, effects=[law]) for law in laws]
+    right, wrong = (SimpleNamespace(fit=fit_record(measured, record, m, search=True)) for m in models)
+    foretelling = Foretelling(record, {id(right): right, id(wrong): wrong}, 1.0)
+    assert foretelling.ratio(wrong, right)[2] < 1.0 < foretelling.ratio(right, wrong)[1]
+    assert foretelling.ratio(right, right) == (1.0, 1.0, 1.0)
+    # Each split has fits of its own.
+    spans = [np.ptp(one.record.t) for one in foretelling._fits(right)]
+    np.testing.assert_allclose(spans, [36.0, 42.0, 48.0], atol=0.05)
+    few = record.part(slice(20))
+    assert np.isnan(Foretelling(few, foretelling.wholes, 1.0).ratio(wrong, right)[0])
 
 
 def test_a_search_takes_a_fit_that_is_near_its_minimum():

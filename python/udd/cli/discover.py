@@ -90,6 +90,7 @@ def describe(found: Discovery) -> str:
         lines.append(f"  held-out error {span}: {numbers.before}")
     lines += [f"  nearest: {plain(sentence)}" for sentence in words.refused(found)]
     lines.append(f"  noise floor after {at}: {numbers.floor}")
+    lines.append(f"  noise: {words.noise(found)}")
     for other in found.alternatives:
         lines.append(f"  could equally be {other.title}: {other.effect.expression}. {words.limit(other)}")
     if found.hint is not None:

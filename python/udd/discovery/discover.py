@@ -22,6 +22,7 @@ from udd.own_models import OwnModel
 from .camera import camera_shows
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
+from .drift import FORETELLS, as_random
 from .heldout import lacks_more, misses_the_motion, pace
 from .results import Discovery, Found, Refused
 from .search import Search, State, Step
@@ -63,12 +64,14 @@ def discover(
     gains far more than the whole library comes before it. Two effects at once compete with one, and with
     formulas. Between forms that explain the first part about as well all data decide, and what each foretells
     of the rest; those that the data cannot tell apart are named. What a slow drift of the sensor's zero
-    explains about as well is no effect. Records of more than 8000 frames are averaged in blocks as far as
-    their motion and noise allow. Where no effect passes but the model does not explain the data (chi2 per
-    degree of freedom above 2.5, or free runs that miss by the size of the motion), an effect is present that
-    these data do not name; what comes nearest is listed with its held-out error, but not added. Nor is what
-    passes all this while free runs over the last 40 % do not get better beyond doubt, where they are not as
-    good as noise allows already: that fits the first part, and is not confirmed.
+    explains about as well is no effect; what forces that push at random, like those of a support that moves,
+    explain about as well is not identified (but of a disk, whose film shows such). Records of more than 8000
+    frames are averaged in blocks as far as their motion and noise allow. Where no effect passes but the model
+    does not explain the data (chi2 per degree of freedom above 2.5, or free runs that miss by the size of the
+    motion), an effect is present that these data do not name; what comes nearest is listed with its held-out
+    error, but not added. Nor is what passes all this while free runs over the last 40 % do not get better
+    beyond doubt, where they are not as good as noise allows already: that fits the first part, and is not
+    confirmed.
 
     Parameters
     ----------
@@ -145,6 +148,9 @@ def discover(
     doubtful = [a for a in others if a.likeness < SAME]
     left = bool(found) and lacks_more(final, end.errors)
     excused = camera_shows(known.whole, end.whole) if found and not end.stopped else None
+    ratio = search.improvement(before, end.errors) if found else (1.0, 1.0, 1.0)
+    # Random forces foretell nothing: what makes free runs so much better is a law.
+    random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
     refused: list[Refused] = end.unconfirmed
@@ -157,7 +163,14 @@ def discover(
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
         verdict = "fits the first part, not confirmed"
-    elif unexplained or doubtful or left or excused is not None or any(is_spline(f.effect) for f in found):
+    elif (
+        unexplained
+        or doubtful
+        or left
+        or random
+        or excused is not None
+        or any(is_spline(f.effect) for f in found)
+    ):
         verdict = "effect present, form not identified"
     elif found:
         verdict = "effect identified"
@@ -171,7 +184,7 @@ def discover(
         alternatives=others,
         error_before=before,
         error_after=end.errors,
-        ratio=search.improvement(before, end.errors) if found else (1.0, 1.0, 1.0),
+        ratio=ratio,
         scans=[sorted(look.library.scored, key=lambda s: -s.chi2) for look in end.looks],
         curves=[look.curves for look in end.looks],
         looks=[look.looks for look in end.looks],
@@ -182,6 +195,7 @@ def discover(
         budget=clock.budget if stopped else None,
         stopped=stopped,
         excused=None if excused is None else [f.title for f in found if f.effect.name in excused],
+        random=random.doubts.missed if random else [],
     )
 
 

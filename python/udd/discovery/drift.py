@@ -1,4 +1,4 @@
-"""What a slow drift of the sensor's zero would explain of what a model misses."""
+"""What a sensor's zero that drifts, or a support that moves, would explain of what a model misses."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from udd.fitting import Fit
+from udd.fitting import Fit, eased
 
+from .curves import NATS
 from .trials import price_of
 
 Array = NDArray[np.float64]
@@ -45,6 +46,38 @@ def drift_gain(fit: Fit) -> float:
             fall = float(scaled @ scaled - left @ left) / max(fit.scatter, 1.0)
             total += fall if fall > price_of(fit) * design.shape[1] else 0.0
     return total
+
+
+FORETELLS = 0.5
+"""The ratio of free runs' errors, at worst, from which on no random forces come into question."""
+
+
+def as_random(known: Fit, found: Fit) -> Fit | None:
+    """The likeliest fit of what was found, where forces that push at random explain the data about as well.
+
+    So does a support that moves: what it feeds into a swing that hardly loses energy lasts for many turns,
+    and looks like a law. A right law needs no such forces beside it: what was found is then likeliest where
+    it is held tightly. One that needs them still has to explain more beside them than the known model does,
+    by the evidence of fits that are each held as tightly as is likeliest. Not of a disk, whose camera sees
+    all marks move.
+
+    Parameters
+    ----------
+    known, found : Fit
+        Of all data, without and with what was found, in a search.
+
+    Returns
+    -------
+    Fit or None
+        None where they do not, or where no such forces are needed.
+    """
+    if found.model.kind == "disk":
+        return None
+    likeliest = eased(found)
+    tight = likeliest.level == len(likeliest.problem.schedule) - 1
+    if tight or likeliest.evidence - eased(known).evidence > NATS:
+        return None
+    return likeliest
 
 
 def _change(fit: Fit) -> float:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
 from udd.effects import Effect
 from udd.fitting import Fit
-from udd.fitting.doubts import ran_off
+from udd.fitting.doubts import Missed, Reading, ran_off, rate_of, readings
 from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
@@ -214,6 +214,9 @@ class Discovery:
     excused : list of str or None
         Where parameters of the camera were held and its faults would explain most of what the found model
         leaves, or a part of what was found: titles of the effects that they would explain as well.
+    random : list of Missed
+        The random forces that the model needs beside the effects, where such forces alone, like those of a
+        support that moves, explain the data about as well: the effects are not identified then.
     """
 
     verdict: str
@@ -234,6 +237,7 @@ class Discovery:
     budget: float | None = None
     stopped: str | None = None
     excused: list[str] | None = None
+    random: list[Missed] = field(default_factory=list)
 
     @property
     def measurement(self) -> Measurement:
@@ -251,6 +255,15 @@ class Discovery:
         return self.fit.model
 
     @property
+    def noise(self) -> list[Reading]:
+        """What the frames of each channel are good to, as the record shows it; of means where it was thinned.
+
+        See :class:`udd.fitting.doubts.Reading`.
+        """
+        steps = self.thinned[0].steps if self.thinned else {}
+        return [replace(one, step=steps.get(one.name, one.step)) for one in readings(self.fit)]
+
+    @property
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
@@ -263,6 +276,12 @@ class Discovery:
             said.append(
                 f"Parameters of the camera were held, whose faults would explain {what}: leave all of them "
                 "free (camera=True)."
+            )
+        if self.random:
+            needed = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.random)
+            said.append(
+                "Forces that push at random, like those of a support that moves, explain this record about "
+                f"as well; beside what was found it still needs {needed}, r.m.s. over a frame."
             )
         held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if held:
@@ -294,6 +313,7 @@ class Discovery:
             "verdict": self.verdict,
             "stopped": self.stopped,
             "remarks": self.remarks,
+            "noise": [vars(one) for one in self.noise],
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],
             "refused": [near.to_dict() for near in self.refused],

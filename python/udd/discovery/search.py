@@ -18,11 +18,12 @@ from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released
 from udd.fitting.parameters import Free
 
-from .bearing import ALPHA, Pair, borne_out, held_ratio, same_level
+from .bearing import ALPHA, Pair, borne_out, same_level
 from .candidates import Candidate
 from .clock import Clock, TimeUpError
 from .curves import NATS, Curve
-from .drift import drift_gain
+from .drift import as_random, drift_gain
+from .foretelling import Foretelling
 from .formulas import Formula, formulas_for
 from .heldout import (
     Errors,
@@ -239,7 +240,11 @@ class Search:
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
             one_more = self.improvement(states[number - 1].errors, errors)
-            if confirmed(known.errors, self.improvement(known.errors, errors)) and not one_more[1] > 1.0:
+            ratio = self.improvement(known.errors, errors)
+            if not confirmed(known.errors, ratio) or one_more[1] > 1.0:
+                continue
+            # Runs that are too short to show it do not confirm what forces at random do as well.
+            if ratio[2] < 1.0 or as_random(known.whole, states[number].whole) is None:
                 return number
         return 0
 
@@ -261,15 +266,22 @@ class Search:
         ]
 
     def _released(self, state: State) -> State:
-        """With everything free that the user leaves free, unless that goes astray."""
+        """With everything free that the user leaves free, unless that goes astray.
+
+        A camera may well be farther off than is usual: held-out data that are foretold better beyond doubt
+        with what it came to say that it is.
+        """
         names = set(state.part.parameters)
         if all(f.name in names for f in self.free):
             return state
         try:
             part, whole = together(partial(released, free=self.free), (state.part, state.whole))
-            if not (part.converged and whole.converged) or ran_away(part) or ran_away(whole):
+            if not (part.converged and whole.converged):
                 return state
             errors = self.errors(part)
+            strayed = ran_away(part) or ran_away(whole)
+            if strayed and not self.improvement(state.errors, errors)[2] < 1.0:
+                return state
         except FitError:
             return state
         return state if self._worse(state.errors, errors) else State(part, whole, errors)
@@ -466,9 +478,10 @@ class Search:
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
         paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
         near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
-        costs = self._costs(current, near[:_EQUALS], first.unit(before), unit)
+        costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
-        near = self._foretelling(near, costs)
+        foretelling = Foretelling(self.record, wholes, self.unit)
+        near = self._foretelling(near, costs, foretelling)
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
             judged = self._judged(current, trial, look)
@@ -476,7 +489,7 @@ class Search:
                 continue
             errors = self._errors_or_none(trial.fit)
             if errors is not None and not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, look.library, costs)
+                others = self._alternatives(trial, trials, look.library, costs, foretelling)
                 step = Step(
                     candidates=trial.candidates,
                     curve=trial.curve,
@@ -499,30 +512,27 @@ class Search:
             if t.formula is None or not any(same_law(t.compared, other.compared) for other in known)
         ]
 
-    def _foretelling(self, near: list[Trial], costs: dict[int, float]) -> list[Trial]:
+    def _foretelling(
+        self, near: list[Trial], costs: dict[int, float], foretelling: Foretelling
+    ) -> list[Trial]:
         """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
         best = near[0] if near else None
         for other in near[1:]:
             tied = costs[id(other)] - costs[id(near[0])] <= _TIED
-            if best and tied and _clearly(self._foretold(best, other)):
+            if best and tied and _clearly(foretelling.ratio(best, other)):
                 best = other
         return [best, *(t for t in near if t is not best)] if best else near
 
-    def _foretold(self, one: Trial, other: Trial) -> Ratio:
-        """Cost of the held-out frames by another form over that by one, all parameters held."""
-        try:
-            return held_ratio(one.fit, other.fit, self.record.part(self.held), self.unit)
-        except FitError:
-            return math.nan, math.nan, math.nan
-
-    def _costs(self, current: State, near: list[Trial], unit: float, most: float) -> dict[int, float]:
-        """What each of several forms costs that explain the first part about as well: by all data.
+    def _costs(
+        self, current: State, near: list[Trial], unit: float, most: float
+    ) -> tuple[dict[int, float], dict[int, Trial]]:
+        """What each of several forms costs that explain the first part about as well: by all data; the fits.
 
         Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
         of all data is, but for a constant, the cost of predicting each stretch from those before it.
         """
         if len(near) < 2:
-            return {id(t): t.criterion(unit) + t.handicap for t in near if t.needed}
+            return {id(t): t.criterion(unit) + t.handicap for t in near if t.needed}, {}
 
         def again(trial: Trial) -> Trial | None:
             try:
@@ -541,7 +551,7 @@ class Search:
                 result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
             except FitError:
                 continue
-        return result
+        return result, {id(t): w for t, w in wholes}
 
     def _judged(self, current: State, trial: Trial, look: Look) -> Judged | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
@@ -590,7 +600,12 @@ class Search:
         )
 
     def _alternatives(
-        self, chosen: Trial, trials: list[Trial], scanned: Scan, costs: dict[int, float]
+        self,
+        chosen: Trial,
+        trials: list[Trial],
+        scanned: Scan,
+        costs: dict[int, float],
+        foretelling: Foretelling,
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
@@ -607,7 +622,7 @@ class Search:
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
                 or (trial.formula is not None and self._says_less(trial, chosen, nats))
-                or _clearly(self._foretold(trial, chosen))
+                or _clearly(foretelling.ratio(trial, chosen))
             ):
                 continue
             for mine, other in _beside(chosen.candidates, trial.candidates):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .annealing import at_level, held, loosened
+from .annealing import at_level, eased, held, loosened
 from .fit import (
     UNEXPLAINED,
     as_stated,
@@ -27,6 +27,7 @@ __all__ = [
     "at_level",
     "checked_units",
     "data_of",
+    "eased",
     "extend",
     "filtered",
     "fit",

@@ -175,6 +175,12 @@ def at_level(fitted: Fit, level: int) -> Fit:
     return solve(fitted.measurements, problem, fitted.point)
 
 
+def eased(fitted: Fit) -> Fit:
+    """The same model, held as loosely as is likeliest, from where a fit ended."""
+    problem = replace(fitted.problem, likeliest=True)
+    return _eased(replace(fitted, problem=problem), problem.schedule)
+
+
 def held(fitted: Fit, record: Record, level: int) -> Fit:
     """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
 

@@ -11,7 +11,7 @@ from udd import _core
 from udd.own_models import OwnModel
 
 from .parameters import Free
-from .sensor import lattice
+from .sensor import is_film, lattice, moving
 
 if TYPE_CHECKING:
     from .problem import Fit
@@ -119,6 +119,10 @@ class Doubts:
         By what the standard errors are multiplied: 1 where nothing is missing.
     sensor : list of Reading
         The noise of each channel and the steps that it was read in.
+    rests : float or None
+        Time from which a film shows its disk at rest, which is left out, s.
+    filmed : bool
+        Whether it is a film, whose own faults leave a right model's innovations coloured.
     """
 
     missed: list[Missed]
@@ -127,6 +131,8 @@ class Doubts:
     ran_off: list[RanOff]
     factor: float
     sensor: list[Reading]
+    rests: float | None = None
+    filmed: bool = False
 
     @property
     def coloured(self) -> list[str]:
@@ -135,21 +141,26 @@ class Doubts:
 
     @property
     def missing(self) -> bool:
-        """Whether the model lacks something."""
-        return not self.tight or bool(self.coloured)
+        """Whether the model lacks something.
+
+        Of a film colour alone does not tell: its faults, like those of a lens, make some.
+        """
+        return not self.tight or (bool(self.coloured) and not self.filmed)
 
     @property
     def verdict(self) -> str:
         """In a sentence."""
         if self.missing:
             return "something is missing: run udd discover"
+        if self.coloured:
+            return "what is left is not white, by a fault of the film or something small: run udd discover"
         return "nothing shows that something is missing"
 
     @property
     def sentences(self) -> list[str]:
         """All of it in words, the verdict first."""
         said = [self.verdict]
-        rates = ", ".join(f"{_rate(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.missed)
+        rates = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.missed)
         right = ", ".join(f"{m.right:.2g} {m.unit}".rstrip() for m in self.missed)
         if not self.tight:
             said.append(
@@ -167,6 +178,10 @@ class Doubts:
         said += [f"warning: {one.text}" for one in self.ran_off]
         if self.sensor:
             said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
+        if self.rests is not None:
+            said.append(
+                f"from {self.rests:.4g} s on the disk rests and the film repeats its picture: left out"
+            )
         if self.factor > 1:
             said.append(
                 f"standard errors are {self.factor:.0f} times those of a right model: what is missing may "
@@ -192,11 +207,17 @@ def doubts(fit: Fit) -> Doubts:
     last = len(fit.problem.schedule) - 1
     tight = fit.level >= last - _NEARLY
     white = _white(fit)
-    missing = not tight or any(p < _COLOURED for p in white.values())
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
-    factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if missing and not tight else 1.0
-    return Doubts(_missed(fit), tight, white, ran_off(fit), factor, readings(fit))
+    factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if not tight else 1.0
+    return Doubts(
+        _missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit), is_film(fit.measurement)
+    )
+
+
+def _rests(fit: Fit) -> float | None:
+    end = moving(fit.measurement)
+    return float(fit.measurement.t[end - 1]) if end < len(fit.measurement) else None
 
 
 def readings(fit: Fit) -> list[Reading]:
@@ -223,7 +244,7 @@ def units(fit: Fit) -> dict[str, str]:
     return {name: known.get(name.partition("[")[0], "") for name in fit.parameters}
 
 
-def _rate(state: str) -> str:
+def rate_of(state: str) -> str:
     """What an error of an equation is called."""
     return {"Omega": "angular accelerations", "Y": "velocities of Y", "Z": "velocities of Z"}.get(
         state, f"{state}'"

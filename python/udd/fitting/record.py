@@ -18,7 +18,7 @@ from udd.models import Model
 from udd.own_models import OwnModel
 
 from .own import checked_start, guessed, slope, typical_noise
-from .sensor import frame_noise, is_encoder, lattice
+from .sensor import frame_noise, is_encoder, lattice, moving
 
 Array = NDArray[np.float64]
 
@@ -156,7 +156,7 @@ def record_of(
     if not own and measurement.kind == "own":
         given = ", ".join(measurement.names)
         raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
-    values, seen = measurement.values, measurement.seen
+    values, seen = measurement.values, measurement.seen & (np.arange(len(measurement)) < moving(measurement))
     if seen.sum() < 10:
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")
     origin = float(measurement.t[0])

@@ -15,6 +15,8 @@ _FEW = 8  # gaps between values that tell a lattice
 _SAME = 1e-7  # of the range, below which two values are one
 _OFF, _MOST = 0.02, 0.98  # how far gaps may be from multiples of the step, and how many are not farther
 _ORDERS = (3, 4, 5, 6)  # of the differences that tell noise from motion
+_MOVES = 3.0  # standard errors by which a frame differs from the one before where a film is not at rest
+_STILL = 10  # frames of a film that shows no motion any more, at least
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 _CLOSE = 1e-3  # relative, within which a number is a round one
 
@@ -83,6 +85,26 @@ def frame_noise(values: Array) -> Array:
     own = step**2 / 12.0
     result: Array = np.sqrt(noise**2 - own + np.repeat(lengths, lengths) * own)
     return result
+
+
+def is_film(measurement: Measurement) -> bool:
+    """Whether a measurement is one of the disk, tracked in a film."""
+    return measurement.kind == "disk" and "px_per_m" in measurement.meta
+
+
+def moving(measurement: Measurement) -> int:
+    """The number of rows until a film's disk has come to rest for good, or all of them.
+
+    From there on a compressed film repeats its picture, with its errors: the frames say nothing new, and
+    their scatter says nothing of the noise.
+    """
+    n = len(measurement)
+    if not is_film(measurement) or measurement.sigma is None:
+        return n
+    seen = np.flatnonzero(measurement.seen)
+    steps = np.abs(np.diff(measurement.values[seen], axis=0)) > _MOVES * measurement.sigma[seen[1:]]
+    last = np.flatnonzero(steps.any(axis=1))[-1:] + 2  # the frame it moved to, and one more
+    return int(seen[last[0]]) if len(last) and last[0] + _STILL < len(seen) else n
 
 
 def is_encoder(measurement: Measurement) -> bool:

@@ -12,6 +12,7 @@ from udd.measurement import Measurement
 from udd.measurement.table import ANGLES
 
 from .record import odd_frames
+from .sensor import lattice
 
 Array = NDArray[np.float64]
 
@@ -38,11 +39,14 @@ class Thinned:
         How many frames each block holds; 1 where the record is as it was.
     frames : int
         How many there were.
+    steps : dict of str to float
+        The step that each column was read in, which its means no longer show; 0 where there is none.
     """
 
     measurement: Measurement
     every: int
     frames: int
+    steps: dict[str, float]
 
 
 def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinned:
@@ -60,7 +64,7 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
     """
     n = int(measurement.seen.sum())
     if n <= _MANY:
-        return Thinned(measurement, 1, n)
+        return Thinned(measurement, 1, n, {})
     t = measurement.t[measurement.seen]
     values = measurement.values[measurement.seen].copy()
     for k, name in enumerate(measurement.names):
@@ -71,9 +75,10 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
     while every > 1:
         found = _averaged(measurement, t, values, step, every)
         if found is not None:
-            return Thinned(found, every, n)
+            steps = {name: lattice(x) for name, x in zip(measurement.names, values.T, strict=True)}
+            return Thinned(found, every, n, steps)
         every = int(_SHORTER * every)
-    return Thinned(measurement, 1, n)
+    return Thinned(measurement, 1, n, {})
 
 
 def _change(t: Array, values: Array, step: float) -> float:

@@ -210,6 +210,13 @@ def headline(discovery: Any) -> Headline:
     )
 
 
+def noise(discovery: Any) -> str:
+    """What the frames of each channel are good to, and the steps that they were read in."""
+    said = "; ".join(one.text for one in discovery.noise)
+    averaged = discovery.thinned and discovery.thinned[0].every > 1
+    return f"{said} (means of {discovery.thinned[0].every} frames)" if averaged else said
+
+
 def length(value: float, unit: str) -> str:
     """An error with its unit: mm or mrad, or per cent of a motion's spread."""
     if not math.isfinite(value):
