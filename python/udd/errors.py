@@ -18,9 +18,9 @@ class UddError(ValueError):
         One sentence. What it repeats of the input is cut where that is long.
     """
 
-    def __init__(self, message: str = "") -> None:
+    def __init__(self, message: str = "", *more: object) -> None:
         words = re.sub(rf"\S{{{_WORD},}}", lambda word: f"{word[0][: _WORD - 3]}...", message)
-        super().__init__(words if len(words) <= _ALL else f"{words[: _ALL - 3]}...")
+        super().__init__(words if len(words) <= _ALL else f"{words[: _ALL - 3]}...", *more)
 
 
 class ModelError(UddError):
