@@ -71,7 +71,7 @@ where
         let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, &|_, values| values.to_vec());
         let zero = zeros();
         let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
-        let one = |follower: &mut Follower<'_, _, Wide, D>,
+        let one = |follower: &mut Follower<'_, Wide, D>,
                    i: usize,
                    (film, start, end): Span,
                    link: &mut Link<D>| {
@@ -94,7 +94,7 @@ where
         let laws = self.own_laws(point);
         let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = Places { switched: false, places: [place; PLACES_PER_LINK] };
-        let one = |follower: &mut Follower<'_, _, Wide, D>,
+        let one = |follower: &mut Follower<'_, Wide, D>,
                    i: usize,
                    (_, start, end): Span,
                    found: &mut Places<D>| {

@@ -5,7 +5,7 @@
 //! its step anew up to there, and [`Landing`] corrects the step's size until the surface's function is
 //! zero; the other lanes go on meanwhile.
 
-use super::method::{MOST_PROBES, Method, Point};
+use super::method::{Course, MOST_PROBES, Method, Point};
 use super::root::bracketed;
 use super::tolerance::Tolerance;
 use crate::model::{MAX_SURFACES, System};
@@ -89,7 +89,7 @@ where
 
     /// The same at `dt` after the start of the method's last trial, on its polynomial.
     #[inline(always)]
-    pub fn on<K: Method<S, D>>(&self, target: usize, method: &K, dt: S::Real) -> S::Real {
+    pub fn on(&self, target: usize, method: &dyn Course<S, D>, dt: S::Real) -> S::Real {
         let x = method.real_at(dt, &self.system.watched());
         self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
     }
@@ -115,10 +115,9 @@ where
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.
-    #[inline(always)]
-    pub fn find<K: Method<S, D>>(
+    pub fn find(
         &self,
-        method: &K,
+        method: &dyn Course<S, D>,
         h: S::Real,
         lanes: S::Mask,
         look: &Look<S, D>,
@@ -139,7 +138,7 @@ where
             let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
-            for (i, &theta) in K::PROBES.iter().enumerate() {
+            for (i, &theta) in method.probes().iter().enumerate() {
                 let dt = h.scale(theta);
                 let x = vector!(S, D; n => S::lift(look.probes[i][n]));
                 let value = self.value(target, self.at.t + dt, &x);

@@ -5,6 +5,7 @@
 //! zero there; the integrator freezes the side of each surface within a step, so that every step sees
 //! a smooth law, and lands on the surface before it changes the side.
 
+mod any;
 mod bristle;
 mod disk;
 mod dle;
@@ -14,6 +15,7 @@ mod own;
 mod pendulum;
 pub mod stick;
 
+pub use any::AnySystem;
 pub use bristle::Bristled;
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
