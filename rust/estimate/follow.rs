@@ -152,9 +152,7 @@ where
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<S>, S>],
-        one: &(
-             dyn Fn(&mut Follower<'_, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync
-         ),
+        one: &(dyn Fn(&mut Follower<'_, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync),
         none: &T,
         mut found: Vec<T>,
     ) -> Result<Vec<T>, EstimateError>

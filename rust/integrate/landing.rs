@@ -36,6 +36,38 @@ pub struct Look<S: Scalar, const D: usize> {
     pub beyond: [S::Mask; TARGETS],
 }
 
+/// The states at these parts of a step of size `h`.
+pub struct Probes<'a, R: Real, const D: usize> {
+    h: R,
+    parts: &'static [f64],
+    states: &'a [[R; D]; MOST_PROBES],
+}
+
+/// Finds the lanes that are beyond each target at any of these places. A function of its own for each law and kind of
+/// number, whatever the method.
+#[inline(never)]
+pub fn beyond<M: System<S, D>, S: Scalar, const D: usize>(
+    system: &M,
+    at: &Point<S, D>,
+    wall: bool,
+    probes: &Probes<'_, S::Real, D>,
+    beyond: &mut [S::Mask; TARGETS],
+) {
+    let watch = Watch { system, at, wall, noise: NOISE };
+    // Unrolled, so that each target's function is known.
+    unroll!(target in 0..TARGETS => {
+        if watch.has(target) {
+            let mut any = S::mask(false);
+            for i in 0..probes.parts.len() {
+                let x = vector!(S, D; n => S::lift(probes.states[i][n]));
+                let value = watch.value(target, at.t + probes.h.scale(probes.parts[i]), &x);
+                any = any.or(value.less(S::Real::zero()));
+            }
+            beyond[target] = any;
+        }
+    });
+}
+
 /// What a step does to the targets, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Found<R: Real> {
@@ -99,18 +131,10 @@ where
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.system.watched());
         let mut beyond = [S::mask(false); TARGETS];
-        // Unrolled, so that each target's function is known.
-        unroll!(target in 0..TARGETS => {
-            if self.has(target) {
-                let mut any = S::mask(false);
-                for i in 0..K::PROBES.len() {
-                    let x = vector!(S, D; n => S::lift(probes[i][n]));
-                    let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
-                    any = any.or(value.less(S::Real::zero()));
-                }
-                beyond[target] = any.and(lanes);
-            }
-        });
+        self.system.beyond(self.at, self.wall, &Probes { h, parts: K::PROBES, states: &probes }, &mut beyond);
+        for beyond in &mut beyond {
+            *beyond = beyond.and(lanes);
+        }
         Look { probes, beyond }
     }
 

@@ -1,6 +1,7 @@
 //! A system whose type is forgotten.
 
 use super::{Sides, System};
+use crate::integrate::{Point, Probes, TARGETS};
 use crate::scalar::Scalar;
 
 /// Any [`System`]. What is asked of it seldom, against the steps of a run, is compiled for a `dyn AnySystem` once for each
@@ -15,6 +16,13 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask);
     fn jumps(&self, j: usize) -> bool;
     fn wall(&self, x: &[S; D]) -> Option<S>;
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    );
 }
 
 impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
@@ -42,6 +50,15 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     fn wall(&self, x: &[S; D]) -> Option<S> {
         System::wall(self, x)
     }
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        System::beyond(self, at, wall, probes, found);
+    }
 }
 
 impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
@@ -68,5 +85,14 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     }
     fn wall(&self, x: &[S; D]) -> Option<S> {
         AnySystem::wall(&**self, x)
+    }
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        AnySystem::beyond(&**self, at, wall, probes, found);
     }
 }

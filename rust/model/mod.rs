@@ -25,6 +25,7 @@ pub use own::{Own, OwnFamily};
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick::Sticking;
 
+use crate::integrate::{Point, Probes, TARGETS, beyond};
 use crate::scalar::{Mask, Scalar};
 
 /// The most switching surfaces a model can have.
@@ -82,6 +83,19 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     fn wall(&self, _x: &[S; D]) -> Option<S> {
         None
     }
+
+    /// Looks on which side of every surface, and of the wall, a step's places are; see [`beyond`].
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) where
+        Self: Sized,
+    {
+        beyond(self, at, wall, probes, found);
+    }
 }
 
 impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
@@ -121,6 +135,16 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     #[inline(always)]
     fn wall(&self, x: &[S; D]) -> Option<S> {
         (**self).wall(x)
+    }
+    #[inline(always)]
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        (**self).beyond(at, wall, probes, found);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::isa::{self, Instructions, Isa, Plain, Work};
+use super::isa::{self, Instructions, Isa, LANES, Plain, Work};
 use super::{Mask, Real, Scalar, elementary, lanes};
 
 /// `L` numbers that go through the same operations, one trajectory each, by the instructions `V`.
@@ -172,7 +172,16 @@ impl<const L: usize, V: Instructions> Real for Packet<L, V> {
 impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
     type Real = Self;
     type Mask = LaneMask<L, V>;
+    type Register = Packet<LANES, V>;
 
+    #[inline(always)]
+    fn register(self, i: usize) -> Packet<LANES, V> {
+        Packet::new(each(|lane| self.0[i * LANES + lane]))
+    }
+    #[inline(always)]
+    fn set_register(&mut self, i: usize, lanes: Packet<LANES, V>) {
+        self.0[i * LANES..][..LANES].copy_from_slice(&lanes.0);
+    }
     #[inline(always)]
     fn constant(value: f64) -> Self {
         Self::new([value; L])
