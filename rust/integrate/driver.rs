@@ -146,7 +146,12 @@ where
     pub fn by(method: K, system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
         let run = Run::new(&system, t, x);
         let mut driver = Self { system, method, norm: *norm, controller: Controller::new(K::ORDER), run };
-        driver.start(S::mask(true), t, x, h);
+        // Packets are only short with their own instructions.
+        if const { S::Real::LANES > 1 } {
+            S::Real::work(Isa::Baseline, Begin { driver: &mut driver, t, x, h });
+        } else {
+            driver.start(S::mask(true), t, x, h);
+        }
         driver
     }
 
@@ -334,9 +339,23 @@ where
             let look = watch.look(&self.method, trial.size, lanes);
             if union(&look.beyond).or(landing).or(run.undecided).any() {
                 let accepted = progress.moved;
-                let of = (&self.system as &dyn AnySystem<S, D>, &mut self.method as &mut dyn Course<S, D>);
-                let looked = (accepted, &look, landing);
-                run.on_surfaces(of, self.norm.state(), &trial, looked, factor, (end, last), &mut progress);
+                let (method, norm): (&mut dyn Course<S, D>, _) = (&mut self.method, self.norm.state());
+                let (looked, ends) = ((accepted, &look, landing), (end, last));
+                // Single runs land often enough to know whose surfaces they are.
+                if const { size_of::<S>() == size_of::<f64>() } {
+                    run.on_surfaces(
+                        (&self.system, method),
+                        norm,
+                        &trial,
+                        looked,
+                        factor,
+                        ends,
+                        &mut progress,
+                    );
+                } else {
+                    let law: &dyn AnySystem<S, D> = &self.system;
+                    run.on_surfaces((&law, method), norm, &trial, looked, factor, ends, &mut progress);
+                }
                 return progress;
             }
         }
@@ -419,9 +438,9 @@ impl<S: Scalar, const D: usize> Run<S, D> {
     }
     /// Commits the trial where it crosses no target, and deals with the lanes where it does.
     #[allow(clippy::too_many_arguments)]
-    fn on_surfaces(
+    fn on_surfaces<M: System<S, D>>(
         &mut self,
-        (law, method): (&dyn AnySystem<S, D>, &mut dyn Course<S, D>),
+        (law, method): (&M, &mut dyn Course<S, D>),
         tolerance: &Tolerance,
         trial: &Trial<S, D>,
         (accepted, look, landing): (S::Mask, &Look<S, D>, S::Mask),
@@ -431,7 +450,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
     ) {
         let never = S::mask(false);
         let at = self.at;
-        let watch = Watch::new(&law, &at, self.wall, tolerance);
+        let watch = Watch::new(law, &at, self.wall, tolerance);
         let leaving = accepted.and(self.undecided);
         let found = watch.find(method, trial.size, accepted.and(leaving.not()), look);
         let crossing = union(&found.crossing);
@@ -494,9 +513,9 @@ impl<S: Scalar, const D: usize> Run<S, D> {
             let longer = trial.size * factor.max(S::Real::one()).scale(10.0);
             self.h = S::Real::select(leaving, longer, self.h);
             self.undecided = self.undecided.and(leaving.not());
-            let sides = sides_of(&law, S::lift(self.at.t), &self.at.x);
+            let sides = sides_of(law, S::lift(self.at.t), &self.at.x);
             self.take_sides(leaving, &sides);
-            self.begin((law, method), leaving);
+            self.begin((law, &mut *method), leaving);
         }
         if stale.any() {
             // The last step becomes one of no length.
@@ -510,7 +529,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
                 continue;
             }
             let before = self.at.sides;
-            let turned = self.cross((law, method), target, over, end);
+            let turned = self.cross((law, &mut *method), target, over, end);
             let told = found.stale[target].and(if target == WALL { stale } else { fresh.and(unflipped) });
             progress.moved = progress.moved.or(told);
             let mut seen = crossed.or(told).and(turned);
@@ -617,6 +636,29 @@ struct FirstStep<'a, S: Scalar> {
     h: Option<S::Real>,
     order: i32,
     tolerance: &'a Tolerance,
+}
+
+/// The start in all lanes.
+struct Begin<'a, M, S: Scalar, const D: usize, E, K> {
+    driver: &'a mut Driver<M, S, D, E, K>,
+    t: S::Real,
+    x: [S; D],
+    h: Option<S::Real>,
+}
+
+impl<M, S, const D: usize, E, K> scalar::Work for Begin<'_, M, S, D, E, K>
+where
+    S: Scalar,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        self.driver.start(S::mask(true), self.t, self.x, self.h);
+    }
 }
 
 /// The sides and the first step of runs that start.

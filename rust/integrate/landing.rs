@@ -53,19 +53,20 @@ pub fn beyond<M: System<S, D>, S: Scalar, const D: usize>(
     probes: &Probes<'_, S::Real, D>,
     beyond: &mut [S::Mask; TARGETS],
 ) {
+    // Where there is no target this is not asked.
+    if const { M::SMOOTH } {
+        return;
+    }
     let watch = Watch { system, at, wall, noise: NOISE };
-    // Unrolled, so that each target's function is known.
-    unroll!(target in 0..TARGETS => {
-        if watch.has(target) {
-            let mut any = S::mask(false);
-            for i in 0..probes.parts.len() {
-                let x = vector!(S, D; n => S::lift(probes.states[i][n]));
-                let value = watch.value(target, at.t + probes.h.scale(probes.parts[i]), &x);
-                any = any.or(value.less(S::Real::zero()));
-            }
-            beyond[target] = any;
+    // The usual numbers of places known to the compiler, which looks at them side by side.
+    if const { size_of::<S>() == size_of::<f64>() } {
+        match probes.parts.len() {
+            4 => return watch.at_places(4, probes, beyond),
+            8 => return watch.at_places(8, probes, beyond),
+            _ => {}
         }
-    });
+    }
+    watch.at_places(probes.parts.len(), probes, beyond);
 }
 
 /// What a step does to the targets, lane by lane.
@@ -136,6 +137,24 @@ where
             *beyond = beyond.and(lanes);
         }
         Look { probes, beyond }
+    }
+
+    /// The lanes that are beyond each target at any of so many places.
+    #[inline(always)]
+    fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, beyond: &mut [S::Mask; TARGETS]) {
+        let parts = &probes.parts[..places];
+        // Unrolled, so that each target's function is known.
+        unroll!(target in 0..TARGETS => {
+            if self.has(target) {
+                let mut any = S::mask(false);
+                for i in 0..places {
+                    let x = vector!(S, D; n => S::lift(probes.states[i][n]));
+                    let value = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
+                    any = any.or(value.less(S::Real::zero()));
+                }
+                beyond[target] = any;
+            }
+        });
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.

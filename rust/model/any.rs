@@ -12,6 +12,7 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn surfaces(&self) -> usize;
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S;
     fn watched(&self) -> [bool; D];
+    fn surface_name(&self, j: usize, side: bool) -> &'static str;
     fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>);
     fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask);
     fn jumps(&self, j: usize) -> bool;
@@ -37,6 +38,9 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     }
     fn watched(&self) -> [bool; D] {
         System::watched(self)
+    }
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        System::surface_name(self, j, side)
     }
     fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
         System::settle(self, t, x, sides);
@@ -73,6 +77,9 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     }
     fn watched(&self) -> [bool; D] {
         AnySystem::watched(&**self)
+    }
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        AnySystem::surface_name(&**self, j, side)
     }
     fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
         AnySystem::settle(&**self, t, x, sides);
