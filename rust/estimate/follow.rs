@@ -20,11 +20,13 @@ pub(super) struct Law<B, S> {
     pub system: B,
 }
 
+type BySeries<'a, S, const D: usize> = Driver<&'a dyn AnySystem<S, D>, S, D, Tolerance, Taylor<'a, S, D>>;
+
 /// What follows one film's links. It is compiled once for each kind of number: a series is of the law's tape, and
 /// beside twelve derivatives a call costs little.
 pub(super) enum Follower<'a, S: Scalar<Real = f64, Mask = bool>, const D: usize> {
     /// By the law's power series: most links take one step. Where it does not serve they are taken by the other.
-    Series(Box<Driver<&'a dyn AnySystem<S, D>, S, D, Tolerance, Taylor<'a, S, D>>>, Tolerance),
+    Series(Box<BySeries<'a, S, D>>, Tolerance),
     /// By a Runge-Kutta method, where the law has no series.
     Stages(Box<Driver<&'a dyn AnySystem<S, D>, S, D>>),
 }

@@ -436,8 +436,9 @@ impl<S: Scalar, const D: usize> Run<S, D> {
             self.at.sides[j] = choose(lanes, sides[j], self.at.sides[j]);
         }
     }
+
     /// Commits the trial where it crosses no target, and deals with the lanes where it does.
-    #[allow(clippy::too_many_arguments)]
+    #[allow(clippy::too_many_arguments, reason = "what a trial of the driver knows")]
     fn on_surfaces<M: System<S, D>>(
         &mut self,
         (law, method): (&M, &mut dyn Course<S, D>),

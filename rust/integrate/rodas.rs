@@ -126,6 +126,8 @@ const INNER: [[f64; STAGES]; 3] = [
 
 /// The rates' derivatives by the state, `[n][k]` that of rate `n` by component `k`, and by time.
 type Slopes<const D: usize> = ([[f64; D]; D], [f64; D]);
+/// The same at any time and state.
+type SlopesAt<'a, const D: usize> = dyn Fn(&Point<f64, D>) -> Slopes<D> + 'a;
 
 /// Rodas5P: G. Steinebach, BIT Numer. Math. 63 (2023) 27. Order 5 with an embedded order 4, stiffly accurate, each
 /// stage a linear system with the same matrix; the continuous extension has order 4.
@@ -133,7 +135,7 @@ type Slopes<const D: usize> = ([[f64; D]; D], [f64; D]);
 /// The derivatives of the law are exact, from dual numbers.
 pub struct Rodas<'a, const D: usize> {
     /// The derivatives at any time and state. Whose law it is is forgotten, as in all that is compiled for this method.
-    slopes_at: Box<dyn Fn(&Point<f64, D>) -> Slopes<D> + 'a>,
+    slopes_at: Box<SlopesAt<'a, D>>,
     /// Where the derivatives are known, and what they are.
     known: Option<Point<f64, D>>,
     slopes: Slopes<D>,
