@@ -71,21 +71,19 @@ where
         let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, &|_, values| values.to_vec());
         let zero = zeros();
         let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
-        let one = |follower: &mut Follower<'_, _, Wide, D>,
-                   i: usize,
-                   (film, start, end): Span,
-                   link: &mut Link<D>| {
-            let x = variable(&point.states[i]);
-            let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
-            let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
-            let arrival = system.rates(end, &there, &sides_of(system, end, &there));
-            for k in 0..D {
-                link.defect[k] = point.states[i + 1][k] - there[k];
-                link.slopes[k] = last[k].d;
-                link.arrival[k] = arrival[k];
-            }
-            Ok(())
-        };
+        let one =
+            |follower: &mut Follower<'_, Wide, D>, i: usize, (film, start, end): Span, link: &mut Link<D>| {
+                let x = variable(&point.states[i]);
+                let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
+                let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
+                let arrival = system.rates(end, &there, &sides_of(system, end, &there));
+                for k in 0..D {
+                    link.defect[k] = point.states[i + 1][k] - there[k];
+                    link.slopes[k] = last[k].d;
+                    link.arrival[k] = arrival[k];
+                }
+                Ok(())
+            };
         self.each_link(point, laws, &one, &none, room)
     }
 
@@ -94,25 +92,24 @@ where
         let laws = self.own_laws(point);
         let place = Place { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = Places { switched: false, places: [place; PLACES_PER_LINK] };
-        let one = |follower: &mut Follower<'_, _, Wide, D>,
-                   i: usize,
-                   (_, start, end): Span,
-                   found: &mut Places<D>| {
-            let x: [Wide; D] = variable(&point.states[i]);
-            let mut met = [x; PLACES_PER_LINK];
-            let (last, switched) = follower.follow(Way { start, end, x, places: &PLACES, met: &mut met })?;
-            let a = by_state(&last);
-            found.switched = switched;
-            for q in 0..PLACES_PER_LINK {
-                let since = PLACES[q] * (end - start);
-                // From here to the end: all the way, less the way up to here.
-                let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
-                let response = a * here * (WEIGHTS[q] * (end - start));
-                let state = vector!(f64, D; k => met[q][k].re);
-                found.places[q] = Place { since, t: start + since, state, response };
-            }
-            Ok(())
-        };
+        let one =
+            |follower: &mut Follower<'_, Wide, D>, i: usize, (_, start, end): Span, found: &mut Places<D>| {
+                let x: [Wide; D] = variable(&point.states[i]);
+                let mut met = [x; PLACES_PER_LINK];
+                let (last, switched) =
+                    follower.follow(Way { start, end, x, places: &PLACES, met: &mut met })?;
+                let a = by_state(&last);
+                found.switched = switched;
+                for q in 0..PLACES_PER_LINK {
+                    let since = PLACES[q] * (end - start);
+                    // From here to the end: all the way, less the way up to here.
+                    let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
+                    let response = a * here * (WEIGHTS[q] * (end - start));
+                    let state = vector!(f64, D; k => met[q][k].re);
+                    found.places[q] = Place { since, t: start + since, state, response };
+                }
+                Ok(())
+            };
         self.each_link(point, &laws, &one, &none, Vec::new())
     }
 }

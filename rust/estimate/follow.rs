@@ -2,7 +2,7 @@
 
 use super::{EstimateError, Estimator, Point, Role, Sensor};
 use crate::integrate::{Driver, Failure, Method, Taylor, Tolerance, order};
-use crate::model::{Family, System};
+use crate::model::{AnySystem, Family, System};
 use crate::run::parallel::try_in_parts;
 use crate::scalar::{Dual, Isa, Scalar};
 use crate::tape::Tape;
@@ -20,15 +20,15 @@ pub(super) struct Law<B, S> {
     pub system: B,
 }
 
-/// What follows one film's links.
-pub(super) enum Follower<'a, M, S: Scalar<Real = f64, Mask = bool>, const D: usize>
-where
-    M: System<S, D>,
-{
+type BySeries<'a, S, const D: usize> = Driver<&'a dyn AnySystem<S, D>, S, D, Tolerance, Taylor<'a, S, D>>;
+
+/// What follows one film's links. It is compiled once for each kind of number: a series is of the law's tape, and
+/// beside twelve derivatives a call costs little.
+pub(super) enum Follower<'a, S: Scalar<Real = f64, Mask = bool>, const D: usize> {
     /// By the law's power series: most links take one step. Where it does not serve they are taken by the other.
-    Series(Box<Driver<&'a M, S, D, Tolerance, Taylor<'a, S, D>>>, Tolerance),
+    Series(Box<BySeries<'a, S, D>>, Tolerance),
     /// By a Runge-Kutta method, where the law has no series.
-    Stages(Box<Driver<&'a M, S, D>>),
+    Stages(Box<Driver<&'a dyn AnySystem<S, D>, S, D>>),
 }
 
 /// A link on the way from its start.
@@ -46,13 +46,12 @@ pub(super) type Span = (usize, f64, f64);
 /// Where a link ends, and whether the law switched on the way.
 pub(super) type End<S, const D: usize> = ([S; D], bool);
 
-impl<'a, M, S, const D: usize> Follower<'a, M, S, D>
+impl<'a, S, const D: usize> Follower<'a, S, D>
 where
     S: Scalar<Real = f64, Mask = bool>,
-    M: System<S, D>,
 {
-    fn new(tape: Option<&'a Tape<D>>, law: &'a Law<M, S>, tolerance: &Tolerance) -> Self {
-        let (x, system) = ([S::zero(); D], &law.system);
+    fn new<M: System<S, D>>(tape: Option<&'a Tape<D>>, law: &'a Law<M, S>, tolerance: &Tolerance) -> Self {
+        let (x, system): (_, &dyn AnySystem<S, D>) = ([S::zero(); D], &law.system);
         match tape {
             Some(tape) => {
                 let method = Taylor::new(tape, law.values.clone(), order(tolerance), Isa::best());
@@ -155,9 +154,7 @@ where
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<S>, S>],
-        one: &(
-             dyn Fn(&mut Follower<'_, F::Built<S>, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync
-         ),
+        one: &(dyn Fn(&mut Follower<'_, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync),
         none: &T,
         mut found: Vec<T>,
     ) -> Result<Vec<T>, EstimateError>
@@ -169,7 +166,7 @@ where
         found.resize(self.record.linked.len(), none.clone());
         try_in_parts(&mut found, TOGETHER, &|first, part| {
             // The film whose links were followed last, and what followed them.
-            let mut last: Option<(usize, Follower<'_, _, S, D>)> = None;
+            let mut last: Option<(usize, Follower<'_, S, D>)> = None;
             for (j, found) in part.iter_mut().enumerate() {
                 let i = first + j;
                 let Some(link) = self.link(point, i) else {

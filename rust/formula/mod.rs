@@ -205,8 +205,15 @@ impl Expression {
     ///
     /// # Panics
     /// Where the stack was made for another formula, or the place lacks what the formula takes.
-    #[inline(always)]
+    #[inline]
     pub fn value<S: Scalar>(&self, place: &Place<'_, S>, stack: &mut [S]) -> S {
+        self.value_on(place, &[S::mask(true); MAX_SURFACES], stack)
+    }
+
+    /// The same with its [kinks](Kinks) taken on these sides.
+    // One function for each kind of number: its loop is large.
+    #[inline(never)]
+    pub fn value_on<S: Scalar>(&self, place: &Place<'_, S>, sides: &Sides<S>, stack: &mut [S]) -> S {
         let leaf = |leaf| match leaf {
             Leaf::Number(value) => S::constant(value),
             Leaf::Time => place.t,
@@ -214,22 +221,21 @@ impl Expression {
             Leaf::Rate(n) => place.rates[n],
             Leaf::Parameter(i) => place.parameters[i],
         };
-        self.value_of(leaf, stack)
+        self.evaluate(leaf, sides, stack)
     }
 
     /// Its value where its leaves have these.
     ///
     /// # Panics
     /// Where the stack is lower than the formula's [depth](Expression::depth).
-    #[inline(always)]
+    // One function for each kind of number and of leaf.
+    #[inline(never)]
     pub fn value_of<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, stack: &mut [S]) -> S {
-        self.value_on(leaf, &[S::mask(true); MAX_SURFACES], stack)
+        self.evaluate(leaf, &[S::mask(true); MAX_SURFACES], stack)
     }
 
-    /// The same with its [kinks](Kinks) taken on these sides.
-    // One function for each kind of number and of leaf: its loop is large.
-    #[inline(never)]
-    pub fn value_on<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, sides: &Sides<S>, stack: &mut [S]) -> S {
+    #[inline(always)]
+    fn evaluate<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, sides: &Sides<S>, stack: &mut [S]) -> S {
         let mut top = 0;
         for op in &self.ops {
             match *op {

@@ -2,11 +2,11 @@
 
 use super::control::{Controller, initial_step};
 use super::landing::{Landed, Landing, Look, TARGETS, WALL, Watch, union};
-use super::method::{Method, Point, Trial};
+use super::method::{Course, Method, Point, Trial};
 use super::runge_kutta::Dopri5;
 use super::saltation::pass;
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
-use crate::model::{MAX_SURFACES, Sides, System, choose, sides_of};
+use crate::model::{AnySystem, MAX_SURFACES, Sides, System, choose, sides_of};
 use crate::scalar::{self, Instructions, Isa, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
@@ -92,6 +92,11 @@ pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>>
     method: K,
     norm: E,
     controller: Controller<S::Real>,
+    run: Run<S, D>,
+}
+
+/// Where a run stands. What it does seldom, against its steps, is compiled once for each kind of number.
+struct Run<S: Scalar, const D: usize> {
     /// Whether lanes end on the wall.
     wall: bool,
     at: Point<S, D>,
@@ -139,92 +144,45 @@ where
 
     /// The same by a method made beforehand.
     pub fn by(method: K, system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
-        let zero = S::Real::zero();
-        let mut driver = Self {
-            at: Point { t, x, sides: sides_of(&system, S::lift(t), &x) },
-            system,
-            method,
-            norm: *norm,
-            controller: Controller::new(K::ORDER),
-            wall: false,
-            h: S::Real::zero(),
-            from: t,
-            size: S::Real::zero(),
-            landing: Landing::new(),
-            flips: S::Real::zero(),
-            start: t,
-            jumps: (S::Real::zero(), t),
-            undecided: S::mask(false),
-            work: Work { accepted: zero, rejected: zero, trials: zero, beside: zero, grazes: zero },
-        };
-        driver.start(S::mask(true), t, x, h);
+        let run = Run::new(&system, t, x);
+        let mut driver = Self { system, method, norm: *norm, controller: Controller::new(K::ORDER), run };
+        // Packets are only short with their own instructions.
+        if const { S::Real::LANES > 1 } {
+            S::Real::work(Isa::Baseline, Begin { driver: &mut driver, t, x, h });
+        } else {
+            driver.start(S::mask(true), t, x, h);
+        }
         driver
     }
 
     /// Ends runs on the model's wall, where it has one.
     pub fn with_wall(mut self) -> Self {
-        self.wall = self.system.wall(&self.at.x).is_some();
+        self.run.wall = self.system.wall(&self.run.at.x).is_some();
         self
     }
 
     /// Starts anew in these lanes, as [`new`](Driver::new) does.
     #[inline(always)]
     pub fn start(&mut self, lanes: S::Mask, t: S::Real, x: [S; D], h: Option<S::Real>) {
-        self.at.t = S::Real::select(lanes, t, self.at.t);
-        self.at.x = vector!(S, D; n => S::select(lanes, x[n], self.at.x[n]));
-        self.from = S::Real::select(lanes, t, self.from);
-        self.size = S::Real::select(lanes, S::Real::zero(), self.size);
-        if const { M::SMOOTH && K::SERIES } {
-            // A series knows how far it reaches.
-            let h = h.unwrap_or(S::Real::constant(f64::INFINITY));
-            self.h = S::Real::select(lanes, h, self.h);
-        } else {
-            self.find_start(lanes, t, h);
+        let run = &mut self.run;
+        run.at.t = S::Real::select(lanes, t, run.at.t);
+        run.at.x = vector!(S, D; n => S::select(lanes, x[n], run.at.x[n]));
+        run.from = S::Real::select(lanes, t, run.from);
+        run.size = S::Real::select(lanes, S::Real::zero(), run.size);
+        // A series knows how far it reaches.
+        let h = if K::SERIES { Some(h.unwrap_or(S::Real::constant(f64::INFINITY))) } else { h };
+        match h {
+            Some(h) if const { M::SMOOTH && K::SERIES } => run.h = S::Real::select(lanes, h, run.h),
+            h => {
+                let first = FirstStep { lanes, t, h, order: K::ORDER, tolerance: self.norm.state() };
+                match const { S::Real::LANES > 1 } {
+                    true => run.find_start(&self.system, first),
+                    false => run.find_start(&(&self.system as &dyn AnySystem<S, D>), first),
+                }
+                self.controller.reset(lanes);
+            }
         }
         self.begin(lanes);
-    }
-
-    /// Finds the sides of the law and the size of the first step; packets do so by their own instructions.
-    #[inline(never)]
-    fn find_start(&mut self, lanes: S::Mask, t: S::Real, h: Option<S::Real>) {
-        if const { S::Real::LANES > 1 } {
-            S::Real::work(Isa::Baseline, FirstStep { driver: self, lanes, t, h });
-        } else {
-            self.start_on_sides(lanes, t, h);
-        }
-    }
-
-    #[inline(always)]
-    fn start_on_sides(&mut self, lanes: S::Mask, t: S::Real, h: Option<S::Real>) {
-        let mut fresh = self.at;
-        fresh.sides = sides_of(&self.system, S::lift(fresh.t), &fresh.x);
-        let h = h.unwrap_or_else(|| {
-            if K::SERIES {
-                return S::Real::constant(f64::INFINITY);
-            }
-            self.work.beside = tick(lanes, self.work.beside, 2.0);
-            initial_step(&self.system, &fresh, K::ORDER, self.norm.state())
-        });
-        start_sides(&self.system, &mut fresh, h);
-        self.take_sides(lanes, &fresh.sides);
-        self.h = S::Real::select(lanes, h, self.h);
-        self.flips = S::Real::select(lanes, S::Real::zero(), self.flips);
-        self.start = S::Real::select(lanes, t, self.start);
-        self.jumps.0 = S::Real::select(lanes, S::Real::zero(), self.jumps.0);
-        self.jumps.1 = S::Real::select(lanes, t, self.jumps.1);
-        self.undecided = self.undecided.and(lanes.not());
-        for on in &mut self.landing.on {
-            *on = on.and(lanes.not());
-        }
-        self.controller.reset(lanes);
-    }
-
-    /// Takes the law on these sides, in these lanes.
-    #[inline(always)]
-    fn take_sides(&mut self, lanes: S::Mask, sides: &Sides<S>) {
-        for j in 0..MAX_SURFACES {
-            self.at.sides[j] = choose(lanes, sides[j], self.at.sides[j]);
-        }
     }
 
     /// The work so far.
@@ -236,7 +194,7 @@ where
             }
             all
         };
-        let Work { accepted, rejected, trials, beside, grazes } = self.work;
+        let Work { accepted, rejected, trials, beside, grazes } = self.run.work;
         let evaluations = trials.scale(K::EVALUATIONS as f64) + beside;
         Counts {
             accepted: sum(accepted),
@@ -263,37 +221,37 @@ where
     /// The time reached.
     #[inline(always)]
     pub fn t(&self) -> S::Real {
-        self.at.t
+        self.run.at.t
     }
 
     /// The state reached.
     #[inline(always)]
     pub fn x(&self) -> &[S; D] {
-        &self.at.x
+        &self.run.at.x
     }
 
     /// The sides that the law is taken on.
     #[inline(always)]
     pub fn sides(&self) -> &Sides<S> {
-        &self.at.sides
+        &self.run.at.sides
     }
 
     /// The size of the next trial step.
     #[inline(always)]
     pub fn h(&self) -> S::Real {
-        self.h
+        self.run.h
     }
 
     /// The time at which the last accepted step began.
     #[inline(always)]
     pub fn from(&self) -> S::Real {
-        self.from
+        self.run.from
     }
 
     /// The last accepted step's size (times are rounded, sizes are not).
     #[inline(always)]
     pub fn size(&self) -> S::Real {
-        self.size
+        self.run.size
     }
 
     /// The state at `dt` after the start of the last accepted step, on its polynomial; in lanes that moved
@@ -311,7 +269,8 @@ where
     /// Goes on from another state at the same time, as when tangents are scaled back.
     #[inline(always)]
     pub fn set_state(&mut self, lanes: S::Mask, x: [S; D]) {
-        self.at.x = vector!(S, D; n => S::select(lanes, x[n], self.at.x[n]));
+        let at = &mut self.run.at;
+        at.x = vector!(S, D; n => S::select(lanes, x[n], at.x[n]));
         self.begin(lanes);
     }
 
@@ -319,25 +278,26 @@ where
     /// reaches it exactly.
     #[inline(always)]
     pub fn trial(&mut self, end: S::Real) -> Progress<S::Mask> {
-        let remaining = end - self.at.t;
+        let run = &mut self.run;
+        let remaining = end - run.at.t;
         // An end that is not a number leaves its lane active, to fail.
         let active = is_zero(remaining).not();
-        let targets = !M::SMOOTH && (self.wall || self.system.surfaces() > 0);
-        let landing = if targets { self.landing.lanes() } else { S::mask(false) };
+        let targets = !M::SMOOTH && (run.wall || self.system.surfaces() > 0);
+        let landing = if targets { run.landing.lanes() } else { S::mask(false) };
 
-        let cut = self.h.abs().scale(1.01).less(remaining.abs()).not();
-        let mut h = S::Real::select(cut, remaining, self.h);
+        let cut = run.h.abs().scale(1.01).less(remaining.abs()).not();
+        let mut h = S::Real::select(cut, remaining, run.h);
         let mut last = cut;
         if targets {
             // A short step leads away from a surface that rounding does not let go of.
-            h = S::Real::select(self.undecided, h.scale(0.1), h);
-            h = S::Real::select(landing, self.landing.size, h);
-            last = cut.and(self.undecided.or(landing).not());
+            h = S::Real::select(run.undecided, h.scale(0.1), h);
+            h = S::Real::select(landing, run.landing.size, h);
+            last = cut.and(run.undecided.or(landing).not());
         }
         let asked = S::Real::select(active, h, S::Real::zero());
-        let trial = self.method.attempt(&self.system, &self.at, asked, &self.norm);
-        self.method.extend(&self.system, &self.at);
-        self.work.trials = tick(active, self.work.trials, 1.0);
+        let trial = self.method.attempt(&self.system, &run.at, asked, &self.norm);
+        self.method.extend(&self.system, &run.at);
+        run.work.trials = tick(active, run.work.trials, 1.0);
 
         let judged = active.and(landing.not());
         // A series knows its own size: there is nothing to learn from one step for the next.
@@ -351,56 +311,149 @@ where
         let mut failed = S::mask(false);
         if K::SERIES {
             last = last.and(trial.size.abs().less(asked.abs()).not());
-            let (t, next) = (self.at.t, self.at.t + trial.size);
+            let (t, next) = (run.at.t, run.at.t + trial.size);
             failed = rejected.or(accepted.and(t.less(next).or(next.less(t)).not()));
         } else {
             // A step cut short at the end says little about a long one.
             let next = asked * factor;
-            let kept = next.abs().max(self.h.abs()).zip(asked, f64::copysign);
+            let kept = next.abs().max(run.h.abs()).zip(asked, f64::copysign);
             let next = S::Real::select(cut.and(good), kept, next);
-            self.h = S::Real::select(judged, next, self.h);
+            run.h = S::Real::select(judged, next, run.h);
             if rejected.any() {
                 failed = rejected.and(S::Mask::from_lanes(|i| {
-                    let (t, h) = (self.at.t.lane(i), self.h.lane(i));
+                    let (t, h) = (run.at.t.lane(i), run.h.lane(i));
                     // A size that is not a number, as towards an end that is none, would never shrink.
                     t + h == t || h.abs() < 1e-100 || !h.is_finite()
                 }));
             }
         }
         if rejected.any() {
-            self.work.rejected = tick(rejected, self.work.rejected, 1.0);
+            run.work.rejected = tick(rejected, run.work.rejected, 1.0);
         }
 
         let mut progress =
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
         if const { !M::SMOOTH } && targets {
-            let lanes = progress.moved.and(self.undecided.not());
-            let watch = Watch::new(&self.system, &self.at, self.wall, self.norm.state());
+            let lanes = progress.moved.and(run.undecided.not());
+            let watch = Watch::new(&self.system, &run.at, run.wall, self.norm.state());
             let look = watch.look(&self.method, trial.size, lanes);
-            if union(&look.beyond).or(landing).or(self.undecided).any() {
+            if union(&look.beyond).or(landing).or(run.undecided).any() {
                 let accepted = progress.moved;
-                self.on_surfaces(&trial, (accepted, &look), landing, factor, (end, last), &mut progress);
+                let (method, norm): (&mut dyn Course<S, D>, _) = (&mut self.method, self.norm.state());
+                let (looked, ends) = ((accepted, &look, landing), (end, last));
+                // Single runs land often enough to know whose surfaces they are.
+                if const { size_of::<S>() == size_of::<f64>() } {
+                    run.on_surfaces(
+                        (&self.system, method),
+                        norm,
+                        &trial,
+                        looked,
+                        factor,
+                        ends,
+                        &mut progress,
+                    );
+                } else {
+                    let law: &dyn AnySystem<S, D> = &self.system;
+                    run.on_surfaces((&law, method), norm, &trial, looked, factor, ends, &mut progress);
+                }
                 return progress;
             }
         }
-        self.commit(&trial, progress.moved, (end, last));
+        run.commit(M::SMOOTH, &trial, progress.moved, (end, last));
+        self.method.accept(progress.moved);
         progress
     }
 
+    #[inline(always)]
+    fn begin(&mut self, lanes: S::Mask) {
+        self.method.begin(&self.system, &self.run.at, lanes);
+        self.run.work.beside = tick(lanes, self.run.work.beside, 1.0);
+    }
+}
+
+impl<S: Scalar, const D: usize> Run<S, D> {
+    fn new(system: &impl System<S, D>, t: S::Real, x: [S; D]) -> Self {
+        let zero = S::Real::zero();
+        let sides = match const { S::Real::LANES > 1 } {
+            true => sides_of(system, S::lift(t), &x),
+            false => sides_of(&(system as &dyn AnySystem<S, D>), S::lift(t), &x),
+        };
+        Self {
+            wall: false,
+            at: Point { t, x, sides },
+            h: zero,
+            from: t,
+            size: zero,
+            landing: Landing::new(),
+            flips: zero,
+            start: t,
+            jumps: (zero, t),
+            undecided: S::mask(false),
+            work: Work { accepted: zero, rejected: zero, trials: zero, beside: zero, grazes: zero },
+        }
+    }
+
+    /// Finds the sides of the law and the size of the first step; packets do so by their own instructions.
+    #[inline(never)]
+    fn find_start(&mut self, system: &impl System<S, D>, first: FirstStep<'_, S>) {
+        if const { S::Real::LANES > 1 } {
+            S::Real::work(Isa::Baseline, Starting { run: self, system, first });
+        } else {
+            self.start_on_sides(system, first);
+        }
+    }
+
+    #[inline(always)]
+    fn start_on_sides(&mut self, system: &impl System<S, D>, first: FirstStep<'_, S>) {
+        let FirstStep { lanes, t, h, order, tolerance } = first;
+        let mut fresh = self.at;
+        fresh.sides = sides_of(system, S::lift(fresh.t), &fresh.x);
+        // Not by a closure, which would be a function of its own.
+        let h = match h {
+            Some(h) => h,
+            None => {
+                self.work.beside = tick(lanes, self.work.beside, 2.0);
+                initial_step(system, &fresh, order, tolerance)
+            }
+        };
+        start_sides(system, &mut fresh, h);
+        self.take_sides(lanes, &fresh.sides);
+        self.h = S::Real::select(lanes, h, self.h);
+        self.flips = S::Real::select(lanes, S::Real::zero(), self.flips);
+        self.start = S::Real::select(lanes, t, self.start);
+        self.jumps.0 = S::Real::select(lanes, S::Real::zero(), self.jumps.0);
+        self.jumps.1 = S::Real::select(lanes, t, self.jumps.1);
+        self.undecided = self.undecided.and(lanes.not());
+        for on in &mut self.landing.on {
+            *on = on.and(lanes.not());
+        }
+    }
+
+    /// Takes the law on these sides, in these lanes.
+    #[inline(always)]
+    fn take_sides(&mut self, lanes: S::Mask, sides: &Sides<S>) {
+        for j in 0..MAX_SURFACES {
+            self.at.sides[j] = choose(lanes, sides[j], self.at.sides[j]);
+        }
+    }
+
     /// Commits the trial where it crosses no target, and deals with the lanes where it does.
-    fn on_surfaces(
+    #[allow(clippy::too_many_arguments, reason = "what a trial of the driver knows")]
+    fn on_surfaces<M: System<S, D>>(
         &mut self,
+        (law, method): (&M, &mut dyn Course<S, D>),
+        tolerance: &Tolerance,
         trial: &Trial<S, D>,
-        (accepted, look): (S::Mask, &Look<S, D>),
-        landing: S::Mask,
+        (accepted, look, landing): (S::Mask, &Look<S, D>, S::Mask),
         factor: S::Real,
         (end, last): (S::Real, S::Mask),
         progress: &mut Progress<S::Mask>,
     ) {
         let never = S::mask(false);
-        let watch = Watch::new(&self.system, &self.at, self.wall, self.norm.state());
+        let at = self.at;
+        let watch = Watch::new(law, &at, self.wall, tolerance);
         let leaving = accepted.and(self.undecided);
-        let found = watch.find(&self.method, trial.size, accepted.and(leaving.not()), look);
+        let found = watch.find(method, trial.size, accepted.and(leaving.not()), look);
         let crossing = union(&found.crossing);
         let stale = union(&found.stale);
         let clear = accepted.and(crossing.or(stale).not());
@@ -425,9 +478,9 @@ where
             }
         }
         if crossing.any() {
-            if K::SERIES {
+            if method.series() {
                 // The polynomial is as good as the step: it may end there.
-                let x = self.method.at(found.dt);
+                let x = method.at(found.dt);
                 trial.x = vector!(S, D; n => S::select(crossing, x[n], trial.x[n]));
                 trial.size = S::Real::select(crossing, found.dt, trial.size);
                 for j in 0..TARGETS {
@@ -441,7 +494,7 @@ where
                     if !found.crossing[target].any() {
                         continue;
                     }
-                    let on = |dt: S::Real| watch.on(target, &self.method, dt);
+                    let on = |dt: S::Real| watch.on(target, method, dt);
                     let own = (on(found.dt + ahead) - on(found.dt - ahead)) / (ahead + ahead);
                     slope = S::Real::select(found.crossing[target], own, slope);
                 }
@@ -452,7 +505,8 @@ where
         let moved = clear.or(landed.there).or(landed.grazed);
         let fresh = is_zero(self.size).not();
         let unflipped = self.flips.less(S::Real::one());
-        self.commit(&trial, moved, (end, last.and(clear)));
+        self.commit(false, &trial, moved, (end, last.and(clear)));
+        method.accept(moved);
         progress.moved = moved;
 
         if leaving.any() {
@@ -460,9 +514,9 @@ where
             let longer = trial.size * factor.max(S::Real::one()).scale(10.0);
             self.h = S::Real::select(leaving, longer, self.h);
             self.undecided = self.undecided.and(leaving.not());
-            let sides = sides_of(&self.system, S::lift(self.at.t), &self.at.x);
+            let sides = sides_of(law, S::lift(self.at.t), &self.at.x);
             self.take_sides(leaving, &sides);
-            self.begin(leaving);
+            self.begin((law, &mut *method), leaving);
         }
         if stale.any() {
             // The last step becomes one of no length.
@@ -476,13 +530,13 @@ where
                 continue;
             }
             let before = self.at.sides;
-            let turned = self.cross(target, over, end);
+            let turned = self.cross((law, &mut *method), target, over, end);
             let told = found.stale[target].and(if target == WALL { stale } else { fresh.and(unflipped) });
             progress.moved = progress.moved.or(told);
             let mut seen = crossed.or(told).and(turned);
-            if target != WALL && self.system.jumps(target) {
+            if target != WALL && law.jumps(target) {
                 // What the switch led to, such as a contact that sticks, says more than where it began.
-                for j in (0..self.system.surfaces()).rev() {
+                for j in (0..law.surfaces()).rev() {
                     let changed =
                         before[j].and(self.at.sides[j].not()).or(self.at.sides[j].and(before[j].not()));
                     progress.crossed[j] = progress.crossed[j].or(seen.and(changed));
@@ -495,9 +549,9 @@ where
     }
 
     #[inline(always)]
-    fn commit(&mut self, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
+    fn commit(&mut self, smooth: bool, trial: &Trial<S, D>, lanes: S::Mask, (end, last): (S::Real, S::Mask)) {
         let mut t = S::Real::select(last, end, self.at.t + trial.size);
-        if const { !M::SMOOTH } {
+        if !smooth {
             let elapsed = lanes.and(is_zero(t - self.at.t).not());
             self.flips = S::Real::select(elapsed, S::Real::zero(), self.flips);
         }
@@ -511,18 +565,23 @@ where
         }
         (self.from, self.size) = (from, size);
         (self.at.t, self.at.x) = (t, x);
-        self.method.accept(lanes);
         self.work.accepted = tick(lanes, self.work.accepted, 1.0);
     }
 
     /// Changes the side of the target that these lanes are on; returns those where it did.
-    fn cross(&mut self, target: usize, lanes: S::Mask, end: S::Real) -> S::Mask {
+    fn cross(
+        &mut self,
+        (law, method): (&dyn AnySystem<S, D>, &mut dyn Course<S, D>),
+        target: usize,
+        lanes: S::Mask,
+        end: S::Real,
+    ) -> S::Mask {
         if target == WALL {
             return lanes;
         }
         self.flips = S::Real::select(lanes, self.flips + S::Real::one(), self.flips);
         let mut turned = lanes;
-        if self.system.jumps(target) {
+        if law.jumps(target) {
             // More of them in almost no time are no motion.
             let span = (end - self.start).abs().scale(STILL);
             let moved = lanes.and(span.less((self.at.t - self.jumps.1).abs()));
@@ -536,9 +595,9 @@ where
             turned = lanes.and(stuck.not());
         }
         let Point { t, x, sides } = &mut self.at;
-        let grazes = pass(&self.system, target, *t, self.size, x, sides, turned);
+        let grazes = pass(&law, target, *t, self.size, x, sides, turned);
         self.work.grazes = tick(grazes, self.work.grazes, 1.0);
-        self.begin(turned);
+        self.begin((law, method), turned);
         turned
     }
 
@@ -547,22 +606,48 @@ where
         S::Real::constant(MOST_JUMPS).less(self.jumps.0)
     }
 
-    #[inline(always)]
-    fn begin(&mut self, lanes: S::Mask) {
-        self.method.begin(&self.system, &self.at, lanes);
+    fn begin(&mut self, (law, method): (&dyn AnySystem<S, D>, &mut dyn Course<S, D>), lanes: S::Mask) {
+        method.begin(law, &self.at, lanes);
         self.work.beside = tick(lanes, self.work.beside, 1.0);
+    }
+
+    /// Why a lane cannot go on, by a method that takes steps of any size or by series.
+    fn failure_of(&self, law: &dyn AnySystem<S, D>, series: bool, lane: usize) -> Failure {
+        let t = self.at.t.lane(lane);
+        if self.chatters().lane(lane) {
+            return Failure::Chattering { t };
+        }
+        let rate = law.rates(S::lift(self.at.t), &self.at.x, &self.at.sides);
+        let mut finite = series || self.h.lane(lane).is_finite();
+        for n in 0..D {
+            finite &= self.at.x[n].real().lane(lane).is_finite() && rate[n].real().lane(lane).is_finite();
+        }
+        match finite {
+            true if series => Failure::NoSeries { t },
+            true => Failure::StepUnderflow { t },
+            false => Failure::NotFinite { t },
+        }
     }
 }
 
-/// The sides and the first step of runs that start in some lanes.
-struct FirstStep<'a, M, S: Scalar, const D: usize, E, K> {
-    driver: &'a mut Driver<M, S, D, E, K>,
+/// How runs start in some lanes: the size of the first step is found for a method of this order where it is not given.
+struct FirstStep<'a, S: Scalar> {
     lanes: S::Mask,
     t: S::Real,
     h: Option<S::Real>,
+    order: i32,
+    tolerance: &'a Tolerance,
 }
 
-impl<M, S, const D: usize, E, K> scalar::Work for FirstStep<'_, M, S, D, E, K>
+/// The start in all lanes.
+struct Begin<'a, M, S: Scalar, const D: usize, E, K> {
+    driver: &'a mut Driver<M, S, D, E, K>,
+    t: S::Real,
+    x: [S; D],
+    h: Option<S::Real>,
+}
+
+impl<M, S, const D: usize, E, K> scalar::Work for Begin<'_, M, S, D, E, K>
 where
     S: Scalar,
     M: System<S, D>,
@@ -573,7 +658,23 @@ where
 
     #[inline(always)]
     fn run<V: Instructions>(self) {
-        self.driver.start_on_sides(self.lanes, self.t, self.h);
+        self.driver.start(S::mask(true), self.t, self.x, self.h);
+    }
+}
+
+/// The sides and the first step of runs that start.
+struct Starting<'a, 'b, M, S: Scalar, const D: usize> {
+    run: &'a mut Run<S, D>,
+    system: &'a M,
+    first: FirstStep<'b, S>,
+}
+
+impl<M: System<S, D>, S: Scalar, const D: usize> scalar::Work for Starting<'_, '_, M, S, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Instructions>(self) {
+        self.run.start_on_sides(self.system, self.first);
     }
 }
 
@@ -628,20 +729,7 @@ where
 
     /// Why a lane cannot go on.
     pub fn failure_of(&self, lane: usize) -> Failure {
-        let t = self.at.t.lane(lane);
-        if self.chatters().lane(lane) {
-            return Failure::Chattering { t };
-        }
-        let rate = self.system.rates(S::lift(self.at.t), &self.at.x, &self.at.sides);
-        let mut finite = K::SERIES || self.h.lane(lane).is_finite();
-        for n in 0..D {
-            finite &= self.at.x[n].real().lane(lane).is_finite() && rate[n].real().lane(lane).is_finite();
-        }
-        match finite {
-            true if K::SERIES => Failure::NoSeries { t },
-            true => Failure::StepUnderflow { t },
-            false => Failure::NotFinite { t },
-        }
+        self.run.failure_of(&self.system, K::SERIES, lane)
     }
 }
 

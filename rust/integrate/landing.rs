@@ -5,7 +5,7 @@
 //! its step anew up to there, and [`Landing`] corrects the step's size until the surface's function is
 //! zero; the other lanes go on meanwhile.
 
-use super::method::{MOST_PROBES, Method, Point};
+use super::method::{Course, MOST_PROBES, Method, Point};
 use super::root::bracketed;
 use super::tolerance::Tolerance;
 use crate::model::{MAX_SURFACES, System};
@@ -34,6 +34,39 @@ const NOISE: f64 = 1e-14;
 pub struct Look<S: Scalar, const D: usize> {
     probes: [[S::Real; D]; MOST_PROBES],
     pub beyond: [S::Mask; TARGETS],
+}
+
+/// The states at these parts of a step of size `h`.
+pub struct Probes<'a, R: Real, const D: usize> {
+    h: R,
+    parts: &'static [f64],
+    states: &'a [[R; D]; MOST_PROBES],
+}
+
+/// Finds the lanes that are beyond each target at any of these places. A function of its own for each law and kind of
+/// number, whatever the method.
+#[inline(never)]
+pub fn beyond<M: System<S, D>, S: Scalar, const D: usize>(
+    system: &M,
+    at: &Point<S, D>,
+    wall: bool,
+    probes: &Probes<'_, S::Real, D>,
+    beyond: &mut [S::Mask; TARGETS],
+) {
+    // Where there is no target this is not asked.
+    if const { M::SMOOTH } {
+        return;
+    }
+    let watch = Watch { system, at, wall, noise: NOISE };
+    // The usual numbers of places known to the compiler, which looks at them side by side.
+    if const { size_of::<S>() == size_of::<f64>() } {
+        match probes.parts.len() {
+            4 => return watch.at_places(4, probes, beyond),
+            8 => return watch.at_places(8, probes, beyond),
+            _ => {}
+        }
+    }
+    watch.at_places(probes.parts.len(), probes, beyond);
 }
 
 /// What a step does to the targets, lane by lane.
@@ -89,7 +122,7 @@ where
 
     /// The same at `dt` after the start of the method's last trial, on its polynomial.
     #[inline(always)]
-    pub fn on<K: Method<S, D>>(&self, target: usize, method: &K, dt: S::Real) -> S::Real {
+    pub fn on(&self, target: usize, method: &dyn Course<S, D>, dt: S::Real) -> S::Real {
         let x = method.real_at(dt, &self.system.watched());
         self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
     }
@@ -99,26 +132,35 @@ where
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.system.watched());
         let mut beyond = [S::mask(false); TARGETS];
+        self.system.beyond(self.at, self.wall, &Probes { h, parts: K::PROBES, states: &probes }, &mut beyond);
+        for beyond in &mut beyond {
+            *beyond = beyond.and(lanes);
+        }
+        Look { probes, beyond }
+    }
+
+    /// The lanes that are beyond each target at any of so many places.
+    #[inline(always)]
+    fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, beyond: &mut [S::Mask; TARGETS]) {
+        let parts = &probes.parts[..places];
         // Unrolled, so that each target's function is known.
         unroll!(target in 0..TARGETS => {
             if self.has(target) {
                 let mut any = S::mask(false);
-                for i in 0..K::PROBES.len() {
-                    let x = vector!(S, D; n => S::lift(probes[i][n]));
-                    let value = self.value(target, self.at.t + h.scale(K::PROBES[i]), &x);
+                for i in 0..places {
+                    let x = vector!(S, D; n => S::lift(probes.states[i][n]));
+                    let value = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
                     any = any.or(value.less(S::Real::zero()));
                 }
-                beyond[target] = any.and(lanes);
+                beyond[target] = any;
             }
         });
-        Look { probes, beyond }
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.
-    #[inline(always)]
-    pub fn find<K: Method<S, D>>(
+    pub fn find(
         &self,
-        method: &K,
+        method: &dyn Course<S, D>,
         h: S::Real,
         lanes: S::Mask,
         look: &Look<S, D>,
@@ -139,7 +181,7 @@ where
             let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
-            for (i, &theta) in K::PROBES.iter().enumerate() {
+            for (i, &theta) in method.probes().iter().enumerate() {
                 let dt = h.scale(theta);
                 let x = vector!(S, D; n => S::lift(look.probes[i][n]));
                 let value = self.value(target, self.at.t + dt, &x);

@@ -1,7 +1,7 @@
 //! What a one-step method is to the stepping loop.
 
 use super::tolerance::ErrorNorm;
-use crate::model::{Sides, System};
+use crate::model::{AnySystem, Sides, System};
 use crate::scalar::Scalar;
 use crate::unroll::vector;
 
@@ -98,4 +98,35 @@ pub trait Method<S: Scalar, const D: usize> {
 
     /// The same polynomial's unit of time and its coefficients, lowest first: `x = Σ_k c_k (dt/unit)^k`.
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;
+}
+
+/// What landing asks of a [`Method`] whose type is forgotten. See the methods of the same names.
+pub(super) trait Course<S: Scalar, const D: usize> {
+    fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &Point<S, D>, lanes: S::Mask);
+    fn accept(&mut self, lanes: S::Mask);
+    fn at(&self, dt: S::Real) -> [S; D];
+    fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D];
+    fn probes(&self) -> &'static [f64];
+    fn series(&self) -> bool;
+}
+
+impl<S: Scalar, const D: usize, K: Method<S, D>> Course<S, D> for K {
+    fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &Point<S, D>, lanes: S::Mask) {
+        Method::begin(self, &law, at, lanes);
+    }
+    fn accept(&mut self, lanes: S::Mask) {
+        Method::accept(self, lanes);
+    }
+    fn at(&self, dt: S::Real) -> [S; D] {
+        Method::at(self, dt)
+    }
+    fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
+        Method::real_at(self, dt, of)
+    }
+    fn probes(&self) -> &'static [f64] {
+        K::PROBES
+    }
+    fn series(&self) -> bool {
+        K::SERIES
+    }
 }

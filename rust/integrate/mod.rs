@@ -21,7 +21,7 @@ mod tolerance;
 
 pub use dop853::Dop853Scheme;
 pub use driver::{Counts, Driver, Ending, Progress};
-pub use landing::{TARGETS, WALL};
+pub use landing::{Probes, TARGETS, WALL, beyond};
 pub use method::{MOST_PROBES, Method, Point, Trial};
 pub use propagate::propagate;
 pub use rodas::Rodas;

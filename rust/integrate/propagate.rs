@@ -2,7 +2,7 @@
 
 use super::driver::Driver;
 use super::tolerance::{Failure, Tolerance};
-use crate::model::System;
+use crate::model::{AnySystem, System};
 use crate::scalar::Scalar;
 
 /// More steps than this within one propagation mean that something is wrong.
@@ -37,7 +37,9 @@ where
     if t0 == t1 {
         return Ok(x0);
     }
-    let mut driver: Driver<_, S, D> = Driver::new(system, t0, x0, Some(t1 - t0), tolerance);
+    // Its type is forgotten: one function for each kind of number.
+    let mut driver: Driver<&dyn AnySystem<S, D>, S, D> =
+        Driver::new(system, t0, x0, Some(t1 - t0), tolerance);
     while driver.t() != t1 {
         driver.advance(t1)?;
         if driver.counts().accepted > MOST_STEPS {

@@ -126,15 +126,16 @@ const INNER: [[f64; STAGES]; 3] = [
 
 /// The rates' derivatives by the state, `[n][k]` that of rate `n` by component `k`, and by time.
 type Slopes<const D: usize> = ([[f64; D]; D], [f64; D]);
+/// The same at any time and state.
+type SlopesAt<'a, const D: usize> = dyn Fn(&Point<f64, D>) -> Slopes<D> + 'a;
 
 /// Rodas5P: G. Steinebach, BIT Numer. Math. 63 (2023) 27. Order 5 with an embedded order 4, stiffly accurate, each
 /// stage a linear system with the same matrix; the continuous extension has order 4.
 ///
 /// The derivatives of the law are exact, from dual numbers.
-pub struct Rodas<A, B, const D: usize> {
-    /// The law over numbers with derivatives by the state, and by time.
-    by_state: A,
-    by_time: B,
+pub struct Rodas<'a, const D: usize> {
+    /// The derivatives at any time and state. Whose law it is is forgotten, as in all that is compiled for this method.
+    slopes_at: Box<SlopesAt<'a, D>>,
     /// Where the derivatives are known, and what they are.
     known: Option<Point<f64, D>>,
     slopes: Slopes<D>,
@@ -143,15 +144,21 @@ pub struct Rodas<A, B, const D: usize> {
     powers: [[f64; D]; 5],
 }
 
-impl<A, B, const D: usize> Rodas<A, B, D>
-where
-    A: System<Dual<f64, D>, D>,
-    B: System<Dual<f64, 1>, D>,
-{
-    /// For the law of these systems.
-    pub fn new(by_state: A, by_time: B) -> Self {
+impl<'a, const D: usize> Rodas<'a, D> {
+    /// For the law of these systems, over numbers with derivatives by the state, and by time.
+    pub fn new(
+        by_state: impl System<Dual<f64, D>, D> + 'a,
+        by_time: impl System<Dual<f64, 1>, D> + 'a,
+    ) -> Self {
+        let slopes_at = Box::new(move |at: &Point<f64, D>| {
+            let varied = vector!(Dual<f64, D>, D; n => Dual::variable(at.x[n], n));
+            let still = vector!(Dual<f64, 1>, D; n => Dual::constant(at.x[n]));
+            let by_state = by_state.rates(Dual::constant(at.t), &varied, &at.sides);
+            let by_time = by_time.rates(Dual::variable(at.t, 0), &still, &at.sides);
+            (by_state.map(|rate| rate.d), by_time.map(|rate| rate.d[0]))
+        });
         let slopes = ([[0.0; D]; D], [0.0; D]);
-        Self { by_state, by_time, known: None, slopes, h: 0.0, powers: [[0.0; D]; 5] }
+        Self { slopes_at, known: None, slopes, h: 0.0, powers: [[0.0; D]; 5] }
     }
 
     /// Finds the derivatives where a step starts, unless they are known from one that failed.
@@ -160,22 +167,12 @@ where
         if self.known.as_ref().is_some_and(same) {
             return;
         }
-        let varied = vector!(Dual<f64, D>, D; n => Dual::variable(at.x[n], n));
-        let still = vector!(Dual<f64, 1>, D; n => Dual::constant(at.x[n]));
-        let by_state = self.by_state.rates(Dual::constant(at.t), &varied, &at.sides);
-        let by_time = self.by_time.rates(Dual::variable(at.t, 0), &still, &at.sides);
-        for n in 0..D {
-            (self.slopes.0[n], self.slopes.1[n]) = (by_state[n].d, by_time[n].d[0]);
-        }
+        self.slopes = (self.slopes_at)(at);
         self.known = Some(*at);
     }
 }
 
-impl<A, B, const D: usize> Method<f64, D> for Rodas<A, B, D>
-where
-    A: System<Dual<f64, D>, D>,
-    B: System<Dual<f64, 1>, D>,
-{
+impl<const D: usize> Method<f64, D> for Rodas<'_, D> {
     const ORDER: i32 = 5;
     const EVALUATIONS: usize = STAGES;
     const SERIES: bool = false;

@@ -7,7 +7,7 @@ use super::method::{EIGHTHS, MOST_PROBES, Method, Point, QUARTERS, Trial};
 use super::tableau::{DormandPrince, Scheme};
 use super::tolerance::ErrorNorm;
 use crate::model::{Sides, System};
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 use crate::unroll::{unroll, vector};
 
 /// The state whose components are these. Many of them, or those with derivatives, are taken in a loop: unrolled, the
@@ -68,12 +68,27 @@ fn combine<S: Scalar, const D: usize, const N: usize>(
     count: usize,
     n: usize,
 ) -> S {
+    if const { size_of::<S>() > size_of::<S::Real>() && S::Real::LANES == 1 } {
+        return combine_apart(&weights[..count.min(N)], stages, n);
+    }
     let mut sum = stages[0][n].scale(weights[0]);
     unroll!(j in 1..N => {
         if j < count && weights[j] != 0.0 {
             sum += stages[j][n].scale(weights[j]);
         }
     });
+    sum
+}
+
+/// The same for numbers with derivatives, of which each is an array: not written out.
+#[inline(never)]
+fn combine_apart<S: Scalar, const D: usize>(weights: &[f64], stages: &[[S; D]], n: usize) -> S {
+    let mut sum = stages[0][n].scale(weights[0]);
+    for j in 1..weights.len() {
+        if weights[j] != 0.0 {
+            sum += stages[j][n].scale(weights[j]);
+        }
+    }
     sum
 }
 

@@ -5,10 +5,15 @@ use super::method::Method;
 use super::tolerance::{ErrorNorm, Failure};
 use crate::model::{Sides, System};
 
+/// So many steps are taken without a look at anything but the time.
+const MOST: usize = 64;
+
 /// A [`Driver`] over plain numbers, its model and its method forgotten: what looks at every step of a run is then
 /// compiled once for each number of states. See the driver's methods of the same names.
 pub trait Steps<const D: usize> {
-    fn advance(&mut self, end: f64) -> Result<Ending, Failure>;
+    /// Takes accepted steps up to `end`, until one reaches the time `wanted` or does not end freely, but only so many
+    /// that whoever wants the run to stop need not wait. The steps before the last one are not to be looked at.
+    fn advance(&mut self, end: f64, wanted: f64) -> Result<Ending, Failure>;
     fn t(&self) -> f64;
     fn x(&self) -> &[f64; D];
     fn sides(&self) -> &Sides<f64>;
@@ -30,7 +35,14 @@ where
     E: ErrorNorm<f64, D> + Copy,
     K: Method<f64, D>,
 {
-    fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
+    fn advance(&mut self, end: f64, wanted: f64) -> Result<Ending, Failure> {
+        let wanted = wanted.min(end);
+        for _ in 1..MOST {
+            let ending = self.advance(end)?;
+            if ending != Ending::Free || self.t() >= wanted {
+                return Ok(ending);
+            }
+        }
         self.advance(end)
     }
     fn t(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! One of two models of the same dimension.
 
 use super::{Family, Parameter, Sides, System};
+use crate::integrate::{Point, Probes, TARGETS};
 use crate::scalar::Scalar;
 
 /// A model of one kind or of another, told apart when the program runs.
@@ -64,6 +65,16 @@ where
     #[inline(always)]
     fn wall(&self, x: &[S; D]) -> Option<S> {
         ask!(self, model => model.wall(x))
+    }
+    #[inline(always)]
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        ask!(self, model => model.beyond(at, wall, probes, found));
     }
 }
 

@@ -5,6 +5,7 @@
 //! zero there; the integrator freezes the side of each surface within a step, so that every step sees
 //! a smooth law, and lands on the surface before it changes the side.
 
+mod any;
 mod bristle;
 mod disk;
 mod dle;
@@ -14,6 +15,7 @@ mod own;
 mod pendulum;
 pub mod stick;
 
+pub use any::AnySystem;
 pub use bristle::Bristled;
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
@@ -23,6 +25,7 @@ pub use own::{Own, OwnFamily};
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick::Sticking;
 
+use crate::integrate::{Point, Probes, TARGETS, beyond};
 use crate::scalar::{Mask, Scalar};
 
 /// The most switching surfaces a model can have.
@@ -80,6 +83,19 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     fn wall(&self, _x: &[S; D]) -> Option<S> {
         None
     }
+
+    /// Looks on which side of every surface, and of the wall, a step's places are; see [`beyond`].
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) where
+        Self: Sized,
+    {
+        beyond(self, at, wall, probes, found);
+    }
 }
 
 impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
@@ -119,6 +135,16 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     #[inline(always)]
     fn wall(&self, x: &[S; D]) -> Option<S> {
         (**self).wall(x)
+    }
+    #[inline(always)]
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        (**self).beyond(at, wall, probes, found);
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Family, Parameter, Sides, System, parameter};
-use crate::formula::{Expression, Kinks, Leaf, Mistake, Names};
+use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
 use crate::scalar::{Real, Scalar};
 use crate::unroll::vector;
 
@@ -39,8 +39,7 @@ impl<S: Scalar, const D: usize> Own<S, D> {
         vector!(S, D; n => S::lift(rates[n]))
     }
 
-    // One function for each kind of number: its loop is large.
-    #[inline(never)]
+    #[inline(always)]
     fn evaluate(
         &self,
         formulas: &[Expression],
@@ -49,19 +48,15 @@ impl<S: Scalar, const D: usize> Own<S, D> {
         sides: &Sides<S>,
         (values, stack): (&mut [S], &mut [S]),
     ) {
-        let leaf = |leaf| match leaf {
-            Leaf::Number(value) => S::constant(value),
-            Leaf::Time => t,
-            Leaf::State(n) | Leaf::Rate(n) => x[n],
-            Leaf::Parameter(i) => self.parameters[i],
-        };
+        let place = Place { t, x, rates: &[], parameters: &self.parameters };
         for (formula, value) in formulas.iter().zip(values) {
-            *value = formula.value_on(leaf, sides, stack);
+            *value = formula.value_on(&place, sides, stack);
         }
     }
 
     /// The values of some of its formulas.
-    #[inline(always)]
+    // One function for each kind of number, too: the room for them is written at every place where it is inlined.
+    #[inline(never)]
     fn values<const N: usize>(&self, formulas: &[Expression], t: S, x: &[S; D], sides: &Sides<S>) -> [S; N] {
         let mut values = [S::zero(); N];
         if self.deep {
@@ -92,6 +87,10 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     }
 
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        // As said above, not called.
+        if const { S::Real::LANES > 1 } {
+            return S::one();
+        }
         let [value] = self.values(&self.kinks.surfaces[j..=j], t, x, sides);
         value
     }

@@ -20,18 +20,20 @@ impl<'a, const D: usize> Samples<'a, D> {
         Self { times, x: states }
     }
 
-    /// Takes the samples that lie in the run's last step.
-    pub fn take(&mut self, run: &dyn Steps<D>) {
+    /// The time of the next sample.
+    pub fn wanted(&self) -> f64 {
+        self.times.get(self.x.len()).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// Takes the samples that lie in the run's last step; returns the time of the next one.
+    pub fn take(&mut self, run: &dyn Steps<D>) -> f64 {
         let end = run.t();
-        if self.times.get(self.x.len()).is_none_or(|&t| t > end) {
-            return;
-        }
-        while let Some(&t) = self.times.get(self.x.len()) {
-            if t > end {
-                break;
-            }
-            let x = if t == end { *run.x() } else { run.dense(t - run.from()) };
+        let mut wanted = self.wanted();
+        while wanted <= end {
+            let x = if wanted == end { *run.x() } else { run.dense(wanted - run.from()) };
             self.x.push(x);
+            wanted = self.wanted();
         }
+        wanted
     }
 }

@@ -45,12 +45,13 @@ impl Table {
     }
 }
 
-fn collect<F: Family<D>, const D: usize>(
+fn collect<F: Family<D>, A: Family<D>, const D: usize>(
     ensemble: &Ensemble<'_, F, D>,
+    alone: &A,
     mut table: Table,
     crew: Crew<'_>,
 ) -> Table {
-    for passage in ensemble.run(crew) {
+    for passage in ensemble.run_beside(alone, crew) {
         match passage {
             Some(Passage { states, t, x, outcome }) => {
                 table.push(states.as_flattened(), t, &x, outcome_code(outcome));
@@ -89,14 +90,14 @@ fn ensemble<'py>(
     }
     let values = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
-    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, _values| {
+    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, alone, _values| {
         let starts = jobs::starts(&starts)?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();
         let table = Table::new(rows::count(&values, &starts), times.len(), dimension)?;
         let ensemble =
             Ensemble { family, values: &values, starts: &starts, times: &times, tolerance, stepper };
-        let (table, signal) = watched.watch(py, |crew| collect(&ensemble, table, crew))?;
+        let (table, signal) = watched.watch(py, |crew| collect(&ensemble, alone, table, crew))?;
         (table, dimension, signal)
     });
     jobs::lost(py, signal, &table.outcome)?;

@@ -8,7 +8,7 @@ use super::interrupt;
 use super::jobs::{self, Jobs, outcome_code};
 use super::model::{AnyModel, state, with_wide_model};
 use crate::integrate::{Dopri5, Failure, Taylor, Tolerance, order};
-use crate::model::Family;
+use crate::model::{AnySystem, Family};
 use crate::run::{Crew, Exponents, Frames, Lyapunov, LyapunovOptions, Stop, frames as frames_of, rows};
 use crate::scalar::{Dual, Isa, constants};
 
@@ -161,15 +161,16 @@ fn follow<F: Family<D>, const D: usize>(
     stop: &Stop,
 ) -> Result<Frames<D>, Failure> {
     let wide: Vec<Dual<f64, D>> = constants(values);
-    let system = family.build(&wide);
+    // Its type is forgotten: models of as many states share what follows.
+    let system: &dyn AnySystem<Dual<f64, D>, D> = &family.build(&wide);
     if let Some(tape) = &rows::tape(family, &[values.to_vec()]) {
         let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
-        match frames_of(&system, method, x0, span, tolerance, stop) {
+        match frames_of(system, method, x0, span, tolerance, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             found => return found,
         }
     }
-    frames_of(&system, Dopri5::default(), x0, span, tolerance, stop)
+    frames_of(system, Dopri5::default(), x0, span, tolerance, stop)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -53,7 +53,7 @@ pub(crate) use with_model;
 /// numbers of states that are rarely wanted there.
 ///
 /// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
-/// own. `starts`, of which own models are taken in packets, too, are compiled for each kind of model.
+/// own. Of `starts`, own models have theirs, too; `alone` is the type that single runs are compiled for.
 macro_rules! with_wide_model {
     (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
         $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family) Three($family) Four($family))
@@ -63,11 +63,28 @@ macro_rules! with_wide_model {
             Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
             Four($family))
     };
-    (starts: $model:expr, |$family:ident, $values:ident| $body:expr) => {
-        $crate::python::model::with_wide_model!(@ $model, $values, $body,
-            Two($crate::model::Either::First($family)) Two($crate::model::Either::Second($family))
-            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
-            Four($crate::model::Either::First($family)) Four($crate::model::Either::Second($family)))
+    (starts: $model:expr, |$family:ident, $alone:ident, $values:ident| $body:expr) => {
+        match $model {
+            $crate::python::model::AnyModel::Three($crate::model::Either::First($family), $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Three($crate::model::Either::Second($family), $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Two($alone @ $crate::model::Either::Second($family), $values) => $body,
+            $crate::python::model::AnyModel::Two($family, $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Four($alone @ $crate::model::Either::Second($family), $values) => $body,
+            $crate::python::model::AnyModel::Four($family, $values) => {
+                let $alone = $family;
+                $body
+            }
+            other => return Err(other.too_much()),
+        }
     };
     (@ $model:expr, $values:ident, $body:expr, $($Kind:ident($held:pat))+) => {
         match $model {

@@ -11,7 +11,7 @@ use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
 use super::model::{AnyModel, state, with_model};
 use crate::integrate::{Dop853, Dopri5, Failure, Rodas, Taylor, Tolerance, order};
-use crate::model::{Family, System};
+use crate::model::{self, Family, System};
 use crate::observe::Record;
 use crate::run::{Output, Run, Stepper, Stiffness, Stop, rows, trajectory};
 use crate::scalar::{Isa, constants};
@@ -76,9 +76,17 @@ fn run<F: Family<D>, const D: usize>(
     let (stiff, stop) = ((stop, None), (stop, stiffness));
     let rodas = || {
         let method = Rodas::new(family.build(&constants(values)), family.build(&constants(values)));
-        trajectory(system(), method, output, x0, tolerance, keep, stiff)
+        let system: &dyn model::AnySystem<f64, D> = &system();
+        trajectory(system, method, output, x0, tolerance, keep, stiff)
     };
-    let stages = || trajectory(system(), Dop853::default(), output, x0, tolerance, keep, stop);
+    // A step of twelve stages is long, and so is what is compiled for it.
+    let stages = || match const { <F::Built<f64> as System<f64, D>>::SMOOTH } {
+        true => trajectory(system(), Dop853::default(), output, x0, tolerance, keep, stop),
+        false => {
+            let system: &dyn model::AnySystem<f64, D> = &system();
+            trajectory(system, Dop853::default(), output, x0, tolerance, keep, stop)
+        }
+    };
     let tape = match by {
         By::Stepper(Stepper::Taylor | Stepper::Auto) => rows::tape(family, &[values.to_vec()]),
         _ => None,

@@ -7,7 +7,7 @@ use super::rows;
 use super::ship::{Ship, Start};
 use super::trajectory::{Outcome, follow};
 use crate::integrate::{Driver, Failure, Steps, Tolerance, order};
-use crate::model::Family;
+use crate::model::{AnySystem, Family, System};
 use crate::observe::Samples;
 use crate::scalar::{Isa, Mask, Real, Scalar};
 use crate::unroll::vector;
@@ -52,8 +52,14 @@ pub struct Passage<const D: usize> {
 impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     /// Runs them all. `None` stands for runs that were not finished when the work was stopped.
     pub fn run(&self, crew: Crew<'_>) -> Vec<Option<Passage<D>>> {
+        self.run_beside(self.family, crew)
+    }
+
+    /// The same, where `alone` is the same family, with the same parameters, in the type that single runs are compiled
+    /// for anyway: those that go in no packet are runs of that.
+    pub fn run_beside<A: Family<D>>(&self, alone: &A, crew: Crew<'_>) -> Vec<Option<Passage<D>>> {
         let (runs, isa) = (rows::count(self.values, self.starts), crew.isa);
-        let stages = Sampled { ensemble: self, recipe: ByDop853, isa };
+        let stages = Sampled { ensemble: self, alone, recipe: ByDop853, isa };
         let tape = match self.stepper {
             Stepper::Dopri5 => None,
             Stepper::Dop853 => return sail(&stages, runs, crew),
@@ -62,14 +68,14 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
         match &tape {
             Some(tape) => {
                 let recipe = ByTaylor { tape, order: order(&self.tolerance), isa };
-                let passages = sail(&Sampled { ensemble: self, recipe, isa }, runs, crew);
+                let passages = sail(&Sampled { ensemble: self, alone, recipe, isa }, runs, crew);
                 let failed = |passage: &Passage<D>| {
                     self.stepper == Stepper::Auto
                         && passage.outcome.is_err_and(|failure| tape.hands_over(&failure))
                 };
                 sail_again(&stages, passages, failed, crew)
             }
-            None => sail(&Sampled { ensemble: self, recipe: ByDopri5, isa }, runs, crew),
+            None => sail(&Sampled { ensemble: self, alone, recipe: ByDopri5, isa }, runs, crew),
         }
     }
 
@@ -85,13 +91,14 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     }
 }
 
-struct Sampled<'a, F, const D: usize, T> {
+struct Sampled<'a, F, A, const D: usize, T> {
     ensemble: &'a Ensemble<'a, F, D>,
+    alone: &'a A,
     recipe: T,
     isa: Isa,
 }
 
-impl<F: Family<D>, const D: usize, T: Recipe<D>> Sampled<'_, F, D, T> {
+impl<F: Family<D>, A, const D: usize, T: Recipe<D>> Sampled<'_, F, A, D, T> {
     /// Starts a run in a lane; returns its states so far. Not a closure, which would be a function of its own.
     #[inline(always)]
     fn load<R: Real>(
@@ -108,7 +115,7 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Sampled<'_, F, D, T> {
     }
 }
 
-impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> {
+impl<F: Family<D>, A: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, A, D, T> {
     type Yield = Passage<D>;
 
     const PACKETS: bool = F::PACKETS && T::STARTS_IN_PACKETS || F::STARTS_IN_PACKETS && T::PACKETS;
@@ -116,12 +123,19 @@ impl<F: Family<D>, const D: usize, T: Recipe<D>> Fleet for Sampled<'_, F, D, T> 
 
     /// As a [trajectory](super::trajectory), so that both share what is compiled.
     fn walk(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Passage<D>>) {
-        let Ensemble { family, times, tolerance, .. } = self.ensemble;
+        let Ensemble { times, tolerance, .. } = self.ensemble;
         while let Some(job) = queue.take() {
             let Start { values, t, x, end } = self.ensemble.start::<f64>(job);
-            let (system, method) = (family.build(values), self.recipe.make(values.to_vec()));
-            let mut run = Driver::by(method, system, t, x, None, tolerance).with_wall();
-            match passage(&mut run, times, end, queue.stop()) {
+            let (system, method) = (self.alone.build(values), self.recipe.make(values.to_vec()));
+            let passage = if const { T::FORGETS && !<A::Built<f64> as System<f64, D>>::SMOOTH } {
+                let system: &dyn AnySystem<f64, D> = &system;
+                let mut run = Driver::by(method, system, t, x, None, tolerance).with_wall();
+                passage(&mut run, times, end, queue.stop())
+            } else {
+                let mut run = Driver::by(method, system, t, x, None, tolerance).with_wall();
+                passage(&mut run, times, end, queue.stop())
+            };
+            match passage {
                 Some(passage) => yields.push(job, passage),
                 None => return,
             }
@@ -200,10 +214,7 @@ fn passage<const D: usize>(
     stop: &Stop,
 ) -> Option<Passage<D>> {
     let mut samples = Samples::new(times, *run.x());
-    let outcome = match follow(run, end, (stop, None), &mut |run, _| {
-        samples.take(run);
-        Ok(())
-    }) {
+    let outcome = match follow(run, end, (stop, None), &mut |run, _| Ok(samples.take(run))) {
         Err(Failure::Interrupted) => return None,
         Ok(Outcome::Chattering) => Err(Failure::Chattering { t: run.t() }),
         outcome => outcome,

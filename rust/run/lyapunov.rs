@@ -98,6 +98,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: Recipe<D>> Fleet for Tange
 
     const PACKETS: bool = F::PACKETS && T::PACKETS;
     const DERIVATIVES: usize = N;
+    const DOUBLE: bool = N == 1 && T::PACKETS;
 
     #[inline(always)]
     fn sail<R: Real>(&self, queue: &Queue<'_>, yields: &mut Yields<'_, Exponents<D, N>>) {

@@ -13,6 +13,10 @@ pub trait Recipe<const D: usize>: Sync {
     /// The same for ensembles of families that are taken in packets.
     const STARTS_IN_PACKETS: bool;
 
+    /// Whether steps are so long, and so is what is compiled for them, that single runs forget the type of the model,
+    /// unless its law is short.
+    const FORGETS: bool = false;
+
     /// The method for systems whose parameters have these values.
     fn make<S: Scalar>(&self, values: Vec<S>) -> Self::Method<S>;
 }
@@ -42,6 +46,7 @@ impl<const D: usize> Recipe<D> for ByDop853 {
     const PACKETS: bool = false;
     // Who wants many runs fast takes another: its twelve stages in packets are not worth their compilation.
     const STARTS_IN_PACKETS: bool = false;
+    const FORGETS: bool = true;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dop853<S, D> {
         Dop853::default()

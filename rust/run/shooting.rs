@@ -3,7 +3,7 @@
 use super::Stop;
 use super::parallel::try_map;
 use crate::integrate::{Dop853, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
-use crate::model::{Family, System};
+use crate::model::{AnySystem, Family};
 use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
 use crate::unroll::vector;
@@ -75,25 +75,25 @@ fn one<F: Family<D>, const D: usize>(
         values[p] = Dual::variable(piece.values[p], D + i);
     }
     let system = family.build(&values);
+    let system: &dyn AnySystem<Number, D> = &system;
     if let Some(tape) = tape {
         let method = Taylor::new(tape, values, order(tolerance), Isa::best());
-        match follow(method, &system, piece, tolerance, stop) {
+        match follow(method, system, piece, tolerance, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             flown => return flown,
         }
     }
-    follow(Dop853::default(), &system, piece, tolerance, stop)
+    follow(Dop853::default(), system, piece, tolerance, stop)
 }
 
-fn follow<M, K, const D: usize>(
+fn follow<K, const D: usize>(
     method: K,
-    system: M,
+    system: &dyn AnySystem<Number, D>,
     piece: &Piece<D>,
     tolerance: &Tolerance,
     stop: &Stop,
 ) -> Result<Flown<D>, Failure>
 where
-    M: System<Number, D>,
     K: Method<Number, D>,
 {
     let start = vector!(Number, D; n => Dual::variable(piece.x[n], n));

@@ -87,6 +87,7 @@ fn sampled<const D: usize>(
     let mut events = Vec::new();
     let mut record = keep.then(|| Record::new(start, x0));
     let outcome = follow(run, end, (stop, stiffness), &mut |run, ending| {
+        let mut wanted = EACH;
         if times.is_empty() {
             // Two events can share a time.
             if run.t() > steps.0[steps.0.len() - 1] {
@@ -97,16 +98,17 @@ fn sampled<const D: usize>(
                 steps.1.push(*run.x());
             }
         } else {
-            samples.take(run);
+            wanted = samples.take(run);
         }
         if let Some(record) = &mut record {
             if !record.grow() {
                 return Err(no_room(record.bytes(), run.t(), (start, end)));
             }
             record.push(run);
+            wanted = EACH;
         }
         events.extend(Event::seen(ending, run));
-        Ok(())
+        Ok(wanted)
     })?;
 
     let (mut t, mut x) = steps;
@@ -127,17 +129,22 @@ fn no_room(kept: usize, t: f64, (start, end): (f64, f64)) -> Failure {
     Failure::NoRoom { end, bytes: kept * (end - start) / (t - start), kept }
 }
 
-/// Follows a run to `end`, showing every step; where asked for, it is watched for being stiff.
+/// The time wanted of who looks at each step.
+const EACH: f64 = f64::NEG_INFINITY;
+
+/// Follows a run to `end`; where asked for, it is watched for being stiff. `see` is shown every step that does not end
+/// freely or reaches the time that it wanted when it was last shown one; maybe more.
 pub(super) fn follow<const D: usize>(
     run: &mut dyn Steps<D>,
     end: f64,
     (stop, stiffness): (&Stop, Option<&Stiffness>),
-    see: &mut dyn FnMut(&dyn Steps<D>, Ending) -> Result<(), Failure>,
+    see: &mut dyn FnMut(&dyn Steps<D>, Ending) -> Result<f64, Failure>,
 ) -> Result<Outcome, Failure> {
     let mut look = Look::new();
+    let mut wanted = EACH;
     while run.t() < end {
         stop.check()?;
-        let (ending, outcome) = match run.advance(end) {
+        let (ending, outcome) = match run.advance(end, wanted) {
             Err(Failure::Chattering { .. }) => (Ending::Free, Some(Outcome::Chattering)),
             Ok(Ending::Wall) => (Ending::Wall, Some(Outcome::Ejected)),
             ending => (ending?, None),
@@ -145,7 +152,10 @@ pub(super) fn follow<const D: usize>(
         if let Some(stiffness) = stiffness {
             look.at(run, stiffness)?;
         }
-        see(run, ending)?;
+        wanted = see(run, ending)?;
+        if stiffness.is_some() {
+            wanted = EACH;
+        }
         if let Some(outcome) = outcome {
             return Ok(outcome);
         }

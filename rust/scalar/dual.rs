@@ -3,7 +3,7 @@
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::{Real, Scalar};
-use crate::unroll::vector;
+use crate::unroll::{unroll, vector};
 
 /// `re + Σ_i d[i] ε_i` with `ε_i ε_j = 0`. The inner scalar may itself be a dual (nested
 /// derivatives) or a packet.
@@ -44,6 +44,35 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
     }
 }
 
+/// Derivatives of derivatives: products of them are long, and functions of their own.
+const fn nested<S: Scalar>() -> bool {
+    size_of::<S>() > size_of::<S::Real>() && S::Real::LANES == 1
+}
+
+/// `a b`, by the product rule.
+#[inline(always)]
+fn product<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
+    Dual { re: a.re * b.re, d: vector!(S, N; i => a.d[i] * b.re + b.d[i] * a.re) }
+}
+
+/// `a/b`.
+#[inline(always)]
+fn quotient<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
+    let inverse = S::one() / b.re;
+    let re = a.re * inverse;
+    Dual { re, d: vector!(S, N; i => (a.d[i] - b.d[i] * re) * inverse) }
+}
+
+#[inline(never)]
+fn product_apart<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
+    product(a, b)
+}
+
+#[inline(never)]
+fn quotient_apart<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
+    quotient(a, b)
+}
+
 impl<S: Scalar, const N: usize> Add for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
@@ -63,9 +92,8 @@ impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
 impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
-    #[allow(clippy::suspicious_arithmetic_impl, reason = "the product rule is a sum")]
     fn mul(self, o: Self) -> Self {
-        Self { re: self.re * o.re, d: vector!(S, N; i => self.d[i] * o.re + o.d[i] * self.re) }
+        if const { nested::<S>() } { product_apart(&self, &o) } else { product(&self, &o) }
     }
 }
 
@@ -73,9 +101,7 @@ impl<S: Scalar, const N: usize> Div for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn div(self, o: Self) -> Self {
-        let inverse = S::one() / o.re;
-        let re = self.re * inverse;
-        Self { re, d: vector!(S, N; i => (self.d[i] - o.d[i] * re) * inverse) }
+        if const { nested::<S>() } { quotient_apart(&self, &o) } else { quotient(&self, &o) }
     }
 }
 
@@ -104,7 +130,17 @@ impl<S: Scalar, const N: usize> SubAssign for Dual<S, N> {
 impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     type Real = S::Real;
     type Mask = S::Mask;
+    type Register = Dual<S::Register, N>;
 
+    #[inline(always)]
+    fn register(self, i: usize) -> Self::Register {
+        Dual { re: self.re.register(i), d: vector!(S::Register, N; n => self.d[n].register(i)) }
+    }
+    #[inline(always)]
+    fn set_register(&mut self, i: usize, lanes: Self::Register) {
+        self.re.set_register(i, lanes.re);
+        unroll!(n in 0..N => { self.d[n].set_register(i, lanes.d[n]); });
+    }
     #[inline(always)]
     fn constant(value: f64) -> Self {
         Self::fixed(S::constant(value))

@@ -77,6 +77,13 @@ pub trait Scalar:
         Self::constant(value)
     }
 
+    /// [`LANES`] of its lanes, where it has as many or more.
+    type Register: Scalar;
+    /// The lanes from `i` times [`LANES`] on.
+    fn register(self, i: usize) -> Self::Register;
+    /// Changes them.
+    fn set_register(&mut self, i: usize, lanes: Self::Register);
+
     #[inline(always)]
     fn zero() -> Self {
         Self::constant(0.0)

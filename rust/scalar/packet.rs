@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::isa::{self, Instructions, Isa, Plain, Work};
+use super::isa::{self, Instructions, Isa, LANES, Plain, Work};
 use super::{Mask, Real, Scalar, elementary, lanes};
 
 /// `L` numbers that go through the same operations, one trajectory each, by the instructions `V`.
@@ -172,7 +172,16 @@ impl<const L: usize, V: Instructions> Real for Packet<L, V> {
 impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
     type Real = Self;
     type Mask = LaneMask<L, V>;
+    type Register = Packet<LANES, V>;
 
+    #[inline(always)]
+    fn register(self, i: usize) -> Packet<LANES, V> {
+        Packet::new(each(|lane| self.0[i * LANES + lane]))
+    }
+    #[inline(always)]
+    fn set_register(&mut self, i: usize, lanes: Packet<LANES, V>) {
+        self.0[i * LANES..][..LANES].copy_from_slice(&lanes.0);
+    }
     #[inline(always)]
     fn constant(value: f64) -> Self {
         Self::new([value; L])
@@ -221,23 +230,23 @@ impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
     // `elementary` itself.
     #[inline(never)]
     fn exp(self) -> Self {
-        elementary::exp(self)
+        isa::run_with::<V, _>(Exp(self))
     }
     #[inline(never)]
     fn ln(self) -> Self {
-        elementary::ln(self)
+        isa::run_with::<V, _>(Ln(self))
     }
-    #[inline(never)]
+    #[inline(always)]
     fn sin(self) -> Self {
-        elementary::sin_cos(self).0
+        self.sin_cos().0
     }
-    #[inline(never)]
+    #[inline(always)]
     fn cos(self) -> Self {
-        elementary::sin_cos(self).1
+        self.sin_cos().1
     }
     #[inline(never)]
     fn tanh(self) -> Self {
-        elementary::tanh(self)
+        isa::run_with::<V, _>(Tanh(self))
     }
     #[inline(never)]
     fn atan2(self, x: Self) -> Self {
@@ -245,6 +254,24 @@ impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
     }
     #[inline(never)]
     fn sin_cos(self) -> (Self, Self) {
-        elementary::sin_cos(self)
+        isa::run_with::<V, _>(SinCos(self))
     }
 }
+
+/// Elementary functions with the packet's own instructions: functions of their own would else be compiled for the
+/// baseline, with a call for every operation.
+macro_rules! functions {
+    ($($Name:ident: $function:ident -> $Output:ty),+) => {$(
+        struct $Name<R>(R);
+
+        impl<R: Real> Work for $Name<R> {
+            type Output = $Output;
+
+            #[inline(always)]
+            fn run<V: Instructions>(self) -> $Output {
+                elementary::$function(self.0)
+            }
+        }
+    )+};
+}
+functions! { Exp: exp -> R, Ln: ln -> R, Tanh: tanh -> R, SinCos: sin_cos -> (R, R) }

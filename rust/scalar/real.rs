@@ -5,6 +5,16 @@ use super::{Isa, Mask, Real, Scalar, Work, elementary};
 impl Scalar for f64 {
     type Real = f64;
     type Mask = bool;
+    type Register = f64;
+
+    #[inline(always)]
+    fn register(self, _i: usize) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn set_register(&mut self, _i: usize, lanes: f64) {
+        *self = lanes;
+    }
 
     #[inline(always)]
     fn constant(value: f64) -> f64 {

@@ -10,7 +10,7 @@
 use super::jet::{HIGH, LOW};
 use super::node::INVERSE;
 use super::series::{Number, half_square, inner, orders};
-use crate::scalar::{Fan, Instructions, Isa, Packet, Real, Scalar, Spread};
+use crate::scalar::{Fan, Instructions, Isa, LANES, Packet, Real, Scalar, Spread};
 use crate::unroll::unroll;
 
 /// The coefficients of the solution up to this order, for the tape's held values.
@@ -46,6 +46,22 @@ pub(super) fn expand<V: Instructions, S: Scalar, const D: usize, const N: usize>
                 return;
             }
         }
+    }
+    // A step of two registers for each part, whose end waits less, but a series that fits into the registers.
+    if const { S::Real::LANES > LANES && size_of::<S>() > size_of::<S::Real>() }
+        && matches!(order, LOW | HIGH)
+    {
+        for i in 0..S::Real::LANES / LANES {
+            let part = |x: S| x.register(i);
+            let keep = |n: usize, k: usize, c: S::Register| work[n][k].set_register(i, c);
+            let mut room = [[<S::Register as Number>::zero(); N]; 3];
+            let series = &mut Series::of(&mut room, x.map(part), part(held[0]), None);
+            match order {
+                LOW => unrolled::<_, N, LOW>(series, keep),
+                _ => unrolled::<_, N, HIGH>(series, keep),
+            }
+        }
+        return;
     }
     let series = &mut Series::of(work, x, held[0], None);
     if const { worthwhile::<S, N>() && !V::ISA.is_rare() } {

@@ -328,6 +328,14 @@ fn apply(function: Function, a: Symbol) -> Symbol {
 impl Scalar for Symbol {
     type Real = Symbol;
     type Mask = SideOf;
+    type Register = Self;
+
+    fn register(self, _i: usize) -> Self {
+        self
+    }
+    fn set_register(&mut self, _i: usize, lanes: Self) {
+        *self = lanes;
+    }
 
     fn constant(value: f64) -> Symbol {
         RECORDING.with_borrow_mut(|r| r.constant(value))

@@ -1,7 +1,8 @@
 //! Two models behind one type are what they are by themselves.
 
+use udd::integrate::{Counts, Driver, Ending, Tolerance};
 use udd::model::effects::{Effect, Kind, Treatment};
-use udd::model::{DiskFamily, Either, Family, OwnFamily, System, sides_of};
+use udd::model::{AnySystem, DiskFamily, Either, Family, OwnFamily, System, sides_of};
 use udd::scalar::{Dual, Scalar, constants};
 
 type Four = Either<DiskFamily, OwnFamily<4>>;
@@ -35,6 +36,27 @@ fn same<S: Scalar<Real = f64, Mask = bool> + PartialEq>(one: &impl System<S, 4>,
         }
         assert!(one.rates(t, &x, &a.1) == other.rates(t, &x, &b.1));
     }
+}
+
+/// A run of a disk that sticks and slips: where it got to and what it took.
+fn run(system: impl System<f64, 4>) -> ([f64; 4], Counts) {
+    let x0 = [1.0, 0.01, -0.02, 0.3];
+    let mut driver: Driver<_, f64, 4> = Driver::new(system, 0.0, x0, None, &Tolerance::default());
+    let mut landed = 0;
+    while driver.t() < 20.0 {
+        landed += usize::from(driver.advance(20.0).unwrap() != Ending::Free);
+    }
+    assert!(landed > 10, "{landed}");
+    (*driver.x(), driver.counts())
+}
+
+#[test]
+fn a_forgotten_type_is_the_one_that_it_was() {
+    let friction = Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued);
+    let disk = DiskFamily { effects: vec![friction], edge: true }.build(&VALUES);
+    let forgotten: &dyn AnySystem<f64, 4> = &disk;
+    same::<f64>(&disk, &forgotten);
+    assert_eq!(run(&disk), run(forgotten));
 }
 
 #[test]

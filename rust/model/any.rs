@@ -1,0 +1,105 @@
+//! A system whose type is forgotten.
+
+use super::{Sides, System};
+use crate::integrate::{Point, Probes, TARGETS};
+use crate::scalar::Scalar;
+
+/// Any [`System`]. What is asked of it seldom, against the steps of a run, is compiled for a `dyn AnySystem` once for each
+/// kind of number instead of once for each model.
+pub trait AnySystem<S: Scalar, const D: usize>: Sync {
+    /// See the methods of the same names of [`System`].
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];
+    fn surfaces(&self) -> usize;
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S;
+    fn watched(&self) -> [bool; D];
+    fn surface_name(&self, j: usize, side: bool) -> &'static str;
+    fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>);
+    fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask);
+    fn jumps(&self, j: usize) -> bool;
+    fn wall(&self, x: &[S; D]) -> Option<S>;
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    );
+}
+
+impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        System::rates(self, t, x, sides)
+    }
+    fn surfaces(&self) -> usize {
+        System::surfaces(self)
+    }
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        System::surface(self, j, t, x, sides)
+    }
+    fn watched(&self) -> [bool; D] {
+        System::watched(self)
+    }
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        System::surface_name(self, j, side)
+    }
+    fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
+        System::settle(self, t, x, sides);
+    }
+    fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        System::switch(self, j, t, x, sides, here);
+    }
+    fn jumps(&self, j: usize) -> bool {
+        System::jumps(self, j)
+    }
+    fn wall(&self, x: &[S; D]) -> Option<S> {
+        System::wall(self, x)
+    }
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        System::beyond(self, at, wall, probes, found);
+    }
+}
+
+impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        AnySystem::rates(&**self, t, x, sides)
+    }
+    fn surfaces(&self) -> usize {
+        AnySystem::surfaces(&**self)
+    }
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        AnySystem::surface(&**self, j, t, x, sides)
+    }
+    fn watched(&self) -> [bool; D] {
+        AnySystem::watched(&**self)
+    }
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        AnySystem::surface_name(&**self, j, side)
+    }
+    fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
+        AnySystem::settle(&**self, t, x, sides);
+    }
+    fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        AnySystem::switch(&**self, j, t, x, sides, here);
+    }
+    fn jumps(&self, j: usize) -> bool {
+        AnySystem::jumps(&**self, j)
+    }
+    fn wall(&self, x: &[S; D]) -> Option<S> {
+        AnySystem::wall(&**self, x)
+    }
+    fn beyond(
+        &self,
+        at: &Point<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        AnySystem::beyond(&**self, at, wall, probes, found);
+    }
+}
