@@ -17,6 +17,7 @@ from .branch import AnyCurve, BifurcationPoint, Branch
 from .cycle_curve import CycleCurve
 from .flow import Flow, flow_of
 from .following import Limits, Way, follow
+from .forcing import require_period
 from .path import Lost, Place, along_parameter, correct, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs
@@ -164,8 +165,12 @@ def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[
 
 def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, Place]:
     """The curve through a solution, and the place there."""
-    flow: Flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state))
+    made = start._curve if isinstance(start, PeriodicOrbit) else None
+    forcing = None if made is None else made.flow.forcing
+    flow: Flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
     index = flow.index(parameter)
+    if forcing is not None:
+        require_period(flow.model, forcing, flow.kept, flow.size, parameter)
     value = float(flow.values[index])
     curve: AnyCurve
     if isinstance(start, Equilibrium):

@@ -222,9 +222,9 @@ def _prepared(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Place]:
     if 2 * wanted > 3 * m:
         times = -(-wanted // m)
         nodes, values = [curve.nodes(place.u)], curve.values_at(place.u)
-        share = np.full(m, curve.span(place.u) / (m * times))
-        for _ in range(times - 1):
-            nodes.append(flow.fly(values, nodes[-1], share).x)
+        share, begins = np.full(m, curve.span(place.u) / (m * times)), curve.begins(place.u)
+        for k in range(times - 1):
+            nodes.append(flow.fly(values, nodes[-1], share, t=begins + k * share).x)
         fine = replace(curve, pieces=m * times)
         packed = np.stack(nodes, axis=1).reshape(m * times, flow.dim)
         u = fine.pack(packed, curve.span(place.u), curve.value(place.u))

@@ -89,7 +89,8 @@ class PeriodicOrbit:
     period : float
         Its period, the time after which all that the rates depend on is as before.
     multipliers : ndarray of complex, shape (r - 1,)
-        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out.
+        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out. Of a
+        forced model: those of the stroboscopic map, shape (r,).
     symmetric : bool
         Whether it is its own image under the model's symmetry, half a period later.
     nodes : ndarray, shape (m, dim)

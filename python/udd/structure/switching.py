@@ -110,7 +110,7 @@ def doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats
     away = np.vstack([first, -curve.mirror * first])
     plain = np.ones(curve.flow.dim)
     shift = curve.shift + curve.mirror * curve.shift
-    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift)
+    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
     base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
     new.fix_phase(base)
     row = new.pack(away, 0.0, 0.0)
