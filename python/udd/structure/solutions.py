@@ -23,6 +23,7 @@ __all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
 Complex = NDArray[np.complex128]
 
 _ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
+_FAMILY = 1e-6  # of its period: by more no inaccuracy moves a neutral cycle
 
 
 def kind_of_rest(eigenvalues: Complex) -> str:
@@ -126,7 +127,9 @@ class PeriodicOrbit:
 
         if self._curve is None or self._unknowns is None:
             return float("nan")
-        return period_error_of(self._curve, self._unknowns)
+        error = period_error_of(self._curve, self._unknowns)
+        # In a family less accurate runs find another cycle, unless its period or energy is held.
+        return error if error < _FAMILY * self.period or not self.neutral else float("nan")
 
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
