@@ -42,6 +42,7 @@ _PUBLIC = {
     "bifurcation": "udd.branching",
     "cascade": "udd.structure",
     "connection": "udd.structure",
+    "connections": "udd.structure",
     "continuation": "udd.structure",
     "covariant_vectors": "udd.spectra",
     "diagram": "udd.structure",
@@ -120,6 +121,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import PeriodicOrbit as PeriodicOrbit
     from udd.structure import cascade as cascade
     from udd.structure import connection as connection
+    from udd.structure import connections as connections
     from udd.structure import continuation as continuation
     from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria

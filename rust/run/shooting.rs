@@ -2,7 +2,7 @@
 
 use super::Stop;
 use super::parallel::try_map;
-use crate::integrate::{Dop853, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
+use crate::integrate::{Dop853, Dopri5, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
 use crate::model::{Family, System};
 use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
@@ -87,15 +87,22 @@ fn one<F: Family<D>, const D: usize>(
     for (i, &p) in wanted.iter().enumerate() {
         values[p] = Dual::variable(piece.values[p], first + i);
     }
-    let system = family.build(&values);
+    // Systems are handed over by value, as in the analyses of many orbits: what is compiled for those serves here.
     if let Some(tape) = tape {
-        let method = Taylor::new(tape, values, order(tolerance), Isa::best());
-        match follow(method, &system, piece, first, tolerance, stop) {
+        let system = family.build(&values);
+        let method = Taylor::new(tape, values.clone(), order(tolerance), Isa::best());
+        match follow(method, system, piece, first, tolerance, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             flown => return flown,
         }
     }
-    follow(Dop853::default(), &system, piece, first, tolerance, stop)
+    let system = family.build(&values);
+    // Of many states what is compiled for their exponents.
+    if const { D > 4 } {
+        follow(Dopri5::default(), system, piece, first, tolerance, stop)
+    } else {
+        follow(Dop853::default(), system, piece, first, tolerance, stop)
+    }
 }
 
 fn follow<M, K, const D: usize>(

@@ -3,7 +3,8 @@
 from .branch import BifurcationPoint, Branch
 from .branches import continuation
 from .cascades import Cascade, cascade
-from .connections import Connection, connection
+from .connecting import Connection, connection
+from .connection_search import Connections, connections
 from .diagrams import Diagram, diagram
 from .loci import Locus, locus
 from .orbits import periodic_orbit
@@ -15,12 +16,14 @@ __all__ = [
     "Branch",
     "Cascade",
     "Connection",
+    "Connections",
     "Diagram",
     "Equilibrium",
     "Locus",
     "PeriodicOrbit",
     "cascade",
     "connection",
+    "connections",
     "continuation",
     "diagram",
     "equilibria",

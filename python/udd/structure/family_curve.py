@@ -55,8 +55,8 @@ class Conserved:
         except ModelError as error:
             known = ", ".join(flow.names) or "none"
             raise ModelError(
-                f"{text!r} is none of the parameters ({known}), not {PERIOD!r}, "
-                f"and no conserved quantity: {error}"
+                f"{type(model).__name__} has no parameter {text!r}; it has {known}. "
+                f"Nor is that {PERIOD!r} or the formula of a conserved quantity: {error}"
             ) from None
         made = cls(text, law)
         random = np.random.default_rng(6)

@@ -137,6 +137,13 @@ class Flow:
             found["rate"][:, kept],
         )
 
+    def fly_each(self, rows: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
+        """Where orbits from `x` (m, r), each with its own parameters `rows` (m, p), are after `spans`."""
+        atol = self.atol * float(np.min(self.size)) * loose
+        begin = np.zeros(len(x))
+        ends = _core.shoot(self.model, rows, self.full(x), begin, spans, [], self.rtol * loose, atol)["x"]
+        return np.ascontiguousarray(ends[:, self.kept])
+
     def with_values(self, values: Floats) -> Model:
         """The model with these parameters; made once for values that come several times in a row."""
         key = values.tobytes()
