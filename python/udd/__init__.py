@@ -20,6 +20,7 @@ _PUBLIC = {
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
+    "Connections": "udd.structure",
     "Diagram": "udd.structure",
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
@@ -27,6 +28,7 @@ _PUBLIC = {
     "Fit": "udd.fitting",
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
+    "Lifetimes": "udd.structure",
     "Locus": "udd.structure",
     "Measurement": "udd.measurement",
     "Model": "udd.models",
@@ -54,6 +56,7 @@ _PUBLIC = {
     "errors": "udd.errors",
     "fit": "udd.fitting",
     "forecast": "udd.forecasting",
+    "lifetimes": "udd.structure",
     "locus": "udd.structure",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
@@ -115,8 +118,10 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import Branch as Branch
     from udd.structure import Cascade as Cascade
     from udd.structure import Connection as Connection
+    from udd.structure import Connections as Connections
     from udd.structure import Diagram as Diagram
     from udd.structure import Equilibrium as Equilibrium
+    from udd.structure import Lifetimes as Lifetimes
     from udd.structure import Locus as Locus
     from udd.structure import PeriodicOrbit as PeriodicOrbit
     from udd.structure import cascade as cascade
@@ -125,6 +130,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import continuation as continuation
     from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria
+    from udd.structure import lifetimes as lifetimes
     from udd.structure import locus as locus
     from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec

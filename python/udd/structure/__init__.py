@@ -10,6 +10,7 @@ from .loci import Locus, locus
 from .orbits import periodic_orbit
 from .rests import equilibria
 from .solutions import Equilibrium, PeriodicOrbit
+from .survival import Lifetimes, lifetimes
 
 __all__ = [
     "BifurcationPoint",
@@ -19,6 +20,7 @@ __all__ = [
     "Connections",
     "Diagram",
     "Equilibrium",
+    "Lifetimes",
     "Locus",
     "PeriodicOrbit",
     "cascade",
@@ -27,6 +29,7 @@ __all__ = [
     "continuation",
     "diagram",
     "equilibria",
+    "lifetimes",
     "locus",
     "periodic_orbit",
 ]
