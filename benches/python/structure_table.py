@@ -90,16 +90,14 @@ def cycles_of_others() -> None:
     bend = "al*(y - x - b*x - (a-b)/2*(abs(x+1)-abs(x-1)))"
     models = {
         "Roessler": (["-y-z", "x+0.2*y", "0.2+z*(x-5.7)"], {}, [0.0, -6.0, 0.0], 5.9),
-        "Sprott B": (["y*z", "x-y", "1-x*y"], {}, [1.0, 1.0, 0.0], None),
+        "Sprott B": (["y*z", "x-y", "1-x*y"], {}, [1.0, 0.5, 1.0], None),
         "Chua, with abs": ([bend, "x-y+z", "-be*y"], chua, [1.8, 0.0, -2.2], None),
     }
     for name, (equations, parameters, start, period) in models.items():
         model = udd.Model(["x", "y", "z"], equations, parameters)
         try:
             orbit, seconds = timed(
-                lambda m=model, s=start, p=period: udd.periodic_orbit(
-                    m, s, period=p, settle=50.0, longest=400.0
-                )
+                lambda m=model, s=start, p=period: udd.periodic_orbit(m, s, period=p, settle=50.0)
             )
         except udd.UddError as error:
             print(f"{name:46s} {error}")

@@ -1,4 +1,4 @@
-"""How often the verdict of a spectrum is right: random starts of six models whose attractors are known.
+"""How often the verdict of a spectrum is right: random starts of models whose attractors are known.
 
 Prints each wrong one. `python verdicts.py 20` takes 20 starts of each model.
 """
@@ -29,6 +29,22 @@ def cases() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
         ("Lorenz, r = 160", udd.Model(xyz, LORENZ, {"r": 160.0}), 5 * middle, SPREAD, {"periodic orbit"}),
         ("DLE, w = 10", udd.DLE(10.0), np.array([1.0, 1.0, 0.0]), np.full(3, 2.0), {"periodic orbit"}),
         ("DLE, w = 1", udd.DLE(1.0), np.array([1.0, 1.0, 0.0]), np.full(3, 1.0), {"chaos"}),
+        *larger(),
+    ]
+
+
+def larger() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
+    """Models of one, four, five and six states."""
+    five = udd.Model(["x", "y", "z", "u", "v"], [*LORENZ, "v", "(1-u^2)*v-u"], {"r": 28.0})
+    two = udd.Model(["x", "v", "y", "w"], ["v", "(1-x^2)*v-x", "w", "2*(1-y^2)*w-y"])
+    chain = ["a", "(1-x^2)*a-x+0.5*(y-x)", "b", "(1-y^2)*b-y+0.5*(x+z-2*y)", "c", "(1-z^2)*c-z+0.5*(y-z)"]
+    six = udd.Model(["x", "a", "y", "b", "z", "c"], chain)
+    return [
+        ("one state", udd.Model(["x"], ["x-x^3"]), np.zeros(1), np.full(1, 2.0), {"equilibrium"}),
+        # Two frequencies without a common measure: none of the three.
+        ("four, a torus", two, np.zeros(4), np.full(4, 2.0), {"undecided"}),
+        ("five, chaos", five, np.array([0, 0, 25.0, 0, 0]), np.array([10, 10, 10, 2, 2.0]), {"chaos"}),
+        ("six, a cycle", six, np.zeros(6), np.full(6, 2.0), {"periodic orbit"}),
     ]
 
 
