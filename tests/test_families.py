@@ -100,5 +100,11 @@ def test_what_is_not_kept_is_refused() -> None:
         udd.continuation(orbit, "x^2", (0.0, 1.0))
     with pytest.raises(ModelError, match="has no parameter 'q'; it has none"):
         udd.continuation(orbit, "q", (0.0, 1.0))
+    (point,) = udd.continuation(orbit, "period", (6.6, 8.0)).points
+    with pytest.raises(ModelError, match="over a second parameter"):
+        udd.locus(point, "q", (-0.1, 0.1))
+    # Twice the period, twice the value.
+    born = udd.continuation(point)
+    assert born.values[0] == pytest.approx(2.0 * point.value, abs=0.1)
     # One of a family: how long it lasts is nothing that has a bound.
     assert np.isnan(orbit.period_error)

@@ -141,7 +141,9 @@ def connection(branch: Branch) -> Connection:
         raise ModelError("a branch of cycles is needed, of udd.continuation")
     curve, place = branch._places[int(np.argmax(branch.periods))]
     assert isinstance(curve, CycleCurve)
-    if curve.flow.forcing is not None or curve.parameter == HELD:
+    if curve.flow.forcing is not None:
+        raise ModelError("a forced model has no equilibria that an orbit could connect")
+    if curve.parameter == HELD:
         raise ModelError(
             f"a connection is looked for over a parameter of the model, not over {branch.parameter}"
         )
