@@ -38,6 +38,10 @@ def test_henon_heiles_bifurcates_where_it_is_known_to() -> None:
     # The first isochronous pitchforks in units of the saddle's energy (M. Brack, Found. Phys. 31 (2001) 209).
     energies = [6 * point.value for point in family.points if point.kind == "branch point"]
     assert energies[:2] == pytest.approx([0.969309, 0.986709], abs=1e-6)
+    # The same by power series with 42 digits.
+    exact = [0.13528591930035279812, 0.15253573548213440877, 0.16155151511081361069]
+    for point, value in zip(family.points, exact, strict=False):
+        assert abs(point.value - value) <= point.error < 1e-13
     for point in family.points:
         # The motion along the axis, and the derivatives across it.
         def rates(t: float, s: np.ndarray) -> np.ndarray:
