@@ -61,6 +61,30 @@ def test_the_dle_has_those_that_another_integrator_has() -> None:
     assert before == -after
 
 
+def test_a_model_that_blows_up_on_one_side_of_its_connection() -> None:
+    model = udd.Model(["x", "v"], ["v", "x^2 - 1 + v*(b + x)"], {"b": 0.85})
+    (one,) = udd.connections(model, "b", (0.6, 0.9), n=12)
+    assert one.kind == "homoclinic"
+
+    def end(b: float) -> float:
+        """Where the saddle's unstable manifold is when it has gone round: inside, or past the saddle."""
+        growing = (b + 1 + np.sqrt((b + 1) ** 2 + 8)) / 2
+        start = np.array([1.0, 0.0]) - 1e-6 * np.array([1.0, growing])
+        run = integrate.solve_ivp(
+            lambda t, s: [s[1], s[0] ** 2 - 1 + s[1] * (b + s[0])],
+            [0.0, 60.0],
+            start,
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=_far,
+        )
+        return float(run.y[0, -1])
+
+    # Past the saddle it goes away without end.
+    assert {end(one.value + d) > 5.0 for d in (-1e-7, 1e-7)} == {False, True}
+
+
 def _far(t: float, s: np.ndarray) -> float:
     return float(40.0 - np.abs(s).max())
 

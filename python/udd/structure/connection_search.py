@@ -24,18 +24,20 @@ __all__ = ["Connections", "connections"]
 
 _FINE = 24  # states looked at in a typical time
 _AWAY = 1e-3  # from the equilibrium, in typical sizes, the manifold begins as a straight line
-_LEFT = 0.1  # further away it has left the equilibrium
+_LEFT = 0.1  # further away it has left the equilibrium,
+_LEAVES = 80.0  # which takes as many typical times at most
 _SHOWN = 20.0  # typical times that show the extent of the motion
 _FAR = 30.0  # typical sizes, beyond which nothing comes back
 _NEAR = 3.0  # a passage at a larger distance is none
 _LOOSE = 10.0  # times 1e-13: so accurate are the runs
-_CLOSE = 1e-2  # from so near a passage Newton's method starts,
+_CLOSE = 3e-2  # from so near a passage Newton's method starts,
 _NARROW = 1e-11  # or from an interval this narrow: towards a slow spiral passages come nearer slowly
 _TRIES = 4  # to find an equilibrium
 _FINER = 4  # so often values are added where the manifold stays longest
 _PARTS = 8  # into which an interval is cut between values on whose sides it passes differ,
 _ROUNDS = 14  # so often at most
 _BEFORE = 1.5  # typical times by which passages at neighbouring values differ at most
+_LATER = 15.0  # ... by which it passes later next to a connection
 _TURN = 3.0  # ... that a turn about an equilibrium takes at most
 _BESIDE = 4.0  # steps of the grid by which Newton's method may move a connection
 
@@ -128,7 +130,7 @@ def connections(
     its mirror image, on another side than at the next value of the parameter, there is a connection between
     the two; it is found by narrowing the interval, and by Newton's method as :func:`udd.connection` does. Two
     connections between neighbouring values are missed, as are those that take longer. Where the manifold
-    goes away for good, values are added where it stays longest.
+    goes away for good, values are added where it stays longest, and where it passes more or fewer times.
 
     Examples
     --------
@@ -178,10 +180,14 @@ def _extent(model: Model, rests: list[Floats]) -> Floats:
     times = np.linspace(0.0, _SHOWN * clock, 10 * _FINE)
     seen = [np.ones(len(model.state_names)) if not rests else rests[0]]
     for rest in rests:
-        try:
-            seen += [*simulate(model, times, rest + _AWAY * (1.0 + np.abs(rest)), method="auto").state]
-        except IntegrationError:
-            continue
+        # What blows up does so later than half of the time, or than a quarter, ...
+        for part in 0.5 ** np.arange(8):
+            try:
+                aside = rest + _AWAY * (1.0 + np.abs(rest))
+                seen += [*simulate(model, part * times, aside, method="auto").state]
+                break
+            except IntegrationError:
+                continue
     states = np.array(seen)
     return states[np.isfinite(states).all(axis=1)]
 
@@ -232,7 +238,7 @@ class _Manifold:
         return None
 
     def passages(
-        self, values: Floats, rests: list[Floats]
+        self, values: Floats, rests: list[Floats], longest: float
     ) -> tuple[list[dict[bool, list[_Passage]]], list[Floats]]:
         """Passages by the equilibrium, or its mirror image (True), at each value; the states on the way."""
         flow, step = self.flow, self.flow.clock / _FINE
@@ -250,17 +256,17 @@ class _Manifold:
         paths = [[state.copy()] for state in x]
         left_at = np.full(count, np.inf)
         center = np.array(rests)
-        for k in range(1, int(100 * _FINE)):
+        for k in range(1, round(_FINE * (_LEAVES + longest / flow.clock))):
             own = np.flatnonzero(going)
             if not len(own):
                 break
-            x[own] = flow.fly_each(rows[own], x[own], time[own] * step, _LOOSE)
+            x[own] = self._on(rows[own], x[own], time[own] * step)
             scaled = np.linalg.norm((x - center) / size, axis=1)
             for i in own.tolist():
                 paths[i].append(x[i].copy())
                 if scaled[i] > _LEFT and not np.isfinite(left_at[i]):
                     left_at[i] = k * step
-                if not scaled[i] < _FAR or k * step > left_at[i] + self.longest:
+                if not scaled[i] < _FAR or k * step > left_at[i] + longest:
                     going[i] = False
         found = []
         for i, way in enumerate(ways):
@@ -274,6 +280,17 @@ class _Manifold:
                 )
             found.append(table)
         return found, [np.array(path) for path in paths]
+
+    def _on(self, rows: Floats, x: Floats, spans: Floats) -> Floats:
+        """The states a step later; infinite where the run blows up."""
+        try:
+            return self.flow.fly_each(rows, x, spans, _LOOSE)
+        except IntegrationError:
+            if len(x) == 1:
+                return np.full_like(x, np.inf)
+        half = len(x) // 2
+        parts = (slice(None, half), slice(half, None))
+        return np.concatenate([self._on(rows[part], x[part], spans[part]) for part in parts])
 
     def _by(self, path: Floats, target: Floats, left: Floats, image: bool, after: float) -> list[_Passage]:
         """Minima of the distance from a target once the manifold has left its equilibrium."""
@@ -301,7 +318,7 @@ class _Manifold:
     def _compared(self) -> list[_Compared]:
         """Values with what is passed there: those of the grid, and more where the manifold stays longest.
 
-        Next to a connection it stays for long near the equilibrium that it passes.
+        Next to a connection it stays for long near the equilibrium that it passes, and may pass it once more.
         """
         values = [float(v) for v, rest in zip(self.grid, self.rests, strict=True) if rest is not None]
         rests = [rest for rest in self.rests if rest is not None]
@@ -309,7 +326,7 @@ class _Manifold:
         for _ in range(_FINER):
             if not values or not self.exists:
                 break
-            tables, paths = self.passages(np.array(values), rests)
+            tables, paths = self.passages(np.array(values), rests, self.longest)
             seen += zip(values, rests, tables, map(len, paths), strict=True)
             seen.sort(key=lambda one: one[0])
             values, rests = [], []
@@ -317,6 +334,12 @@ class _Manifold:
                 if before[3] < here[3] >= after[3] and here[3] > 1 + after[3]:
                     values += np.linspace(before[0], after[0], 2 * _PARTS + 1)[1:-1].tolist()
                     rests += [here[1]] * (2 * _PARTS - 1)
+            for before, after in pairwise(seen):
+                # One side of a connection may lead away at once.
+                if any(len(before[2][image]) != len(after[2].get(image, [])) for image in before[2]):
+                    values += np.linspace(before[0], after[0], _PARTS + 1)[1:-1].tolist()
+                    rests += [before[1]] * (_PARTS - 1)
+            values, rests = values[: len(self.grid)], rests[: len(self.grid)]
             own = {one[0] for one in seen}
             chosen = [k for k, value in enumerate(values) if value not in own and value not in values[:k]]
             near = [self.rest_near(values[k], rests[k]) for k in chosen]
@@ -366,10 +389,11 @@ class _Manifold:
                 rests.append(bracket.rest if rest is None else rest)
         if not values:
             return []
-        tables, paths = self.passages(np.array(values), rests)
+        # Nearer to the connection it passes later.
+        longest = self.longest + _LATER * self.flow.clock
+        tables, paths = self.passages(np.array(values), rests, longest)
         narrowed = []
         for b, bracket in enumerate(brackets):
-            # Nearer to the connection it passes later.
             least = min(bracket.before.t, bracket.after.t) - _BEFORE * self.flow.clock
             low, before, after, high = bracket.low, bracket.before, bracket.after, bracket.high
             nearest: _Nearest | None = None
