@@ -20,6 +20,7 @@ _PUBLIC = {
     "ConvergenceWarning": "udd.errors",
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
+    "Connections": "udd.structure",
     "Diagram": "udd.structure",
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
@@ -28,6 +29,7 @@ _PUBLIC = {
     "Forecast": "udd.forecasting",
     "IncompleteWarning": "udd.errors",
     "Interrupted": "udd.errors",
+    "Lifetimes": "udd.structure",
     "Locus": "udd.structure",
     "Measurement": "udd.measurement",
     "Model": "udd.models",
@@ -43,6 +45,7 @@ _PUBLIC = {
     "bifurcation": "udd.branching",
     "cascade": "udd.structure",
     "connection": "udd.structure",
+    "connections": "udd.structure",
     "continuation": "udd.structure",
     "covariant_vectors": "udd.spectra",
     "diagram": "udd.structure",
@@ -54,6 +57,7 @@ _PUBLIC = {
     "errors": "udd.errors",
     "fit": "udd.fitting",
     "forecast": "udd.forecasting",
+    "lifetimes": "udd.structure",
     "locus": "udd.structure",
     "lyapunov": "udd.exponents",
     "lyapunov_spectrum": "udd.spectra",
@@ -116,15 +120,19 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import Branch as Branch
     from udd.structure import Cascade as Cascade
     from udd.structure import Connection as Connection
+    from udd.structure import Connections as Connections
     from udd.structure import Diagram as Diagram
     from udd.structure import Equilibrium as Equilibrium
+    from udd.structure import Lifetimes as Lifetimes
     from udd.structure import Locus as Locus
     from udd.structure import PeriodicOrbit as PeriodicOrbit
     from udd.structure import cascade as cascade
     from udd.structure import connection as connection
+    from udd.structure import connections as connections
     from udd.structure import continuation as continuation
     from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria
+    from udd.structure import lifetimes as lifetimes
     from udd.structure import locus as locus
     from udd.structure import periodic_orbit as periodic_orbit
     from udd.sweeping import SweepSpec as SweepSpec

@@ -156,6 +156,11 @@ impl Expression {
         Ok(Self::of(parse::parse(text, names)?))
     }
 
+    /// A number.
+    pub(crate) fn number(value: f64) -> Self {
+        Self::of(vec![Op::Push(Leaf::Number(value))])
+    }
+
     fn of(ops: Vec<Op>) -> Self {
         let (mut depth, mut height) = (0, 0_usize);
         for op in &ops {

@@ -89,6 +89,10 @@ impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
         ask!(self, family => family.goes_in_packets())
     }
 
+    fn idle(&self) -> usize {
+        ask!(self, family => family.idle())
+    }
+
     fn parameters(&self) -> Vec<Parameter> {
         ask!(self, family => family.parameters())
     }

@@ -192,6 +192,12 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
         true
     }
 
+    /// How many states at the end only fill up the number that the analysis is compiled for: they rest, and nothing
+    /// depends on them.
+    fn idle(&self) -> usize {
+        0
+    }
+
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;
 

@@ -164,7 +164,26 @@ impl<const D: usize> OwnFamily<D> {
         self
     }
 
-    /// The states' names, and which of them are angles.
+    /// The same with idle states up to the number `E`.
+    ///
+    /// # Panics
+    /// Where there are more than `E` states already.
+    pub fn filled<const E: usize>(&self) -> OwnFamily<E> {
+        let idle = E.checked_sub(D).expect("at least as many states");
+        let equations = self.equations.iter().cloned().chain(vec![Expression::number(0.0); idle]);
+        let Ok(equations) = <[Expression; E]>::try_from(equations.collect::<Vec<_>>()) else {
+            unreachable!("as many as states")
+        };
+        OwnFamily {
+            equations: Arc::new(equations),
+            kinks: self.kinks.clone(),
+            deep: self.deep,
+            parameters: self.parameters.clone(),
+            states: self.states.clone(),
+        }
+    }
+
+    /// The names of the states that are not idle, and which of them are angles.
     pub fn states(&self) -> Vec<(String, bool)> {
         self.states.clone()
     }
@@ -183,6 +202,10 @@ impl<const D: usize> Family<D> for OwnFamily<D> {
 
     fn goes_in_packets(&self) -> bool {
         self.kinks.surfaces.is_empty()
+    }
+
+    fn idle(&self) -> usize {
+        D - self.states.len()
     }
 
     fn parameters(&self) -> Vec<Parameter> {

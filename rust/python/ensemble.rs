@@ -82,7 +82,7 @@ fn ensemble<'py>(
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::from_python(model)?.filled();
     let (tolerance, stepper) = (Tolerance { rtol, atol }, stepper(method)?);
     let times = times.as_slice()?.to_vec();
     if times.is_empty() {
@@ -91,7 +91,7 @@ fn ensemble<'py>(
     let values = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
     let (table, dimension, signal) = with_wide_model!(starts: &model, |family, alone, _values| {
-        let starts = jobs::starts(&starts)?;
+        let starts = jobs::starts(&starts, family.idle())?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();
         let table = Table::new(rows::count(&values, &starts), times.len(), dimension)?;
@@ -103,9 +103,10 @@ fn ensemble<'py>(
     jobs::lost(py, signal, &table.outcome)?;
     let runs = table.outcome.len();
     let dict = PyDict::new(py);
-    let states = PyArray1::from_vec(py, table.states).reshape([runs, times.len(), dimension])?;
-    dict.set_item("states", states)?;
-    dict.set_item("end", PyArray1::from_vec(py, table.end).reshape([runs, dimension])?)?;
+    let live = model.states().len();
+    let cut = |numbers| PyArray1::from_vec(py, jobs::live(numbers, dimension, live));
+    dict.set_item("states", cut(table.states).reshape([runs, times.len(), live])?)?;
+    dict.set_item("end", cut(table.end).reshape([runs, live])?)?;
     dict.set_item("t_end", PyArray1::from_vec(py, table.t_end))?;
     dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
     Ok(dict)

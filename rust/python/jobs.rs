@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use numpy::PyReadonlyArray2;
+use numpy::ndarray::ArrayView1;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
@@ -91,15 +92,24 @@ pub fn values(model: &AnyModel, values: &PyReadonlyArray2<'_, f64>) -> PyResult<
     Ok(values.rows().into_iter().map(|row| row.to_vec()).collect())
 }
 
-/// Rows of initial states.
-pub fn starts<const D: usize>(starts: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; D]>> {
-    let starts = starts.as_array();
-    if starts.nrows() == 0 || starts.ncols() != D {
+/// Rows of initial states, of which the last `idle` components are zero.
+pub fn starts<const D: usize>(starts: &PyReadonlyArray2<'_, f64>, idle: usize) -> PyResult<Vec<[f64; D]>> {
+    let (starts, wanted) = (starts.as_array(), D - idle);
+    if starts.nrows() == 0 || starts.ncols() != wanted {
         let (rows, columns) = starts.dim();
-        let message = format!("initial states of {D} numbers are needed, not {rows} rows of {columns}");
+        let message = format!("initial states of {wanted} numbers are needed, not {rows} rows of {columns}");
         return Err(ModelError::new_err(message));
     }
-    Ok(starts.rows().into_iter().map(|row| std::array::from_fn(|n| row[n])).collect())
+    let state = |row: ArrayView1<'_, f64>| std::array::from_fn(|n| row.get(n).copied().unwrap_or(0.0));
+    Ok(starts.rows().into_iter().map(state).collect())
+}
+
+/// Of numbers that come in rows of `width` the first `live` of each row: those of states that are not idle.
+pub fn live(numbers: Vec<f64>, width: usize, live: usize) -> Vec<f64> {
+    if width == live {
+        return numbers;
+    }
+    numbers.chunks_exact(width).flat_map(|row| &row[..live]).copied().collect()
 }
 
 /// Values and starts come one for each run, or one for all.

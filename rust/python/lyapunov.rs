@@ -48,7 +48,11 @@ impl Table {
 }
 
 fn table<F: Family<D>, const D: usize>(orbits: &Lyapunov<'_, F, D>, all: bool, crew: Crew<'_>) -> Table {
-    if all { collect(&orbits.run::<D>(crew)) } else { collect(&orbits.run::<1>(crew)) }
+    // Of many states one exponent alone is not worth its compilation.
+    if const { D <= 4 } && !all {
+        return collect(&orbits.run::<1>(crew));
+    }
+    collect(&orbits.run::<D>(crew))
 }
 
 fn collect<const D: usize, const N: usize>(orbits: &[Option<Exponents<D, N>>]) -> Table {
@@ -99,28 +103,37 @@ fn lyapunov<'py>(
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::from_python(model)?.filled();
     let options = LyapunovOptions { time, transient, goal, tolerance: Tolerance { rtol, atol } };
     let rows = jobs::values(&model, &values)?;
     let jobs = Jobs::new(threads, &progress);
-    let (table, width, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
-        let starts = jobs::starts(&starts)?;
+    let (table, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
+        let starts = jobs::starts(&starts, family.idle())?;
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
         let dimension = starts[0].len();
         let (table, signal) = jobs.watch(py, |crew| table(&orbits, all, crew))?;
-        (table, if all { dimension } else { 1 }, dimension, signal)
+        (table, dimension, signal)
     });
     signal?;
     let count = table.time.len();
-    let wide = |values: Vec<f64>, width: usize| PyArray1::from_vec(py, values).reshape([count, width]);
+    let live = model.states().len();
+    let wide = |values: Vec<f64>, wanted: usize| {
+        let width = values.len() / count;
+        let cut = jobs::live(values, width, wanted);
+        PyArray1::from_vec(py, cut).reshape([count, wanted])
+    };
+    let wanted = if all { live } else { 1 };
+    // Of idle states: the rows at the end, then the columns.
+    let product =
+        jobs::live(jobs::live(table.product, dimension * dimension, live * dimension), dimension, live);
     let dict = PyDict::new(py);
-    dict.set_item("value", wide(table.value, width)?)?;
-    dict.set_item("standard_error", wide(table.standard_error, width)?)?;
+    dict.set_item("value", wide(table.value, wanted)?)?;
+    dict.set_item("standard_error", wide(table.standard_error, wanted)?)?;
     dict.set_item("time", PyArray1::from_vec(py, table.time))?;
-    dict.set_item("mean", wide(table.mean, dimension)?)?;
-    dict.set_item("product", PyArray1::from_vec(py, table.product).reshape([count, dimension, dimension])?)?;
-    dict.set_item("end", wide(table.end, dimension)?)?;
+    dict.set_item("mean", wide(table.mean, live)?)?;
+    dict.set_item("product", PyArray1::from_vec(py, product).reshape([count, live, live])?)?;
+    dict.set_item("end", wide(table.end, live)?)?;
     dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
     Ok(dict)
 }
@@ -136,19 +149,21 @@ fn frames<'py>(
     rtol: f64,
     atol: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::from_python(model)?.filled();
     let tolerance = Tolerance { rtol, atol };
     let (states, growth, covariant, dimension) = with_wide_model!(tangents: &model, |family, values| {
-        let x0 = state(&state0)?;
+        let x0 = state(&state0, family.idle())?;
         let found = interrupt::run(py, |stop| follow(family, values, x0, (dt, count), &tolerance, stop))?;
         let flat = found.covariant.as_flattened().as_flattened().to_vec();
         (found.states.into_flattened(), found.growth.into_flattened(), flat, x0.len())
     });
     let dict = PyDict::new(py);
-    dict.set_item("states", PyArray1::from_vec(py, states).reshape([count + 1, dimension])?)?;
-    dict.set_item("growth", PyArray1::from_vec(py, growth).reshape([count, dimension])?)?;
-    let covariant = PyArray1::from_vec(py, covariant).reshape([count + 1, dimension, dimension])?;
-    dict.set_item("covariant", covariant)?;
+    let live = model.states().len();
+    let cut = |numbers| PyArray1::from_vec(py, jobs::live(numbers, dimension, live));
+    dict.set_item("states", cut(states).reshape([count + 1, live])?)?;
+    dict.set_item("growth", cut(growth).reshape([count, live])?)?;
+    let covariant = jobs::live(covariant, dimension * dimension, live * dimension);
+    dict.set_item("covariant", cut(covariant).reshape([count + 1, live, live])?)?;
     Ok(dict)
 }
 
@@ -165,12 +180,12 @@ fn follow<F: Family<D>, const D: usize>(
     let system: &dyn AnySystem<Dual<f64, D>, D> = &family.build(&wide);
     if let Some(tape) = &rows::tape(family, &[values.to_vec()]) {
         let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
-        match frames_of(system, method, x0, span, tolerance, stop) {
+        match frames_of(system, method, (x0, family.idle()), span, tolerance, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             found => return found,
         }
     }
-    frames_of(system, Dopri5::default(), x0, span, tolerance, stop)
+    frames_of(system, Dopri5::default(), (x0, family.idle()), span, tolerance, stop)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

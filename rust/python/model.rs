@@ -49,19 +49,20 @@ macro_rules! with_model {
 }
 pub(crate) use with_model;
 
-/// The same for work on packets and tangents, which takes long to compile: not for friction by bristles and
-/// numbers of states that are rarely wanted there.
+/// The same for work on packets and tangents, which takes long to compile: not for friction by bristles, and of
+/// [filled](AnyModel::filled) models.
 ///
 /// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
 /// own. Of `starts`, own models have theirs, too; `alone` is the type that single runs are compiled for.
 macro_rules! with_wide_model {
     (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
-        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family) Three($family) Four($family))
+        $crate::python::model::with_wide_model!(@ $model, $values, $body,
+            Two($family) Three($family) Four($family) Six($family))
     };
     (packets: $model:expr, |$family:ident, $values:ident| $body:expr) => {
         $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family)
             Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
-            Four($family))
+            Four($family) Six($family))
     };
     (starts: $model:expr, |$family:ident, $alone:ident, $values:ident| $body:expr) => {
         match $model {
@@ -80,6 +81,10 @@ macro_rules! with_wide_model {
             }
             $crate::python::model::AnyModel::Four($alone @ $crate::model::Either::Second($family), $values) => $body,
             $crate::python::model::AnyModel::Four($family, $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Six($family, $values) => {
                 let $alone = $family;
                 $body
             }
@@ -172,7 +177,7 @@ impl AnyModel {
         Ok(model)
     }
 
-    /// The names of the state's components, and which of them are angles, which may grow without end.
+    /// The names of the state's components that are not idle, and which of them are angles, which may grow without end.
     pub fn states(&self) -> Vec<(String, bool)> {
         let names: &[&str] = match self {
             AnyModel::Three(Either::First(_), _) => &["omega", "y", "z"],
@@ -190,16 +195,19 @@ impl AnyModel {
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
     }
 
+    /// With idle states up to a number that analyses are compiled for: own models of one state as if there were two, those
+    /// of five as if there were six.
+    pub fn filled(self) -> Self {
+        match self {
+            AnyModel::One(family, values) => AnyModel::Two(Either::Second(family.filled()), values),
+            AnyModel::Five(Either::Second(family), values) => AnyModel::Six(family.filled(), values),
+            other => other,
+        }
+    }
+
     /// Why it is for `udd.simulate` only.
     pub fn too_much(&self) -> PyErr {
-        ModelError::new_err(match self {
-            AnyModel::Five(Either::First(_), _) | AnyModel::BristledPendulum(..) => {
-                "friction with the treatment lugre is for udd.simulate; here take set-valued"
-            }
-            _ => {
-                "a model of your own with 1, 5 or 6 states is for udd.simulate and udd.equilibria; here it needs 2 to 4"
-            }
-        })
+        ModelError::new_err("friction with the treatment lugre is for udd.simulate; here take set-valued")
     }
 
     /// Whether it is the user's own.
@@ -356,11 +364,13 @@ fn formula_bodies(name: &str, spec: FormulaSpec) -> PyResult<Vec<&'static str>> 
     Ok(formula(name, &spec)?.bodies().iter().map(|body| body.name()).collect())
 }
 
-/// The state as an array of the dimension asked for.
-pub fn state<const D: usize>(values: &[f64]) -> PyResult<[f64; D]> {
-    values
-        .try_into()
-        .map_err(|_| ModelError::new_err(format!("the state needs {D} numbers, not {}", values.len())))
+/// The state as an array of the dimension asked for, of which the last `idle` components are zero.
+pub fn state<const D: usize>(values: &[f64], idle: usize) -> PyResult<[f64; D]> {
+    let wanted = D - idle;
+    if values.len() != wanted {
+        return Err(ModelError::new_err(format!("the state needs {wanted} numbers, not {}", values.len())));
+    }
+    Ok(std::array::from_fn(|n| values.get(n).copied().unwrap_or(0.0)))
 }
 
 /// Whether the model's solutions have power series, which the Taylor method needs.

@@ -144,7 +144,7 @@ fn sections<'py>(
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::from_python(model)?.filled();
     if section.is_empty() || section.len() > usize::from(u8::MAX) || section.len() != direction.len() {
         let (sections, directions) = (section.len(), direction.len());
         let message = format!("{sections} sections with {directions} directions cannot be used");
@@ -156,14 +156,15 @@ fn sections<'py>(
     let (names, angles): (Vec<String>, Vec<bool>) = model.states().into_iter().unzip();
     let rows = jobs::values(&model, &values)?;
     let watched = Jobs::new(threads, &progress);
-    let (table, signal) = with_wide_model!(packets: &model, |family, _values| {
+    let (table, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
         let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
         let pairs = section.iter().zip(&direction);
         let surfaces = pairs.map(|(text, &direction)| parse(text, direction, &names, &parameters));
         let surfaces = surfaces.collect::<PyResult<Vec<_>>>()?;
-        let starts = jobs::starts(&starts)?;
+        let starts = jobs::starts(&starts, family.idle())?;
         jobs::agree(rows.len(), starts.len())?;
-        let table = Table::new(rows.len().max(starts.len()), count, names.len())?;
+        let dimension = starts[0].len();
+        let table = Table::new(rows.len().max(starts.len()), count, dimension)?;
         let sections = Sections {
             family,
             values: &rows,
@@ -172,20 +173,22 @@ fn sections<'py>(
             skip,
             count,
             end: t_max,
-            bounded: std::array::from_fn(|n| !angles[n]),
+            bounded: std::array::from_fn(|n| angles.get(n) == Some(&false)),
             tolerance: Tolerance { rtol, atol },
         };
-        watched.watch(py, |crew| collect(&sections, table, crew))?
+        let (table, signal) = watched.watch(py, |crew| collect(&sections, table, crew))?;
+        (table, dimension, signal)
     });
     jobs::lost(py, signal, &table.outcome)?;
-    let (jobs, count) = (table.outcome.len(), table.count);
+    let (runs, count) = (table.outcome.len(), table.count);
     let dict = PyDict::new(py);
-    dict.set_item("points", PyArray1::from_vec(py, table.points).reshape([jobs, count, names.len()])?)?;
-    dict.set_item("t", PyArray1::from_vec(py, table.t).reshape([jobs, count])?)?;
-    dict.set_item("which", PyArray1::from_vec(py, table.which).reshape([jobs, count])?)?;
+    let cut = |numbers| PyArray1::from_vec(py, jobs::live(numbers, dimension, names.len()));
+    dict.set_item("points", cut(table.points).reshape([runs, count, names.len()])?)?;
+    dict.set_item("t", PyArray1::from_vec(py, table.t).reshape([runs, count])?)?;
+    dict.set_item("which", PyArray1::from_vec(py, table.which).reshape([runs, count])?)?;
     dict.set_item("found", PyArray1::from_vec(py, table.found))?;
     dict.set_item("residual", PyArray1::from_vec(py, table.residual))?;
-    dict.set_item("end", PyArray1::from_vec(py, table.end).reshape([jobs, names.len()])?)?;
+    dict.set_item("end", cut(table.end).reshape([runs, names.len()])?)?;
     dict.set_item("t_end", PyArray1::from_vec(py, table.t_end))?;
     dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
     Ok(dict)

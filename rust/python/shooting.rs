@@ -30,7 +30,7 @@ fn shoot<'py>(
     rtol: f64,
     atol: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::from_python(model)?.filled();
     let tolerance = Tolerance { rtol, atol };
     let rows = jobs::values(&model, &values)?;
     let (t, spans) = (t.as_slice()?, spans.as_slice()?);
@@ -40,7 +40,7 @@ fn shoot<'py>(
         )));
     }
     let (flown, dimension) = with_wide_model!(tangents: &model, |family, _values| {
-        let starts = jobs::starts(&starts)?;
+        let starts = jobs::starts(&starts, family.idle())?;
         if [rows.len(), t.len(), spans.len()] != [starts.len(); 3] {
             return Err(ModelError::new_err("pieces need as many parameters, times and spans as starts"));
         }
@@ -51,14 +51,17 @@ fn shoot<'py>(
         (run(py, family, &list, &wanted, &tolerance)?, starts[0].len())
     });
     let dict = PyDict::new(py);
-    let set = |name: &str, values: Vec<f64>, shape: &[usize]| {
-        dict.set_item(name, PyArray1::from_vec(py, values).reshape(shape.to_vec())?)
+    let (count, live) = (t.len(), model.states().len());
+    let set = |name: &str, values: Vec<f64>, width: usize, shape: &[usize]| {
+        let rows = jobs::live(values, dimension * width, live * width);
+        dict.set_item(name, PyArray1::from_vec(py, rows).reshape(shape.to_vec())?)
     };
-    let count = t.len();
-    set("x", flown.x, &[count, dimension])?;
-    set("by_state", flown.by_state, &[count, dimension, dimension])?;
-    set("by_parameter", flown.by_parameter, &[count, dimension, MOST_PARAMETERS])?;
-    set("rate", flown.rate, &[count, dimension])?;
+    // Of idle states the columns here, the rows in `set`.
+    let by_state = jobs::live(flown.by_state, dimension, live);
+    set("x", flown.x, 1, &[count, live])?;
+    set("by_state", by_state, live, &[count, live, live])?;
+    set("by_parameter", flown.by_parameter, MOST_PARAMETERS, &[count, live, MOST_PARAMETERS])?;
+    set("rate", flown.rate, 1, &[count, live])?;
     Ok(dict)
 }
 
@@ -103,7 +106,7 @@ fn expansion<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
     let (d, rate, by_state, by_parameter, surfaces, more) = with_model!(&model, |family, values| {
-        let x = state(&x)?;
+        let x = state(&x, family.idle())?;
         let found = linear(family, values, t, &x);
         let more = if all { higher(family, values, t, &x) } else { Default::default() };
         let by_state = found.by_state.as_flattened().to_vec();

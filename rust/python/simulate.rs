@@ -195,7 +195,7 @@ fn simulate<'py>(
     let times: Option<Vec<f64>> = times.map(|t| t.as_slice().map(<[f64]>::to_vec)).transpose()?;
     let output = times.as_deref().map_or(Output::Steps(0.0, end), Output::At);
     let flat = with_model!(&model, |family, values| {
-        let x0 = state(&state0)?;
+        let x0 = state(&state0, family.idle())?;
         if family.build(values).wall(&x0).is_some_and(|value: f64| value <= 0.0) {
             let message = "the initial state lies outside the disk: Y^2 + Z^2 must be below R^2 (or use edge=\"ignore\")";
             return Err(ModelError::new_err(message));

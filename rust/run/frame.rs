@@ -6,13 +6,17 @@ use crate::model::System;
 use crate::scalar::{Dual, Instructions, Isa, Mask, Real, Work};
 use crate::unroll::{unroll, vector};
 
-/// The state with `N` orthonormal tangents that no symmetry singles out.
-pub fn tangents<R: Real, const D: usize, const N: usize>(x: [f64; D]) -> [Dual<R, N>; D] {
+/// The state with `N` orthonormal tangents that no symmetry singles out. The last `idle` states are apart from the
+/// others: of as many tangents as there are states the last ones are along them.
+pub fn tangents<R: Real, const D: usize, const N: usize>(x: [f64; D], idle: usize) -> [Dual<R, N>; D] {
     let mut frame = vector!(Dual<R, N>, D; n => Dual::fixed(R::constant(x[n])));
     for n in 0..D {
         for i in 0..N {
             // Any numbers without a pattern.
-            let d = ((n * N + i + 1) as f64 * 1.618).sin() + if n == i { 1.5 } else { 0.0 };
+            let d = match n.max(i) < D - idle {
+                true => ((n * N + i + 1) as f64 * 1.618).sin() + if n == i { 1.5 } else { 0.0 },
+                false => f64::from(u8::from(n == i)),
+            };
             frame[n].d[i] = R::constant(d);
         }
     }

@@ -20,7 +20,7 @@ pub struct Frames<const D: usize> {
     pub covariant: Vec<[[f64; D]; D]>,
 }
 
-/// Follows an orbit from `x0` for `count` intervals of length `dt`.
+/// Follows an orbit from `x0` for `count` intervals of length `dt`. The last `idle` states only fill up the number.
 ///
 /// In each interval the frame is multiplied by the flow's derivative and made orthonormal again, which
 /// leaves a triangular matrix. Run backwards through these, almost any vectors of the spans of the first 1,
@@ -32,7 +32,7 @@ pub struct Frames<const D: usize> {
 pub fn frames<M, K, const D: usize>(
     system: M,
     method: K,
-    x0: [f64; D],
+    (x0, idle): ([f64; D], usize),
     (dt, count): (f64, usize),
     tolerance: &Tolerance,
     stop: &Stop,
@@ -42,7 +42,7 @@ where
     K: Method<Dual<f64, D>, D>,
 {
     let norm = WithTangents(*tolerance);
-    let start = tangents(x0);
+    let start = tangents(x0, idle);
     let mut driver = Driver::by(method, system, 0.0, start, None, &norm).with_wall();
     let mut states = vec![x0];
     let mut bases = vec![matrix(&start)];

@@ -81,7 +81,7 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
         Start {
             values: rows::of::<Vec<f64>>(self.values, orbit),
             t: 0.0,
-            x: tangents(x),
+            x: tangents(x, self.family.idle()),
             end: if self.options.transient > 0.0 { self.options.transient } else { self.options.time },
         }
     }

@@ -2,7 +2,7 @@
 
 use super::Stop;
 use super::parallel::try_map;
-use crate::integrate::{Dop853, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
+use crate::integrate::{Dop853, Dopri5, Driver, Failure, Method, Taylor, Tolerance, WithTangents, order};
 use crate::model::{AnySystem, Family};
 use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
@@ -10,12 +10,13 @@ use crate::unroll::vector;
 
 /// So many parameters can be differentiated by at once.
 pub const MOST_PARAMETERS: usize = 2;
-/// Directions of the derivatives: the state's components, of which there are at most four, then parameters.
-const DIRECTIONS: usize = 4 + MOST_PARAMETERS;
+/// So many derivatives one run carries: by the components of the state, then by parameters. Where a state has more than
+/// four components parameters take a run of their own.
+const DIRECTIONS: usize = 6;
 /// More steps than this within one piece mean that something is wrong.
 const MOST_STEPS: u64 = 1_000_000;
 
-/// A number and its derivatives by the state at a piece's start and by the parameters.
+/// A number and its derivatives.
 type Number = Dual<f64, DIRECTIONS>;
 
 /// Where a piece of an orbit starts: its parameters, its time and state, and how long it lasts.
@@ -54,49 +55,70 @@ pub fn pieces<F: Family<D>, const D: usize>(
     tolerance: &Tolerance,
     stop: &Stop,
 ) -> Result<Vec<Flown<D>>, Failure> {
-    const { assert!(D + MOST_PARAMETERS <= DIRECTIONS) };
+    const { assert!(D <= DIRECTIONS && MOST_PARAMETERS <= DIRECTIONS) };
     // What is differentiated by stays open even where it vanishes.
     let all = |p: usize| pieces.iter().all(|piece| piece.values[p] == 0.0) && !wanted.contains(&p);
     let width = pieces.first().map_or(0, |piece| piece.values.len());
     let known: Vec<_> = (0..width).map(|p| all(p).then_some(0.0)).collect();
     let tape = Tape::record(family, &known).ok();
-    try_map(pieces.len(), &|i| one(family, &pieces[i], wanted, (tape.as_ref(), tolerance), stop))
+    let together = D + MOST_PARAMETERS <= DIRECTIONS;
+    try_map(pieces.len(), &|i| {
+        let piece = &pieces[i];
+        let with =
+            |by_state, wanted| one(family, piece, (by_state, wanted), (tape.as_ref(), tolerance), stop);
+        if together || wanted.is_empty() {
+            return with(true, wanted);
+        }
+        let by_parameter = with(false, wanted)?.by_parameter;
+        Ok(Flown { by_parameter, ..with(true, &[])? })
+    })
 }
 
+/// One piece with derivatives by its start, where asked for, and then by parameters.
 fn one<F: Family<D>, const D: usize>(
     family: &F,
     piece: &Piece<D>,
-    wanted: &[usize],
+    (by_state, wanted): (bool, &[usize]),
     (tape, tolerance): (Option<&Tape<D>>, &Tolerance),
     stop: &Stop,
 ) -> Result<Flown<D>, Failure> {
+    let first = if by_state { D } else { 0 };
     let mut values: Vec<Number> = constants(&piece.values);
     for (i, &p) in wanted.iter().enumerate() {
-        values[p] = Dual::variable(piece.values[p], D + i);
+        values[p] = Dual::variable(piece.values[p], first + i);
     }
     let system = family.build(&values);
     let system: &dyn AnySystem<Number, D> = &system;
     if let Some(tape) = tape {
         let method = Taylor::new(tape, values, order(tolerance), Isa::best());
-        match follow(method, system, piece, tolerance, stop) {
+        match follow(method, system, piece, first, tolerance, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             flown => return flown,
         }
     }
-    follow(Dop853::default(), system, piece, tolerance, stop)
+    // Of many states the method that is compiled for their exponents.
+    if const { D > 4 } {
+        follow(Dopri5::default(), system, piece, first, tolerance, stop)
+    } else {
+        follow(Dop853::default(), system, piece, first, tolerance, stop)
+    }
 }
 
 fn follow<K, const D: usize>(
     method: K,
     system: &dyn AnySystem<Number, D>,
     piece: &Piece<D>,
+    first: usize,
     tolerance: &Tolerance,
     stop: &Stop,
 ) -> Result<Flown<D>, Failure>
 where
     K: Method<Number, D>,
 {
-    let start = vector!(Number, D; n => Dual::variable(piece.x[n], n));
+    // Where derivatives by the start are asked for, those by parameters come after them.
+    let variable =
+        |n: usize| if n < first { Dual::variable(piece.x[n], n) } else { Dual::constant(piece.x[n]) };
+    let start = vector!(Number, D; n => variable(n));
     let end = piece.t + piece.span;
     let norm = WithTangents(*tolerance);
     let mut driver = Driver::by(method, system, piece.t, start, Some(piece.span), &norm);
@@ -117,8 +139,9 @@ where
     };
     for n in 0..D {
         flown.x[n] = x[n].re;
-        flown.by_state[n].copy_from_slice(&x[n].d[..D]);
-        flown.by_parameter[n].copy_from_slice(&x[n].d[D..D + MOST_PARAMETERS]);
+        flown.by_state[n][..first].copy_from_slice(&x[n].d[..first]);
+        let left = MOST_PARAMETERS.min(DIRECTIONS - first);
+        flown.by_parameter[n][..left].copy_from_slice(&x[n].d[first..first + left]);
         flown.rate[n] = rate[n].re;
     }
     Ok(flown)

@@ -37,7 +37,10 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--state", metavar="X,X,X", help="state near the cycle (default: run until it settles)"
     )
-    parser.add_argument("--period", type=float, help="about the cycle's period (default: found)")
+    parser.add_argument(
+        "--period",
+        help="about the cycle's period (default: found); of a forced model the forcing's, also as a formula",
+    )
     parser.add_argument(
         "--born", type=int, default=0, metavar="N", help="follow branches born on the way, N generations"
     )
@@ -97,7 +100,7 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
     else:
         guess = None if args.state is None else numbers([args.state], "--state")
         try:
-            starts.append(periodic_orbit(model, guess, period=args.period))
+            starts.append(periodic_orbit(model, guess, period=_period(args.period)))
         except ModelError as error:
             raise ModelError(
                 f"{error} (a cycle at {args.parameter} = {model.parameters[args.parameter]:g} is wanted: "
@@ -117,6 +120,14 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
             bounds=bounds,
             most=args.most,
         )
+
+
+def _period(text: str | None) -> float | str | None:
+    """A number, or a formula of the parameters."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str, Any], str]:

@@ -3,27 +3,33 @@
 from .branch import BifurcationPoint, Branch
 from .branches import continuation
 from .cascades import Cascade, cascade
-from .connections import Connection, connection
+from .connecting import Connection, connection
+from .connection_search import Connections, connections
 from .diagrams import Diagram, diagram
 from .loci import Locus, locus
 from .orbits import periodic_orbit
 from .rests import equilibria
 from .solutions import Equilibrium, PeriodicOrbit
+from .survival import Lifetimes, lifetimes
 
 __all__ = [
     "BifurcationPoint",
     "Branch",
     "Cascade",
     "Connection",
+    "Connections",
     "Diagram",
     "Equilibrium",
+    "Lifetimes",
     "Locus",
     "PeriodicOrbit",
     "cascade",
     "connection",
+    "connections",
     "continuation",
     "diagram",
     "equilibria",
+    "lifetimes",
     "locus",
     "periodic_orbit",
 ]

@@ -14,9 +14,11 @@ from udd.errors import ModelError
 from udd.models import Model, beyond_the_edge
 
 from .branch import AnyCurve, BifurcationPoint, Branch
-from .cycle_curve import CycleCurve
+from .cycle_curve import HELD, CycleCurve
+from .family_curve import PERIOD, Conserved, FamilyCurve
 from .flow import Flow, flow_of
 from .following import Limits, Way, follow
+from .forcing import require_period
 from .path import Lost, Place, along_parameter, correct, tangent_at
 from .rest_curve import RestCurve
 from .signs import Signs
@@ -48,7 +50,9 @@ def continuation(
         point the branch that is born there is followed (of a Hopf bifurcation the cycles, of a period
         doubling those of twice the period, ...), away from it.
     parameter : str, optional
-        One of ``model.parameters``; by default that of the bifurcation point.
+        One of ``model.parameters``; by default that of the bifurcation point. Of cycles of a conservative
+        model also ``"period"``, or the formula of a conserved quantity such as ``"v^2/2 - cos(x)"``: cycles
+        come in families over it while all parameters stay.
     bounds : (float, float)
         The branch ends where the parameter leaves them.
     direction : {"both", "up", "down"}
@@ -97,6 +101,13 @@ def continuation(
     >>> branch = udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (6.5, 12.0))
     >>> [(point.kind, round(point.value, 9)) for point in branch.points]
     [('symmetry breaking', 7.096426431)]
+
+    The swings of a pendulum, from small ones to those that nearly stand upside down:
+
+    >>> swings = udd.Model(["x", "v"], ["v", "-sin(x)"])
+    >>> family = udd.continuation(udd.periodic_orbit(swings, [1.0, 0.0]), "v^2/2 - cos(x)", (-0.999, 0.99))
+    >>> print(family.periods[[0, -1]].round(6))
+    [ 6.283971 16.15703 ]
     """
     if isinstance(start, BifurcationPoint):
         parameter = start.parameter if parameter is None else parameter
@@ -164,9 +175,16 @@ def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[
 
 def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, Place]:
     """The curve through a solution, and the place there."""
-    flow: Flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state))
-    index = flow.index(parameter)
-    value = float(flow.values[index])
+    made = start._curve if isinstance(start, PeriodicOrbit) else None
+    forcing = None if made is None else made.flow.forcing
+    flow: Flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
+    family = isinstance(start, PeriodicOrbit) and parameter not in flow.names
+    if family and forcing is not None:
+        raise ModelError(f"a forced cycle is followed over a parameter, not over {parameter}")
+    index = HELD if family else flow.index(parameter)
+    if forcing is not None:
+        require_period(flow.model, forcing, flow.kept, flow.size, parameter)
+    value = 0.0 if family else float(flow.values[index])
     curve: AnyCurve
     if isinstance(start, Equilibrium):
         scale = abs(value) or 1.0
@@ -175,16 +193,19 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, P
     else:
         if start._curve is None or start._unknowns is None:
             raise ModelError("this cycle was not made by udd.periodic_orbit")
-        old = start._curve
-        curve = replace(
-            old,
-            flow=replace(old.flow, model=flow.model),
-            values=flow.values,
-            parameter=index,
-            scale=abs(value) or 1.0,
-            clock=old.span(start._unknowns),
-        )
-        u = curve.pack(old.nodes(start._unknowns), old.span(start._unknowns), value)
+        old, span = start._curve, start._curve.span(start._unknowns)
+        nodes = old.nodes(start._unknowns)
+        own = replace(old.flow, model=flow.model)
+        kept = Conserved.of(own, parameter) if family and parameter != PERIOD else None
+        if kept is not None:
+            value = kept.at(own, nodes[0])[0]
+        scale = abs(value) or 1.0
+        where = old.mirror, old.shift, old.reference, old.across, old.share
+        common = own, flow.values, index, scale, span, old.pieces, *where
+        curve = FamilyCurve(*common, conserved=kept) if family else CycleCurve(*common)
+        u = curve.pack(nodes, span, value)
+        if isinstance(curve, FamilyCurve):
+            curve.require_one(u)
         curve.fix_phase(u)
     row = along_parameter(u)
     try:

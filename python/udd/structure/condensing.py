@@ -24,13 +24,16 @@ class CyclicEquations:
     after : float
     both : ndarray, shape (m, r, 2)
     phase : ndarray, shape (r,)
-        The last row: of the first node's components.
+        The last row: of the first node's components,
+    last : ndarray, shape (2,)
+        and of the two numbers.
     """
 
     pieces: Floats
     after: float
     both: Floats
     phase: Floats
+    last: Floats
 
     def toarray(self) -> Floats:
         """The matrix (m r + 1, m r + 2)."""
@@ -42,7 +45,7 @@ class CyclicEquations:
         matrix = np.zeros((m * r + 1, m * r + 2))
         matrix[:-1, :-2] = dense.reshape(m * r, m * r)
         matrix[:-1, -2:] = self.both.reshape(m * r, 2)
-        matrix[-1, :r] = self.phase
+        matrix[-1, :r], matrix[-1, -2:] = self.phase, self.last
         return matrix
 
     def solve(self, row: Floats, right: Floats) -> Floats:
@@ -89,7 +92,7 @@ class CyclicEquations:
             x[where[1::2]] = -np.linalg.solve(t, right_sides)
         small = np.zeros((r + 2, r + 3))
         small[:r, :r], small[:r, r:] = begin[0] + end[0], rest[0]
-        small[r, :r], small[r, r + 2] = self.phase, right[-2]
+        small[r, :r], small[r, r : r + 2], small[r, r + 2] = self.phase, self.last, right[-2]
         small[r + 1] = row[:-2] @ x[:m].reshape(m * r, r + 3)
         small[r + 1, r : r + 2] += row[-2:]
         small[r + 1, r + 2] += right[-1]

@@ -31,7 +31,8 @@ class CycleCurve:
 
     The orbit is cut into pieces of equal time. What comes out of the last one, seen in the mirror where
     `mirror` has signs and turned by `shift`, must be where the first one starts: a symmetric cycle is
-    followed over half its period. The phase is fixed by the plane through a reference across its flow.
+    followed over half its period. The phase is fixed by the plane through a reference across its flow; that
+    of a forced model by the time, and instead the orbit lasts as long as the forcing says.
 
     Attributes
     ----------
@@ -50,6 +51,8 @@ class CycleCurve:
         What is added at the end: turns of angles.
     reference, across : ndarray (r,)
         The plane that the first node lies in.
+    share : float
+        Of a forced model: after how many of the forcing's periods the orbit closes.
     """
 
     flow: Flow
@@ -62,6 +65,7 @@ class CycleCurve:
     shift: Floats
     reference: Floats
     across: Floats
+    share: float = 1.0
     loose: float = 1.0
     seen: tuple[Floats, Flight] | None = field(default=None, init=False)
 
@@ -107,9 +111,17 @@ class CycleCurve:
 
     def fix_phase(self, u: Floats) -> None:
         """Take this orbit's first node for the reference."""
+        if self.flow.forcing is not None:
+            return
         self.reference = self.nodes(u)[0]
         rate = self.rate_at(self.values_at(u), self.reference)
         self.across = rate / np.linalg.norm(rate / self.flow.size) / self.flow.size**2
+
+    def begins(self, u: Floats) -> Floats:
+        """When the pieces begin (m,); always at 0 where the law does not ask."""
+        if self.flow.forcing is None:
+            return np.zeros(self.pieces)
+        return np.linspace(0.0, self.span(u), self.pieces, endpoint=False)
 
     def rate_at(self, values: Floats, x: Floats) -> Floats:
         """The rate at a reduced state."""
@@ -121,7 +133,7 @@ class CycleCurve:
         if self.seen is None or not np.array_equal(self.seen[0], u):
             spans = np.full(self.pieces, self.span(u) / self.pieces)
             wanted = () if self.parameter == HELD else (self.parameter,)
-            found = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, loose=self.loose)
+            found = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, self.loose, self.begins(u))
             self.seen = u.copy(), found
         return self.seen[1]
 
@@ -138,7 +150,19 @@ class CycleCurve:
         by_state = found.by_state * turn[:, :, None] * size / size[:, None] / weight
         by_span = found.rate * turn / size * (self.clock / m)
         by_value = found.by_parameter[:, :, 0] * turn / size * self.scale
-        phase = float(self.across @ (nodes[0] - self.reference))
+        forcing = self.flow.forcing
+        if forcing is None:
+            phase, first = float(self.across @ (nodes[0] - self.reference)), self.across * size / weight
+            last = np.zeros(2)
+        else:
+            # A later piece also begins later, by as much as those before it take longer.
+            rates = self._rates_at_nodes(u)
+            moved = found.rate - np.einsum("mij,mj->mi", found.by_state, rates)
+            by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
+            period, by_values = forcing.period(self.values_at(u))
+            phase, first = (self.span(u) - self.share * period) / self.clock, np.zeros(r)
+            by_own = 0.0 if self.parameter == HELD else float(by_values[self.parameter])
+            last = np.array([1.0, -self.share * by_own * self.scale / self.clock])
         residual = np.append(gaps.ravel(), phase)
         n = m * r
         if n <= _DENSE:
@@ -148,10 +172,15 @@ class CycleCurve:
                 dense[rows, rows] += by_state[i]
                 dense[rows, after : after + r] -= np.eye(r) / weight
             dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
-            dense[n, :r] = self.across * size / weight
+            dense[n, :r], dense[n, n:] = first, last
             return residual, dense
         both = np.stack([by_span, by_value], axis=2)
-        return residual, CyclicEquations(by_state, 1.0 / weight, both, self.across * size / weight)
+        return residual, CyclicEquations(by_state, 1.0 / weight, both, first, last)
+
+    def _rates_at_nodes(self, u: Floats) -> Floats:
+        model = self.flow.with_values(self.values_at(u))
+        rates: Floats = model.rates(self.begins(u), self.flow.full(self.nodes(u)))[:, self.flow.kept]
+        return rates
 
     def closing(self, u: Floats) -> Floats:
         """The derivative (r, r) of the map from the first node to where the orbit closes."""
@@ -164,11 +193,14 @@ class CycleCurve:
         """The pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
 
         Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
+        Of a forced model's all are those of the stroboscopic map: the whole derivatives (m, r, r).
         """
         size, found = self.flow.size, self.flight(u)
         turn = np.ones((self.pieces, self.flow.dim))
         turn[-1] = self.mirror
         scaled = found.by_state * turn[:, :, None] * size / size[:, None]
+        if self.flow.forcing is not None:
+            return np.ascontiguousarray(scaled)
         # Where one piece ends the next begins, in the same plane.
         after = _planes(found.rate * turn / size)
         before = np.roll(after, 1, axis=0)

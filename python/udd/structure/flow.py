@@ -14,6 +14,8 @@ from udd.branching.coordinates import coordinates_of
 from udd.errors import ModelError
 from udd.models import Model, require_model
 
+from .forcing import Forcing, mirror_of, require_period
+
 __all__ = ["Flight", "Floats", "Flow", "flow_of"]
 
 Floats = NDArray[np.float64]
@@ -49,7 +51,9 @@ class Flow:
     clock : float
         A typical time.
     mirror : ndarray (r,) or None
-        The signs of the model's symmetry, if it has one.
+        The signs of the model's symmetry, if it has one; of a forced model's, half a period later.
+    forcing : Forcing or None
+        The period of the rates where they depend on time.
     rtol, atol : float
         Tolerances of the runs; `atol` is relative to the sizes.
     """
@@ -59,6 +63,7 @@ class Flow:
     size: Floats
     clock: float
     mirror: Floats | None
+    forcing: Forcing | None = None
     rtol: float = 1e-13
     atol: float = 1e-15
     _made: dict[bytes, Model] = field(default_factory=dict, repr=False)
@@ -105,17 +110,24 @@ class Flow:
         return state
 
     def fly(
-        self, values: Floats, x: Floats, spans: Floats, wanted: tuple[int, ...] = (), loose: float = 1.0
+        self,
+        values: Floats,
+        x: Floats,
+        spans: Floats,
+        wanted: tuple[int, ...] = (),
+        loose: float = 1.0,
+        t: Floats | None = None,
     ) -> Flight:
         """Follow pieces from `x` (m, r), each for its span; `values` (p,) are the parameters of all.
 
-        `loose` multiplies the tolerances.
+        They begin at the times `t` (m,), by default at 0; `loose` multiplies the tolerances.
         """
         count = len(x)
+        begin = np.zeros(count) if t is None else t
         rows = np.tile(values, (count, 1))
         atol = self.atol * float(np.min(self.size)) * loose
         found = _core.shoot(
-            self.model, rows, self.full(x), np.zeros(count), spans, list(wanted), self.rtol * loose, atol
+            self.model, rows, self.full(x), begin, spans, list(wanted), self.rtol * loose, atol
         )
         kept = self.kept
         return Flight(
@@ -124,6 +136,13 @@ class Flow:
             found["by_parameter"][:, kept],
             found["rate"][:, kept],
         )
+
+    def fly_each(self, rows: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
+        """Where orbits from `x` (m, r), each with its own parameters `rows` (m, p), are after `spans`."""
+        atol = self.atol * float(np.min(self.size)) * loose
+        begin = np.zeros(len(x))
+        ends = _core.shoot(self.model, rows, self.full(x), begin, spans, [], self.rtol * loose, atol)["x"]
+        return np.ascontiguousarray(ends[:, self.kept])
 
     def with_values(self, values: Floats) -> Model:
         """The model with these parameters; made once for values that come several times in a row."""
@@ -134,13 +153,13 @@ class Flow:
         return self._made[key]
 
 
-def flow_of(model: Model, states: Floats, rtol: float = 1e-13) -> Flow:
+def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing | None = None) -> Flow:
     """The flow of a model near these states (n, dim).
 
     Raises
     ------
     ModelError
-        The rates depend on time, or the model has too few states.
+        The rates depend on time and no `forcing` is given, or do not repeat after its period.
     """
     require_model(model)
     # A component that happens to be small is no smaller than a tenth of the largest.
@@ -150,13 +169,18 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13) -> Flow:
     finite = np.where(np.isfinite(found.size), found.size, 1.0)
     probes = finite * np.random.default_rng(2).uniform(-0.9, 0.9, (8, len(finite)))
     now, later = (model.rates(np.full(8, t), probes) for t in (0.0, 0.7371 * found.clock))
-    if not np.array_equal(now, later):
-        raise ModelError(
-            "the rates depend on time: cycles and equilibria of such a model are those of one with the "
-            "forcing's phase as a state"
-        )
     kept = np.flatnonzero(np.isfinite(found.size))
+    if not np.array_equal(now, later):
+        if forcing is None:
+            raise ModelError(
+                "the rates depend on time: such a model has no equilibria, and for its cycles the forcing's "
+                "period is needed, as in periodic_orbit(model, guess, period='2*pi/w')"
+            )
+        require_period(model, forcing, kept, finite[kept])
+        period, _ = forcing.period(np.array(list(model.parameters.values())))
+        mirror = mirror_of(model, kept, finite[kept], period)
+        return Flow(model, kept, finite[kept], found.clock, mirror, forcing, rtol)
     mirror = found.mirrors[0][kept] if found.mirrors else None
     if mirror is not None and (mirror > 0).all():
         mirror = None
-    return Flow(model, kept, finite[kept], found.clock, mirror, rtol)
+    return Flow(model, kept, finite[kept], found.clock, mirror, None, rtol)

@@ -12,6 +12,7 @@ from udd.errors import IntegrationError
 
 from .branch import AnyCurve, BifurcationPoint, Branch
 from .cycle_curve import CycleCurve
+from .family_curve import FamilyCurve
 from .flow import Floats
 from .kinks import corner_ahead
 from .locating import error_of, found_between, point_at, rounding_of
@@ -123,7 +124,8 @@ def follow(curve: AnyCurve, start: Place, limits: Limits) -> Way:
                 return way
             # A new plane for the phase, and a finer mesh where the orbit has grown long.
             curve, there = _prepared(curve, there)
-            after = replace(after, fold=float(there.tangent[-1]))
+            if not isinstance(curve, FamilyCurve):
+                after = replace(after, fold=float(there.tangent[-1]))
         here, signs = there, after
         way.places.append((curve, here, signs, arclength))
         if isinstance(curve, CycleCurve) and (near := _connection(way)) is not None:
@@ -191,7 +193,8 @@ def _birth(curve: AnyCurve, place: Place, before: Place) -> str:
         return f"a branch point near {value:.5g}"
     size = float(np.ptp(curve.nodes(place.u) / curve.flow.size, axis=0).max())
     if size < _SHRUNK * float(np.ptp(curve.nodes(before.u) / curve.flow.size, axis=0).max()):
-        return f"a Hopf bifurcation near {value:.5g}"
+        what = "an equilibrium" if isinstance(curve, FamilyCurve) else "a Hopf bifurcation"
+        return f"{what} near {value:.5g}"
     kind = closes_earlier(curve, place.u)
     return f"{kind or 'a branch point'} near {value:.5g}"
 
@@ -222,9 +225,9 @@ def _prepared(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Place]:
     if 2 * wanted > 3 * m:
         times = -(-wanted // m)
         nodes, values = [curve.nodes(place.u)], curve.values_at(place.u)
-        share = np.full(m, curve.span(place.u) / (m * times))
-        for _ in range(times - 1):
-            nodes.append(flow.fly(values, nodes[-1], share).x)
+        share, begins = np.full(m, curve.span(place.u) / (m * times)), curve.begins(place.u)
+        for k in range(times - 1):
+            nodes.append(flow.fly(values, nodes[-1], share, t=begins + k * share).x)
         fine = replace(curve, pieces=m * times)
         packed = np.stack(nodes, axis=1).reshape(m * times, flow.dim)
         u = fine.pack(packed, curve.span(place.u), curve.value(place.u))

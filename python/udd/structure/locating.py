@@ -12,6 +12,7 @@ from udd.errors import IntegrationError
 
 from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
+from .family_curve import FamilyCurve
 from .flow import Floats
 from .multipliers import as_liouville
 from .path import Lost, Place, along_parameter, correct, nearest_of_family, tangent_at
@@ -80,7 +81,8 @@ def found_between(
             kind = "fold"
         elif name == "plus":
             # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
-            kind = "branch point" if abs(here.fold) > _STILL else "fold"
+            turns = abs(here.fold) <= _STILL and not isinstance(curve, FamilyCurve)
+            kind = "fold" if turns else "branch point"
         elif name == "minus":
             symmetric = isinstance(curve, CycleCurve) and curve.symmetric
             kind = "symmetry breaking" if symmetric else "period doubling"
@@ -115,7 +117,7 @@ def turning(curve: AnyCurve, a: Place, step: float, before: Signs, after: Signs)
             place = Place(u, tangent_at(curve, u, a.tangent))
         except Lost:
             break
-        sigma, fold = middle, float(place.tangent[-1])
+        sigma, fold = middle, signs_at(curve, place).fold
         if fold * low[1] > 0.0:
             low = (middle, fold)
         else:
@@ -138,7 +140,7 @@ def locate(curve: AnyCurve, a: Place, step: float, name: str) -> tuple[float, Pl
     cache: dict[float, Place] = {}
 
     def at(sigma: float) -> float:
-        u = correct(curve, a.u + sigma * a.tangent, a.tangent)
+        u = _beside(curve, a, sigma)
         cache[sigma] = Place(u, tangent_at(curve, u, a.tangent))
         return float(getattr(signs_at(curve, cache[sigma]), name))
 
@@ -146,6 +148,23 @@ def locate(curve: AnyCurve, a: Place, step: float, name: str) -> tuple[float, Pl
     if sigma not in cache:
         at(sigma)
     return sigma, cache[sigma]
+
+
+def _beside(curve: AnyCurve, a: Place, distance: float) -> Floats:
+    """The point of the curve at a distance from `a`.
+
+    Next to a branch point the equations leave a second direction free, in which rounding alone would move
+    Newton's method: there it takes the shortest steps.
+
+    Raises
+    ------
+    Lost
+    """
+    guess = a.u + distance * a.tangent
+    try:
+        return correct(curve, guess, a.tangent)
+    except Lost:
+        return nearest_of_family(curve, guess, a.tangent)
 
 
 def error_of(
@@ -160,7 +179,7 @@ def error_of(
         return _scatter(curve, a, sigma, place, step, name)
 
     def at(distance: float) -> tuple[float, Floats]:
-        u = correct(curve, a.u + distance * a.tangent, a.tangent)
+        u = _beside(curve, a, distance)
         there = Place(u, tangent_at(curve, u, a.tangent))
         return float(getattr(signs_at(curve, there), name)), np.array([curve.value(u), curve.period(u)])
 

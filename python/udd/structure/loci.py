@@ -14,6 +14,7 @@ from udd.errors import IntegrationError, ModelError
 from .branch import AnyCurve, BifurcationPoint
 from .branches import bounds_of
 from .cycle_curve import CycleCurve
+from .family_curve import FamilyCurve
 from .flow import Floats
 from .following import solution_at
 from .locating import frequency_of
@@ -126,6 +127,8 @@ def locus(
         raise ModelError("a bifurcation point of udd.continuation is needed")
     if point.kind not in FUNCTIONS or point.kind == "branch point":
         raise ModelError(f"a curve of points of the kind {point.kind} is not followed")
+    if isinstance(point._curve, FamilyCurve):
+        raise ModelError("points of a family of cycles are not followed over a second parameter")
     second = point._curve.flow.index(parameter)
     if second == point._curve.parameter:
         raise ModelError(f"the second parameter must be another than {parameter}")

@@ -30,7 +30,7 @@ class Multipliers:
 
     Attributes
     ----------
-    log : ndarray, shape (r - 1,)
+    log : ndarray, shape (r - 1,), of a forced model (r,)
         The logarithms of their absolute values, largest first.
     phases : ndarray of complex, shape (r - 1,)
         The values divided by these.
@@ -84,7 +84,11 @@ def as_liouville(curve: CycleCurve, u: Floats) -> bool:
         return True
     states = flow.reduced(orbit_states(curve, u))
     # The mean over equal distances of time around a period converges faster than any power of their number.
-    divergence = np.mean([np.trace(expansion(flow, values, x).by_state) for x in states])
+    times = np.arange(len(states)) * (curve.period(u) / len(states))
+    if flow.forcing is None:
+        times = np.zeros(len(states))
+    each = zip(states, times.tolist(), strict=True)
+    divergence = np.mean([np.trace(expansion(flow, values, x, t=t).by_state) for x, t in each])
     known = float(divergence) * curve.span(u)
     rough = _APART * max(1.0, abs(known)) + float(np.minimum(found.error, 1e3).sum())
     return bool(abs(float(found.log.sum()) - known) < rough)

@@ -19,6 +19,7 @@ from udd.trajectory import simulate
 
 from .cycle_curve import HELD, CycleCurve
 from .flow import Floats, Flow, flow_of
+from .forcing import forcing_of, repeats
 from .multipliers import multipliers_at
 from .path import Lost, along_parameter, correct, nearest_of_family
 from .solutions import PeriodicOrbit
@@ -45,7 +46,7 @@ def periodic_orbit(
     model: Model,
     guess: ArrayLike | xr.Dataset | None = None,
     *,
-    period: float | None = None,
+    period: float | str | None = None,
     settle: float | None = None,
     longest: float | None = None,
 ) -> PeriodicOrbit:
@@ -54,18 +55,22 @@ def periodic_orbit(
     Parameters
     ----------
     model : Model
-        Its rates must not depend on time. The disk's edge is ignored.
+        Where its rates depend on time they must be periodic, with the `period` given. The disk's edge is
+        ignored.
     guess : array_like, shape (dim,) or (n, dim), or xarray.Dataset, optional
         A state near the cycle, or states on it at equal distances of time over one period, which must then
         be given; or one attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
         ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``: its state, its period and the
         value of the parameter are taken. By default the search starts where :func:`udd.lyapunov` does.
-    period : float, optional
+    period : float or str, optional
         About its period. By default the run from the guess tells it: the first time that it comes back, or
-        nearly back, be it to the mirror image.
+        nearly back, be it to the mirror image. Of a forced model exactly the forcing's period, or a multiple
+        of it: a number, or a formula of the parameters such as ``"2*pi/w"``, by which it also changes along a
+        branch.
     settle : float, optional
         For so long the model is run from the guess before, to get near a stable cycle; by default 0, or 600
-        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess.
+        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess. Of a forced model:
+        for as many whole periods as this takes; the guess is a state at time 0.
     longest : float, optional
         The longest period looked for, by default 40 typical times.
 
@@ -76,8 +81,8 @@ def periodic_orbit(
     Raises
     ------
     ModelError
-        A model whose rates depend on time, a guess of the wrong shape, or one from which Newton's method
-        finds no cycle.
+        A model whose rates depend on time while no period is given or do not repeat after it, a guess of the
+        wrong shape, or one from which Newton's method finds no cycle.
 
     Notes
     -----
@@ -87,6 +92,9 @@ def periodic_orbit(
     Gauss and Newton finds one near the guess. Where the law has kinks, runs land on them. A cycle that is its
     own mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's
     close returns there are unstable ones.
+
+    A cycle of a forced model lasts as long as the forcing says; its multipliers are those of the stroboscopic
+    map, one for each component of the state.
 
     Examples
     --------
@@ -104,6 +112,15 @@ def periodic_orbit(
     >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
     >>> udd.periodic_orbit(udd.DLE(6.2), found.sel(number=2)).symmetric
     False
+
+    Duffing's oscillator, forced, and the frequencies at which its amplitude jumps:
+
+    >>> forced = {"c": 0.1, "F": 0.3, "w": 1.2}
+    >>> duffing = udd.Model(["x", "v"], ["v", "-x - x^3 - c*v + F*cos(w*t)"], forced)
+    >>> orbit = udd.periodic_orbit(duffing, [0.0, 0.0], period="2*pi/w", settle=200.0)
+    >>> branch = udd.continuation(orbit, "w", (0.8, 2.5))
+    >>> [(point.kind, round(point.value, 9)) for point in branch.points]
+    [('fold', 1.779719524), ('fold', 1.324236201)]
     """
     require_model(model)
     if guess is not None and hasattr(guess, "data_vars"):
@@ -114,22 +131,24 @@ def periodic_orbit(
     if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
         raise ModelError(f"the guess must be states of {dim} components, not of shape {given.shape}")
     free = beyond_the_edge(model)
-    flow = flow_of(free, np.atleast_2d(given))
+    forcing = None if period is None else forcing_of(free, period)
+    flow = flow_of(free, np.atleast_2d(given), forcing=forcing)
+    span = 0.0 if forcing is None else forcing.period(flow.values)[0]
     if given.ndim == 2 and len(given) > 1:
-        if period is None:
+        if forcing is None:
             raise ModelError("states over a period need the period")
-        span = number("period", period, above=0.0)
         nodes = flow.reduced(given)
         return _polished(model, flow, nodes, span, np.ones(flow.dim), _shift_of(flow, nodes, span))
     aside = 600.0 * flow.clock if guess is None else 0.0
     aside = number("settle", aside if settle is None else settle, least=0.0)
+    if flow.forcing is not None:
+        aside = math.ceil(aside / span) * span
     start = given.reshape(dim)
     if aside > 0.0:
         start = simulate(free, [0.0, aside], start, method="auto").state[-1]
     limit = number("longest", 40.0 * flow.clock if longest is None else longest, above=0.0)
-    if period is not None:
-        span, mirrored = number("period", period, above=0.0), False
-    else:
+    mirrored = False
+    if forcing is None:
         span, mirrored = _return_time(flow, free, start, limit)
     pieces = pieces_for(flow, span)
     run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
@@ -176,8 +195,9 @@ def closed(
     held = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
     value = 0.0 if held == HELD else float(flow.values[held])
     scale = abs(value) or 1.0
+    share = 1.0 if flow.forcing is None else span / flow.forcing.period(flow.values)[0]
     curve = CycleCurve(
-        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes[0], np.zeros(flow.dim)
+        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes[0], np.zeros(flow.dim), share
     )
     guess = curve.pack(nodes, span, value)
     curve.fix_phase(guess)
@@ -205,6 +225,8 @@ def _no_cycle(curve: CycleCurve, u: Floats) -> str:
     flow, (residual, _), start = curve.flow, curve.equations(u), curve.nodes(u)[0]
     if not np.isfinite(u).all() or np.abs(residual).max() > _RESIDUAL:
         return "Newton's method does not converge"
+    if flow.forcing is not None:
+        return ""
     rest = np.abs(curve.rate_at(curve.values_at(u), start) * flow.clock / flow.size).max()
     short = curve.span(u) < 1e-6 * flow.clock
     return "the orbit shrinks to a state of rest" if rest < 1e-9 or short else ""
@@ -254,6 +276,8 @@ def _simplest(curve: CycleCurve, u: Floats) -> tuple[CycleCurve, Floats]:
         shift = flow.turns(gap)
         if np.abs((gap + shift) / flow.size).max() > _SAME:
             continue
+        if flow.forcing is not None and not repeats(model, flow.kept, flow.size, span / parts, mirror):
+            continue
         share = span / parts
         if extent(share) < _WHOLE * extent(span):
             continue  # it has hardly left its start, where it is slow
@@ -274,14 +298,15 @@ def replace_values(flow: Flow, values: Floats) -> Flow:
 def flown(flow: Flow, values: Floats, start: Floats, span: float, pieces: int) -> Floats:
     """States (pieces + 1, r) at equal distances of time along an orbit."""
     states = [start]
-    for _ in range(pieces):
-        states.append(flow.fly(values, states[-1][np.newaxis], np.array([span / pieces])).x[0])
+    for i in range(pieces):
+        begin = np.array([i * span / pieces])
+        states.append(flow.fly(values, states[-1][np.newaxis], np.array([span / pieces]), t=begin).x[0])
     return np.array(states)
 
 
 def _shift_of(flow: Flow, nodes: Floats, span: float) -> Floats:
     share = np.array([span / len(nodes)])
-    end = flow.fly(flow.values, nodes[-1:], share).x[0]
+    end = flow.fly(flow.values, nodes[-1:], share, t=span - share).x[0]
     return flow.turns(end - nodes[0])
 
 

@@ -25,10 +25,10 @@ class Expansion:
     surfaces: Floats
 
 
-def expansion(flow: Flow, values: Floats, x: Floats, higher: bool = False) -> Expansion:
+def expansion(flow: Flow, values: Floats, x: Floats, higher: bool = False, t: float = 0.0) -> Expansion:
     """The rates' derivatives at a reduced state; second and third ones where `higher` asks for them."""
     model = flow.with_values(values)
-    found = _core.expansion(model, 0.0, flow.full(x).tolist(), higher)
+    found = _core.expansion(model, t, flow.full(x).tolist(), higher)
     k = flow.kept
     second, third = found["second"], found["third"]
     if higher:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
 from udd.errors import IncompleteWarning, ModelError
+from udd.trajectory import simulate
 
 from .cycle_curve import CycleCurve
 from .flow import Floats
@@ -30,9 +31,14 @@ def orbit_states(curve: CycleCurve, u: Floats) -> Floats:
     starts = flow.full(curve.nodes(u))
     model = flow.with_values(curve.values_at(u))
     rows = curve.values_at(u)[np.newaxis]
-    method = "auto" if _core.has_series(model) else "dop853"
-    found = _core.ensemble(model, rows, starts, times, 1e-10, 1e-13, method, 1)
-    states: Floats = found["states"][:, :-1].reshape(m * _BETWEEN, -1)
+    if flow.forcing is None:
+        method = "auto" if _core.has_series(model) else "dop853"
+        found = _core.ensemble(model, rows, starts, times, 1e-10, 1e-13, method, 1)["states"]
+    else:
+        tight: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-13, "method": "auto"}
+        each = zip(curve.begins(u), starts, strict=True)
+        found = np.array([simulate(model, t + times, start, **tight).state for t, start in each])
+    states: Floats = found[:, :-1].reshape(m * _BETWEEN, -1)
     if curve.symmetric:
         image = flow.full(curve.mirror * flow.reduced(states))
         states = np.vstack([states, image])
@@ -72,6 +78,8 @@ def crossings_of(
         if not isinstance(curve, CycleCurve):
             raise ModelError("equilibria do not cross a section")
         flow, u = curve.flow, place.u
+        if flow.forcing is not None:
+            raise ModelError("a forced cycle's section is its state at the forcing's phase 0: Branch.states")
         nodes, span = curve.nodes(u), curve.span(u)
         if curve.symmetric:
             nodes = np.vstack([nodes, curve.mirror * nodes])

@@ -8,8 +8,9 @@ from itertools import combinations
 import numpy as np
 
 from .cycle_curve import CycleCurve
+from .family_curve import FamilyCurve
 from .flow import Floats
-from .multipliers import multipliers_at
+from .multipliers import Multipliers, multipliers_at
 from .path import Place
 from .rest_curve import RestCurve
 
@@ -76,6 +77,8 @@ def signs_at(curve: RestCurve | CycleCurve, place: Place) -> Signs:
         return Signs(fold, float(np.linalg.det(matrix)), float("nan"), torus, here.surfaces, values)
     found = multipliers_at(curve, place.u)
     values = found.values
+    if isinstance(curve, FamilyCurve) and found.decided:
+        return _of_family(curve, place, found)
     if not found.decided:
         nothing = float("nan")
         return Signs(fold, nothing, nothing, nothing, np.zeros(0), values)
@@ -85,6 +88,20 @@ def signs_at(curve: RestCurve | CycleCurve, place: Place) -> Signs:
     torus = _less(logs, phases, 1.0) if both else float("nan")
     plus, minus = (_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
     return Signs(fold, plus, minus, torus, np.zeros(0), values)
+
+
+def _of_family(curve: FamilyCurve, place: Place, found: Multipliers) -> Signs:
+    """The functions where something is kept: one multiplier is 1, the others are pairs with the product 1.
+
+    The fold is one of the kept quantity, and collisions of pairs on the unit circle are not told.
+    """
+    values = found.values
+    others = np.delete(np.arange(len(values)), np.argmin(np.abs(values - 1.0)))
+    log, phases = found.log[others], found.phases[others]
+    first = place.tangent[: curve.flow.dim]
+    fold = float(curve.slope(place.u) @ first) * np.sqrt(curve.pieces)
+    plus, minus = (_less(log, phases, unit) for unit in (1.0, -1.0))
+    return Signs(fold, plus, minus, float("nan"), np.zeros(0), values)
 
 
 def _less(log: Floats, phases: np.ndarray, unit: float) -> float:

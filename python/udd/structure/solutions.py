@@ -23,6 +23,7 @@ __all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
 Complex = NDArray[np.complex128]
 
 _ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
+_FAMILY = 1e-6  # of its period: by more no inaccuracy moves a neutral cycle
 
 
 def kind_of_rest(eigenvalues: Complex) -> str:
@@ -89,7 +90,8 @@ class PeriodicOrbit:
     period : float
         Its period, the time after which all that the rates depend on is as before.
     multipliers : ndarray of complex, shape (r - 1,)
-        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out.
+        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out. Of a
+        forced model: those of the stroboscopic map, shape (r,).
     symmetric : bool
         Whether it is its own image under the model's symmetry, half a period later.
     nodes : ndarray, shape (m, dim)
@@ -125,7 +127,9 @@ class PeriodicOrbit:
 
         if self._curve is None or self._unknowns is None:
             return float("nan")
-        return period_error_of(self._curve, self._unknowns)
+        error = period_error_of(self._curve, self._unknowns)
+        # In a family less accurate runs find another cycle, unless its period or energy is held.
+        return error if error < _FAMILY * self.period or not self.neutral else float("nan")
 
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""

@@ -10,6 +10,7 @@ from udd.errors import IntegrationError, ModelError
 
 from .branch import AnyCurve, BifurcationPoint
 from .cycle_curve import CycleCurve
+from .family_curve import FamilyCurve
 from .flow import Floats
 from .locating import changes
 from .orbits import pieces_for
@@ -48,6 +49,8 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place,
     else:
         raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
     new, base, row = made
+    # Over the period a family of two rounds begins at twice the value.
+    begins = new.value(base) if isinstance(new, FamilyCurve) else point.value
 
     def at(size: float) -> Place | None:
         try:
@@ -63,7 +66,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place,
             continue
         for _ in range(_HALVINGS):
             nearer = at(0.5 * size)
-            if nearer is None or _nothing_between(new, point, nearer, found):
+            if nearer is None or _nothing_between(new, point, begins, nearer, found):
                 break
             found, size = nearer, 0.5 * size
         if isinstance(new, CycleCurve):
@@ -77,8 +80,13 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, Place,
     )
 
 
-def _nothing_between(curve: AnyCurve, point: BifurcationPoint, half: Place, whole: Place) -> bool:
-    """Whether a branch does as its normal form says, up to an amplitude and up to half of it."""
+def _nothing_between(
+    curve: AnyCurve, point: BifurcationPoint, begins: float, half: Place, whole: Place
+) -> bool:
+    """Whether a branch does as its normal form says, up to an amplitude and up to half of it.
+
+    It `begins` at this value of the parameter.
+    """
     before, after = signs_at(curve, half), signs_at(curve, whole)
     # What vanishes all along, as where energy is kept, changes its sign by rounding.
     clear = [max(abs(getattr(s, name)) for s in (before, after)) for name in changes(before, after)]
@@ -90,7 +98,7 @@ def _nothing_between(curve: AnyCurve, point: BifurcationPoint, half: Place, whol
     if after.minus < 0.0:
         return False
     # The parameter moves with the square of the amplitude.
-    first, last = (curve.value(place.u) - point.value for place in (half, whole))
+    first, last = (curve.value(place.u) - begins for place in (half, whole))
     still = abs(last) < _STILL * curve.scale
     return still or abs(last / first - 4.0) < _BENT if first else still
 
@@ -110,7 +118,7 @@ def doubled(curve: CycleCurve, place: Place) -> tuple[CycleCurve, Floats, Floats
     away = np.vstack([first, -curve.mirror * first])
     plain = np.ones(curve.flow.dim)
     shift = curve.shift + curve.mirror * curve.shift
-    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift)
+    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
     base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
     new.fix_phase(base)
     row = new.pack(away, 0.0, 0.0)

@@ -11,14 +11,14 @@ from scipy import linalg
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch
-from .cycle_curve import CycleCurve
+from .cycle_curve import HELD, CycleCurve
 from .flow import Floats, Flow
 from .locating import COARSE, rounding_of
 from .rest_curve import expansion
 from .rests import refined, rest_at
 from .solutions import Equilibrium
 
-__all__ = ["Connection", "connection"]
+__all__ = ["Connection", "Problem", "connection", "found_by"]
 
 _LONGER = 2.0  # typical times that are added at both ends
 _SOLVED = 1e-11  # a Newton step below this, in scaled unknowns, is the last
@@ -141,7 +141,23 @@ def connection(branch: Branch) -> Connection:
         raise ModelError("a branch of cycles is needed, of udd.continuation")
     curve, place = branch._places[int(np.argmax(branch.periods))]
     assert isinstance(curve, CycleCurve)
-    problem = _Problem.of(curve, place.u)
+    if curve.flow.forcing is not None:
+        raise ModelError("a forced model has no equilibria that an orbit could connect")
+    if curve.parameter == HELD:
+        raise ModelError(
+            f"a connection is looked for over a parameter of the model, not over {branch.parameter}"
+        )
+    return found_by(Problem.of(curve, place.u), branch.parameter)
+
+
+def found_by(problem: Problem, parameter: str) -> Connection:
+    """The connection near a guess.
+
+    Raises
+    ------
+    ModelError
+        None is found.
+    """
     try:
         value, error = problem.solve(), float("nan")
         for _ in range(8):
@@ -155,16 +171,16 @@ def connection(branch: Branch) -> Connection:
         coarse.loose = COARSE
         error += abs(coarse.solve() - value) + float(rounding_of(value))
     except (np.linalg.LinAlgError, IntegrationError) as failure:
-        raise ModelError(f"the branch tends to no connection that is found: {failure}") from None
+        raise ModelError(f"no connection is found: {failure}") from None
     rest = rest_at(problem.flow, problem.values_at(value), problem.rest(value))
     t = np.linspace(0.0, problem.span, len(problem.nodes))
     kind = "heteroclinic" if (problem.mirror < 0).any() else "homoclinic"
     state = problem.flow.full(problem.nodes)
-    return Connection(kind, branch.parameter, value, error, rest, t, state, problem.nearest())
+    return Connection(kind, parameter, value, error, rest, t, state, problem.nearest())
 
 
 @dataclass(eq=False)
-class _Problem:
+class Problem:
     """An orbit from an equilibrium to itself or to its mirror image, and the parameter."""
 
     flow: Flow
@@ -180,7 +196,7 @@ class _Problem:
     _rests: dict[float, Floats] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, curve: CycleCurve, u: Floats) -> _Problem:
+    def of(cls, curve: CycleCurve, u: Floats) -> Problem:
         """From a long cycle, cut where it is nearest to an equilibrium."""
         flow, values, nodes, m = curve.flow, curve.values_at(u), curve.nodes(u), curve.pieces
         model = flow.with_values(values)
@@ -292,7 +308,7 @@ class _Problem:
             before = largest
             if not np.isfinite(largest):
                 break
-        raise ModelError("the branch tends to no connection that is found: Newton's method does not converge")
+        raise ModelError("no connection is found: Newton's method does not converge")
 
     def prolong(self) -> None:
         """Add what the linear flow near the equilibrium adds to the orbit at its ends."""

@@ -1,0 +1,102 @@
+"""All connections of an interval, against published values and another integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+import udd
+from udd.errors import ModelError
+
+
+def test_lorenz_has_his_homoclinic_orbit() -> None:
+    lorenz = udd.Model(["x", "y", "z"], ["10*(y-x)", "r*x-y-x*z", "x*y-8/3*z"], {"r": 28.0})
+    found = udd.connections(lorenz, "r", (10.0, 16.0), n=60)
+    (one,) = found
+    # Published with fewer digits: 13.926 (C. Sparrow, The Lorenz equations, 1982).
+    assert one.kind == "homoclinic" and one.value == pytest.approx(13.926557407520, abs=1e-9)
+    assert one.error < 1e-11
+    np.testing.assert_allclose(one.equilibrium.state, 0.0, atol=1e-12)
+    assert found.search.startswith("1 manifolds compared at 60 values of r from 10 to 16")
+
+
+def test_the_dle_has_those_that_another_integrator_has() -> None:
+    found = udd.connections(udd.DLE(3.4), "w", (3.34, 3.42), n=40)
+    # About one with a saddle-focus there are others, of more rounds.
+    assert all(one.wild and one.error < 1e-11 for one in found)
+    (one,) = (one for one in found if one.kind == "homoclinic")
+    assert one.value == pytest.approx(3.3768624337325, abs=1e-9)
+
+    def nearest(w: float) -> tuple[float, int]:
+        """How near the stable manifold comes to the rotating state, backward in time, and its side."""
+        size = np.sqrt(w)
+        at = np.array([size, size, 0.0])
+        matrix = np.array([[-1.0, 1.0, 0.0], [0.0, 0.0, size], [-size, -size, 0.0]])
+        numbers, vectors = np.linalg.eig(matrix)
+        left = np.linalg.inv(vectors)[np.argmin(numbers.real)].real
+        slow = vectors[:, np.argmin(numbers.real)].real
+        closest = []
+        for sign in (1.0, -1.0):
+            run = integrate.solve_ivp(
+                lambda t, s: [s[0] - s[1], -s[0] * s[2], s[0] * s[1] - w],
+                [0.0, 40.0],
+                at + 1e-5 * sign * slow,
+                "DOP853",
+                rtol=1e-11,
+                atol=1e-12,
+                events=_far,
+                max_step=0.05,
+            )
+            gone = run.t > 8.0
+            away = np.linalg.norm(run.y.T - at, axis=1)[gone]
+            k = int(np.argmin(away))
+            # A little later the side is the one on which it leaves.
+            later = min(k + 20, len(away) - 1)
+            closest.append((float(away[k]), int(np.sign(left @ (run.y.T[gone][later] - at)))))
+        return min(closest)
+
+    (near, before), (_, after) = (nearest(one.value + d) for d in (-1e-7, 1e-7))
+    assert near < 1.2  # from 1e-3 away it is 1.8
+    assert before == -after
+
+
+def test_a_model_that_blows_up_on_one_side_of_its_connection() -> None:
+    model = udd.Model(["x", "v"], ["v", "x^2 - 1 + v*(b + x)"], {"b": 0.85})
+    (one,) = udd.connections(model, "b", (0.6, 0.9), n=12)
+    assert one.kind == "homoclinic"
+
+    def end(b: float) -> float:
+        """Where the saddle's unstable manifold is when it has gone round: inside, or past the saddle."""
+        growing = (b + 1 + np.sqrt((b + 1) ** 2 + 8)) / 2
+        start = np.array([1.0, 0.0]) - 1e-6 * np.array([1.0, growing])
+        run = integrate.solve_ivp(
+            lambda t, s: [s[1], s[0] ** 2 - 1 + s[1] * (b + s[0])],
+            [0.0, 60.0],
+            start,
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=_far,
+        )
+        return float(run.y[0, -1])
+
+    # Past the saddle it goes away without end.
+    assert {end(one.value + d) > 5.0 for d in (-1e-7, 1e-7)} == {False, True}
+
+
+def _far(t: float, s: np.ndarray) -> float:
+    return float(40.0 - np.abs(s).max())
+
+
+_far.terminal = True  # type: ignore[attr-defined]
+
+
+def test_where_there_can_be_none() -> None:
+    with pytest.raises(ModelError, match="one eigenvalue alone"):
+        udd.connections(udd.Model(["x", "v"], ["v", "m*(1-x^2)*v-x"], {"m": 1.0}), "m", (0.5, 1.0), n=5)
+    with pytest.raises(ModelError, match="must be finite"):
+        udd.connections(udd.DLE(3.4), "w", (1.0, np.inf))
+    orbit = udd.periodic_orbit(udd.Model(["x", "v"], ["v", "-sin(x)"]), [1.0, 0.0])
+    with pytest.raises(ModelError, match="over a parameter of the model, not over period"):
+        udd.connection(udd.continuation(orbit, "period", (6.6, 7.0)))
