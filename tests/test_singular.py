@@ -65,7 +65,10 @@ def test_curves_that_cannot_be_told_from_the_parameters_are_a_case(monkeypatch):
 
 def test_a_covariance_without_an_inverse_tells_what_it_can():
     fit = SimpleNamespace(
-        parameters={"a": 1.0, "b": 1.0}, covariance=np.ones((2, 2)), inflation=lambda _before: 1.0
+        parameters={"a": 1.0, "b": 1.0},
+        covariance=np.ones((2, 2)),
+        inflation=lambda _before: 1.0,
+        shown=1.0,
     )
     tighter = SimpleNamespace(**{**vars(fit), "covariance": np.full((2, 2), 0.5)})
     assert _expected(fit, (fit, tighter), ["a", "b"]) == pytest.approx(1.0)

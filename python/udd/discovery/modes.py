@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 _HARMONICS = 5
 _MAINS = (50.0, 60.0)  # Hz, which a sensor hears
+_WANDERS = 0.004  # share of it by which the mains' frequency may be off
+_SLOWEST = 0.5  # Hz, below which hum that is sampled too slowly is no wave but a drift
 _LINES = 1.0  # of the record, 1/s over its length, within which two frequencies are one
 _NEAR = 0.2  # share of a mode's frequency within which the motion's own line is that mode
 _STEP = 1e-5  # of each state's size, for the rates' slopes
@@ -69,7 +71,8 @@ def modes(model: Model, t: Array, states: Array) -> Array:
 def belongs(frequencies: Array, fit: Fit) -> NDArray[np.bool_]:
     """Which frequencies are the system's own or the mains'.
 
-    Its modes', up to the fifth harmonic, and the sums and differences of two modes.
+    Its modes', up to the fifth harmonic, and the sums and differences of two modes. The mains' hum also where
+    the record, sampled too slowly for it, shows it.
     """
     own = fit.record.film == 0
     t, states = fit.record.t[own], fit.states[own]
@@ -78,6 +81,30 @@ def belongs(frequencies: Array, fit: Fit) -> NDArray[np.bool_]:
     listed += [abs(a + sign * b) for a, b in itertools.combinations(single, 2) for sign in (1, -1)]
     line = _LINES / float(np.ptp(t))
     result = np.zeros(len(frequencies), dtype=bool)
-    for f in (*listed, *_MAINS):
+    for f in listed:
         result |= np.abs(frequencies - f) < line
+    for f in _MAINS:
+        for shown in (f, alias(f, t)):
+            result |= np.abs(frequencies - shown) < max(line, _WANDERS * f if shown > _SLOWEST else 0.0)
     return result
+
+
+def alias(frequency: float, t: Array) -> float:
+    """Where a frequency appears in a record that is sampled evenly, and too slowly for it.
+
+    Parameters
+    ----------
+    frequency : float
+    t : ndarray (n,)
+        Times, s; in a record that was averaged in blocks, the blocks'.
+
+    Examples
+    --------
+    Hum of 60 Hz at 100 frames a second, averaged over three:
+
+    >>> import numpy as np
+    >>> round(alias(60.0, np.arange(0, 60, 0.03)), 3)
+    6.667
+    """
+    rate = 1.0 / float(np.median(np.diff(t)))
+    return abs(frequency - rate * round(frequency / rate))
