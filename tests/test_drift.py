@@ -12,6 +12,7 @@ import udd
 from udd.discovery.drift import as_random, drift_gain
 from udd.discovery.foretelling import Foretelling
 from udd.discovery.looks import Look
+from udd.discovery.results import Found
 from udd.discovery.scan import Scan
 from udd.fitting import annealing, fit_record, record_of
 
@@ -104,3 +105,13 @@ def test_a_curve_leads_that_says_far_more_than_the_library(evidence, leads):
     scan = Scan([scored], np.zeros(1), np.eye(1), [[0]], 1.0)  # type: ignore[list-item]
     look = Look(fitted, scan, [curve], 1)  # type: ignore[list-item]
     assert look.curve_leads() is leads
+
+
+def test_a_curve_over_time_alone_is_like_a_drift_but_in_a_film_of_a_disk():
+    def over(*names):
+        return SimpleNamespace(curve=SimpleNamespace(coordinates=[SimpleNamespace(name=n) for n in names]))
+
+    assert Found.like_a_drift(over("t"), KNOWN)
+    assert not Found.like_a_drift(over("t"), udd.Disk(0.04))
+    assert not Found.like_a_drift(over("theta"), KNOWN)
+    assert not Found.like_a_drift(SimpleNamespace(curve=None), KNOWN)

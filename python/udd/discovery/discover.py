@@ -169,7 +169,7 @@ def discover(
         or left
         or random
         or excused is not None
-        or any(is_spline(f.effect) or (f.of_time and final.model.kind != "disk") for f in found)
+        or any(is_spline(f.effect) or f.like_a_drift(final.model) for f in found)
     ):
         verdict = "effect present, form not identified"
     elif found:

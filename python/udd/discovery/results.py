@@ -73,10 +73,13 @@ class Found:
     curve: Curve | None = None
     tried: str = ""
 
-    @property
-    def of_time(self) -> bool:
-        """Whether it was located as a curve over time alone, as the zero of a sensor that drifts is one."""
-        return self.curve is not None and [c.name for c in self.curve.coordinates] == ["t"]
+    def like_a_drift(self, model: Model) -> bool:
+        """Whether it was located as a curve over time alone, as the zero of a sensor that drifts is one.
+
+        Not of a disk, which a camera sees.
+        """
+        over = [] if self.curve is None else [c.name for c in self.curve.coordinates]
+        return over == ["t"] and model.kind != "disk"
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -288,7 +291,7 @@ class Discovery:
                 "Forces that push at random, like those of a support that moves, explain this record about "
                 f"as well; beside what was found it still needs {needed}, r.m.s. over a frame."
             )
-        if self.fit.model.kind != "disk" and any(effect.of_time for effect in self.effects):
+        if any(effect.like_a_drift(self.fit.model) for effect in self.effects):
             said.append(
                 "What was found is a function of time alone; so is the zero of a sensor that drifts, from "
                 "which one record does not tell it."
