@@ -234,6 +234,10 @@ class Search:
             states.append(found[1])
             self._prune(accepted, states, looks)
             states[-1] = self._released(states[-1])
+            # What no library has, and free runs contradict, is no ground to search on from.
+            contradicted = self.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
+            if accepted[-1].curve is not None and contradicted:
+                break
 
     def _confirmed(self, known: State, states: list[State]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
