@@ -272,8 +272,9 @@ def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most
         assert found.error_after.whole < 1.4e-3
     assert 0.013 < drag < 0.022  # one aerodynamic constant for all lengths, 0.014 to 0.021 there
 
+
 def test_a_formula_that_free_runs_contradict_ends_the_search(shared):
-    """A pendulum of a cup: its formula of Omega fits, and foretells worse; what is fitted around it is no better."""
+    """A pendulum of a cup: its formula of Omega fits and foretells worse; nothing around it is better."""
     measured = udd.read_measurement(shared / "data/real/cup_pendulum.txt", columns="t,theta,_")
     said: list[str] = []
     found = udd.discover(measured, udd.Pendulum(0.65, k0=0.01 * 0.65**2), progress=said.append)
