@@ -1,5 +1,7 @@
 //! What a change of parameters does to the states and to what is seen.
 
+use nalgebra::SVector;
+
 use super::flow::{Link, Places};
 use super::follow::{Law, Way, variable};
 use super::rows::Rows;
@@ -71,11 +73,27 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The rows of the free parameters at the links' ends.
+    /// Which films have a law that knows the time, and a free clock that moves it.
+    pub(super) fn timed(&self, point: &Point<D>) -> Vec<bool> {
+        let mut timed = vec![false; point.sets.len()];
+        for (film, law) in self.plain_laws(point).iter().enumerate() {
+            let mut links =
+                (0..self.record.t.len().saturating_sub(1)).filter_map(|i| Some((i, self.link(point, i)?)));
+            timed[film] = self.free.iter().any(|free| free.role == Role::Clock && free.acts_on(film))
+                && links.any(|(i, (of, start, end))| {
+                    let x = vector!(f64, D; k => point.states[i][k]);
+                    of == film && rates_of(&law.system, start, &x) != rates_of(&law.system, end, &x)
+                });
+        }
+        timed
+    }
+
+    /// The rows of the free parameters at the links' ends; some films' laws are [timed](Estimator::timed).
     pub(super) fn own_state_rows(
         &self,
         point: &Point<D>,
         flow: &[Link<D>],
+        timed: &[bool],
         rows: &mut Rows,
     ) -> Result<(), EstimateError> {
         let p = self.free.len();
@@ -86,6 +104,7 @@ where
         let films = 0..point.sets.len();
         let models: Vec<_> = films.clone().map(|film| acting(&self.free, film, model)).collect();
         let clocks: Vec<_> = films.map(|film| acting(&self.free, film, clock)).collect();
+        let plain = self.plain_laws(point);
         in_blocks(rows, D, &|i, rows| {
             if self.record.linked[i] {
                 let link = &flow[i];
@@ -99,6 +118,19 @@ where
                     // A slower clock lets the flow run on for longer.
                     for &(column, _) in &clocks[film] {
                         row[column] = link.arrival[n] * dt;
+                    }
+                }
+                if timed[film] {
+                    // And begin later: by its start s the flow of x' = f(t, x) changes as -A f(s, x), A its
+                    // derivative by x. Without forces in time that is minus the rate at its end.
+                    let x = vector!(f64, D; k => point.states[i][k]);
+                    let departure =
+                        rates_of(&plain[film].system, self.record.t[i] * point.sets[film].pace(), &x);
+                    let later = (link.arrival - link.a() * SVector::from(departure)) * self.record.t[i];
+                    for n in 0..D {
+                        for &(column, _) in &clocks[film] {
+                            rows[n * p + column] += later[n];
+                        }
                     }
                 }
             }
@@ -287,7 +319,7 @@ pub(super) fn camera(role: Role) -> Option<usize> {
     if let Role::Camera(number) = role { Some(number) } else { None }
 }
 
-fn clock(role: Role) -> Option<usize> {
+pub(super) fn clock(role: Role) -> Option<usize> {
     (role == Role::Clock).then_some(0)
 }
 
@@ -308,6 +340,10 @@ fn actors<F: Family<D>, const D: usize>(
         .chunks(WIDTH)
         .map(|chunk| Actor { system: family.build(&tagged(values, chunk, 0)), columns: columns_of(chunk) })
         .collect()
+}
+
+pub(super) fn rates_of<const D: usize>(system: &impl System<f64, D>, t: f64, x: &[f64; D]) -> [f64; D] {
+    system.rates(t, x, &sides_of(system, t, x))
 }
 
 #[inline(always)]

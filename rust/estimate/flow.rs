@@ -3,10 +3,10 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::bordered::zeros;
-use super::columns::{WIDTH, Wide};
+use super::columns::{WIDTH, Wide, rates_of};
 use super::follow::{Follower, Law, Span, Way, variable};
 use super::{EstimateError, Estimator, Point, Sensor};
-use crate::model::{Family, System, sides_of};
+use crate::model::Family;
 use crate::unroll::vector;
 
 /// Places within a link, as parts of its time, and their weights (Gauss-Legendre).
@@ -68,7 +68,7 @@ where
         laws: &[Law<F::Built<Wide>, Wide>],
         room: Vec<Link<D>>,
     ) -> Result<Vec<Link<D>>, EstimateError> {
-        let plain: Vec<Law<F::Built<f64>, f64>> = self.laws(point, &|_, values| values.to_vec());
+        let plain = self.plain_laws(point);
         let zero = zeros();
         let none = Link { defect: zero, slopes: [[0.0; WIDTH]; D], arrival: zero };
         let one =
@@ -76,7 +76,7 @@ where
                 let x = variable(&point.states[i]);
                 let (last, _) = follower.follow(Way { start, end, x, places: &[], met: &mut [] })?;
                 let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
-                let arrival = system.rates(end, &there, &sides_of(system, end, &there));
+                let arrival = rates_of(system, end, &there);
                 for k in 0..D {
                     link.defect[k] = point.states[i + 1][k] - there[k];
                     link.slopes[k] = last[k].d;

@@ -132,6 +132,11 @@ where
         laws
     }
 
+    /// The same over plain numbers.
+    pub(super) fn plain_laws(&self, point: &Point<D>) -> Vec<Law<F::Built<f64>, f64>> {
+        self.laws(point, &|_, values| values.to_vec())
+    }
+
     /// The film, start and end of link `i` in the model's time, where its frames are linked.
     pub(super) fn link(&self, point: &Point<D>, i: usize) -> Option<Span> {
         let film = self.record.film[i];

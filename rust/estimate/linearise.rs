@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::bordered::zeros;
-use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, columns_of, model, rates, tagged};
+use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, clock, columns_of, model, rates, tagged};
 use super::flow::Link;
 use super::follow::{Law, variable};
 use super::rows::Rows;
@@ -87,8 +87,9 @@ where
         let Linear { mut sights, flow, columns: Columns { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
         let flow = self.flow(point, &laws, flow)?;
-        self.own_state_rows(point, &flow, &mut state)?;
-        self.sights(point, &laws, &mut sights, &mut seen);
+        let timed = self.timed(point);
+        self.own_state_rows(point, &flow, &timed, &mut state)?;
+        self.sights(point, &laws, &timed, &mut sights, &mut seen);
         Ok(Linear { sights, flow, columns: Columns { seen, state } })
     }
 
@@ -97,6 +98,7 @@ where
         &self,
         point: &Point<D>,
         laws: &[Law<F::Built<Wide>, Wide>],
+        timed: &[bool],
         sights: &mut Vec<Sight<D, M>>,
         seen: &mut Rows,
     ) {
@@ -105,7 +107,7 @@ where
         // All are filled anew.
         sights.resize(n, Sight { misfit: zeros(), h: zeros() });
         let beyond = self.beyond(point);
-        let views = views(&point.sets, &self.free);
+        let views = views(&point.sets, &self.free, timed);
         let mut slots: Vec<(&mut Sight<D, M>, &mut [f64])> = Vec::with_capacity(n);
         let mut blocks = seen.blocks_mut(M);
         for sight in sights.iter_mut() {
@@ -140,15 +142,18 @@ struct View {
     model: Vec<usize>,
     /// The camera differentiated by its free parameters, some at a time, with their columns.
     tagged: Vec<(Vec<Wide>, Vec<usize>)>,
+    /// The column of a free clock that moves a law that knows the time.
+    clock: Vec<usize>,
 }
 
-fn views(sets: &[Set], free: &[Free]) -> Vec<View> {
+fn views(sets: &[Set], free: &[Free], timed: &[bool]) -> Vec<View> {
     let one = |(film, set): (usize, &Set)| {
         let tagged = |own: &[_]| (tagged(&set.camera, own, 0), columns_of(own));
         View {
             plain: constants(&set.camera),
             model: columns_of(&acting(free, film, model)),
             tagged: acting(free, film, camera).chunks(WIDTH).map(tagged).collect(),
+            clock: if timed[film] { columns_of(&acting(free, film, clock)) } else { Vec::new() },
         }
     };
     sets.iter().enumerate().map(one).collect()
@@ -189,6 +194,13 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
         let rate = vector!(Wide, D; k => Wide::constant(rate[k].re));
         for (camera, columns) in &view.tagged {
             fill(rows, p, &sensor.observe(camera, &x, &rate), 0, columns);
+        }
+        if !view.clock.is_empty() {
+            // The model's time is (1 + c) times the record's, c the clock's value.
+            let mut clocked = t;
+            clocked.d[0] = record.t[i];
+            let rate = rates(&law.system, clocked, &x);
+            fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &view.clock);
         }
         for Beyond { columns, laws } in self.beyond {
             let rate = rates(&laws[film].system, t, &x);

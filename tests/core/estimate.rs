@@ -148,10 +148,12 @@ proptest! {
         omega in 4.0f64..8.0, y in -0.03f64..0.03, z in -0.05f64..0.05, beta in -3.0f64..3.0,
         y0 in -2e-3f64..2e-3, tilt in -0.05f64..0.05, lag in -5e-3f64..5e-3, row in -0.03f64..0.03,
     ) {
-        let family = family(&[(Kind::Relaxation, Some(Momentum::Consistent))]);
-        let values = [PAPER.as_slice(), &[4.0]].concat();
-        let (record, _) = film(&family, &values, 2, 3);
-        let mut roles: Vec<Role> = (0..7).map(Role::Model).collect();
+        // A law that knows the time, a while after its start.
+        let family = family(&[(Kind::Relaxation, Some(Momentum::Consistent)), (Kind::DriveRipple, None)]);
+        let values = [PAPER.as_slice(), &[4.0, 0.3, -0.2, 1.7]].concat();
+        let (mut record, _) = film(&family, &values, 2, 3);
+        record.t.iter_mut().for_each(|t| *t += 30.0);
+        let mut roles: Vec<Role> = (0..values.len()).map(Role::Model).collect();
         roles.extend((0..DiskCamera::PARAMETERS.len()).map(Role::Camera));
         roles.push(Role::Clock);
         let mut estimator = problem(family, record, Vec::new());
