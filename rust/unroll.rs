@@ -12,7 +12,7 @@ macro_rules! unroll {
     (@ $i:ident $from:literal $count:tt, $body:block, $($k:literal)+) => {
         $(
             #[allow(unconditional_panic, reason = "what lies beyond the count is not compiled")]
-            if $crate::unroll::Turn::<$from, $k, $count>::RUNS {
+            if $crate::unroll::Turn::<$from, $k, $count, 16>::RUNS {
                 let $i: usize = $k;
                 $body
             }
@@ -31,15 +31,15 @@ macro_rules! vector {
 }
 pub(crate) use vector;
 
-/// Whether a loop from `FROM` below `COUNT` reaches `K`.
+/// Whether a loop from `FROM` below `COUNT`, at most `MOST`, reaches `K`.
 ///
-/// It does not depend on the types around the loop: a `const` block there is evaluated, and kept, for each of the
-/// functions that are made of them, which took half of the compiler's memory.
-pub(crate) struct Turn<const FROM: usize, const K: usize, const COUNT: usize>;
+/// It does not depend on the types around the loop: a `const` block there would be evaluated, and kept, for each of the
+/// functions made of them. That took half of the compiler's memory.
+pub(crate) struct Turn<const FROM: usize, const K: usize, const COUNT: usize, const MOST: usize>;
 
-impl<const FROM: usize, const K: usize, const COUNT: usize> Turn<FROM, K, COUNT> {
+impl<const FROM: usize, const K: usize, const COUNT: usize, const MOST: usize> Turn<FROM, K, COUNT, MOST> {
     pub(crate) const RUNS: bool = {
-        assert!(COUNT <= 16);
+        assert!(COUNT <= MOST);
         FROM <= K && K < COUNT
     };
 }
