@@ -49,9 +49,8 @@ def summary(rows: list[tuple[Row, list[Result]]], most: dict[str, float]) -> str
         peer = figure(rate.get(best, float("nan")))
         limit = row.threads * most.get(row.path, float("nan"))
         part = f"{100 * rate['udd'] / limit:.0f} %" if "udd" in rate and limit == limit else "-"
-        lines.append(
-            f"| {row.number}. {row.title} | {row.unit} | {own} | {best} | {peer} | {ratio} | {spread} | {part} |"
-        )
+        cells = (f"{row.number}. {row.title}", row.unit, own, best, peer, ratio, spread, part)
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
