@@ -235,7 +235,7 @@ fn counted(work: &dyn Fn(Isa)) {
 
 /// Prints the rates of the built-in series beside those that the machine could reach.
 fn limits() {
-    println!("{:24}{:>12}{:>12}{:>22}", "", "a second", "at most", "of the machine's limit");
+    println!("{:24}{:>12}{:>12}{:>24}", "", "a second", "at most", "of the machine's limit");
     for isa in Isa::available().into_iter().filter(|&isa| isa > Isa::Baseline) {
         for Path { name, units, work, steps } in paths() {
             let Some(steps) = steps else { continue };
@@ -248,7 +248,7 @@ fn limits() {
             }
             let (rate, most) = (units as f64 / spent, units as f64 / least);
             println!(
-                "{:24}{rate:12.3e}{most:12.3e}{:20.0} %",
+                "{:24}{rate:12.3e}{most:12.3e}{:22.0} %",
                 format!("{name}, {isa:?}"),
                 100.0 * rate / most
             );
