@@ -118,7 +118,7 @@ fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>
 }
 
 fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
-    let units = (count * values.len()) as u64;
+    let units = ((SKIPPED + count) * values.len()) as u64;
     let wanted = values.clone();
     let steps = move || {
         let ends = crossed(Isa::best(), &wanted, count);
@@ -126,6 +126,9 @@ fn sections(name: &'static str, values: Vec<Vec<f64>>, count: usize) -> Path {
     };
     Path::new(name, units, move |isa| drop(crossed(isa, &values, count))).counted(steps)
 }
+
+/// So many points are found before those that are kept.
+const SKIPPED: usize = 20;
 
 /// Collects points of the section z = 0; returns the times of the last ones.
 fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
@@ -138,7 +141,7 @@ fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
         values,
         starts: &[START],
         sections: &[Section { function, rising: true, falling: false }],
-        skip: 20,
+        skip: SKIPPED,
         count,
         end: 1e6,
         bounded: [true; 3],
@@ -232,7 +235,7 @@ fn counted(work: &dyn Fn(Isa)) {
 
 /// Prints the rates of the built-in series beside those that the machine could reach.
 fn limits() {
-    println!("{:24}{:>12}{:>12}{:>22}", "", "a second", "at most", "of the machine's limit");
+    println!("{:24}{:>12}{:>12}{:>24}", "", "a second", "at most", "of the machine's limit");
     for isa in Isa::available().into_iter().filter(|&isa| isa > Isa::Baseline) {
         for Path { name, units, work, steps } in paths() {
             let Some(steps) = steps else { continue };
@@ -245,7 +248,7 @@ fn limits() {
             }
             let (rate, most) = (units as f64 / spent, units as f64 / least);
             println!(
-                "{:24}{rate:12.3e}{most:12.3e}{:20.0} %",
+                "{:24}{rate:12.3e}{most:12.3e}{:22.0} %",
                 format!("{name}, {isa:?}"),
                 100.0 * rate / most
             );

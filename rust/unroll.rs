@@ -6,14 +6,13 @@
 /// Over packets the compiler would otherwise choose between unrolling a loop over components or stages
 /// and turning it, instead of the lanes, into vector instructions.
 macro_rules! unroll {
-    ($i:ident in $from:literal .. $count:expr => $body:block) => {
-        $crate::unroll::unroll!(@ $i $from $count, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
-        const { assert!($count <= 16) };
+    ($i:ident in $from:literal .. $count:tt => $body:block) => {
+        $crate::unroll::unroll!(@ $i $from $count, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)
     };
-    (@ $i:ident $from:literal $count:expr, $body:block, $($k:literal)+) => {
+    (@ $i:ident $from:literal $count:tt, $body:block, $($k:literal)+) => {
         $(
             #[allow(unconditional_panic, reason = "what lies beyond the count is not compiled")]
-            if const { $from <= $k && $k < $count } {
+            if $crate::unroll::Turn::<$from, $k, $count, 16>::RUNS {
                 let $i: usize = $k;
                 $body
             }
@@ -24,10 +23,23 @@ pub(crate) use unroll;
 
 /// The array `[element; D]` over a scalar `S`, where `element` may use the index.
 macro_rules! vector {
-    ($S:ty, $D:expr; $n:ident => $element:expr) => {{
+    ($S:ty, $D:tt; $n:ident => $element:expr) => {{
         let mut all = [<$S as $crate::scalar::Scalar>::zero(); $D];
         $crate::unroll::unroll!($n in 0 .. $D => { all[$n] = $element; });
         all
     }};
 }
 pub(crate) use vector;
+
+/// Whether a loop from `FROM` below `COUNT`, at most `MOST`, reaches `K`.
+///
+/// It does not depend on the types around the loop: a `const` block there would be evaluated, and kept, for each of the
+/// functions made of them. That took half of the compiler's memory.
+pub(crate) struct Turn<const FROM: usize, const K: usize, const COUNT: usize, const MOST: usize>;
+
+impl<const FROM: usize, const K: usize, const COUNT: usize, const MOST: usize> Turn<FROM, K, COUNT, MOST> {
+    pub(crate) const RUNS: bool = {
+        assert!(COUNT <= MOST);
+        FROM <= K && K < COUNT
+    };
+}

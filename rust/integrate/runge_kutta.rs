@@ -42,9 +42,11 @@ pub fn step<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P:
 ) -> ([S; D], [[S; D]; N]) {
     let mut stages = [*first; N];
     let mut new = *x;
-    unroll!(i in 1..T::TABLEAU.stages => {
-        new = stage::<T, S, D, N, P>(i, x, &stages, h);
-        stages[i] = system.rates(S::lift(t + h.scale(T::TABLEAU.c[i])), &new, sides);
+    unroll!(i in 1..N => {
+        if i < T::TABLEAU.stages {
+            new = stage::<T, S, D, N, P>(i, x, &stages, h);
+            stages[i] = system.rates(S::lift(t + h.scale(T::TABLEAU.c[i])), &new, sides);
+        }
     });
     (new, stages)
 }

@@ -10,14 +10,13 @@ use crate::unroll::vector;
 
 /// So many parameters can be differentiated by at once.
 pub const MOST_PARAMETERS: usize = 2;
-/// So many derivatives one run carries: by the components of the state, then by parameters. Where a state has more than
-/// four components parameters take a run of their own.
-const DIRECTIONS: usize = 6;
+/// So many derivatives one run carries, by the components of the state, then by parameters: as many as a fit's, which
+/// shares what is compiled. States of more than [`FEW`] components share it with their exponents: one run carries as
+/// many derivatives as there are components, and parameters take a run of their own.
+const DIRECTIONS: usize = 8;
+const FEW: usize = 4;
 /// More steps than this within one piece mean that something is wrong.
 const MOST_STEPS: u64 = 1_000_000;
-
-/// A number and its derivatives.
-type Number = Dual<f64, DIRECTIONS>;
 
 /// Where a piece of an orbit starts: its parameters, its time and state, and how long it lasts.
 #[derive(Clone, Debug)]
@@ -55,19 +54,21 @@ pub fn pieces<F: Family<D>, const D: usize>(
     tolerance: &Tolerance,
     stop: &Stop,
 ) -> Result<Vec<Flown<D>>, Failure> {
-    const { assert!(D <= DIRECTIONS && MOST_PARAMETERS <= DIRECTIONS) };
+    const { assert!(FEW + MOST_PARAMETERS <= DIRECTIONS && MOST_PARAMETERS <= FEW) };
     // What is differentiated by stays open even where it vanishes.
     let all = |p: usize| pieces.iter().all(|piece| piece.values[p] == 0.0) && !wanted.contains(&p);
     let width = pieces.first().map_or(0, |piece| piece.values.len());
     let known: Vec<_> = (0..width).map(|p| all(p).then_some(0.0)).collect();
     let tape = Tape::record(family, &known).ok();
-    let together = D + MOST_PARAMETERS <= DIRECTIONS;
+    let how = (tape.as_ref(), tolerance);
     try_map(pieces.len(), &|i| {
         let piece = &pieces[i];
-        let with =
-            |by_state, wanted| one(family, piece, (by_state, wanted), (tape.as_ref(), tolerance), stop);
-        if together || wanted.is_empty() {
-            return with(true, wanted);
+        if const { D <= FEW } {
+            return one::<F, D, DIRECTIONS>(family, piece, (true, wanted), how, stop);
+        }
+        let with = |by_state, wanted| one::<F, D, D>(family, piece, (by_state, wanted), how, stop);
+        if wanted.is_empty() {
+            return with(true, &[]);
         }
         let by_parameter = with(false, wanted)?.by_parameter;
         Ok(Flown { by_parameter, ..with(true, &[])? })
@@ -75,7 +76,7 @@ pub fn pieces<F: Family<D>, const D: usize>(
 }
 
 /// One piece with derivatives by its start, where asked for, and then by parameters.
-fn one<F: Family<D>, const D: usize>(
+fn one<F: Family<D>, const D: usize, const N: usize>(
     family: &F,
     piece: &Piece<D>,
     (by_state, wanted): (bool, &[usize]),
@@ -83,12 +84,12 @@ fn one<F: Family<D>, const D: usize>(
     stop: &Stop,
 ) -> Result<Flown<D>, Failure> {
     let first = if by_state { D } else { 0 };
-    let mut values: Vec<Number> = constants(&piece.values);
+    let mut values: Vec<Dual<f64, N>> = constants(&piece.values);
     for (i, &p) in wanted.iter().enumerate() {
         values[p] = Dual::variable(piece.values[p], first + i);
     }
     let system = family.build(&values);
-    let system: &dyn AnySystem<Number, D> = &system;
+    let system: &dyn AnySystem<Dual<f64, N>, D> = &system;
     if let Some(tape) = tape {
         let method = Taylor::new(tape, values, order(tolerance), Isa::best());
         match follow(method, system, piece, first, tolerance, stop) {
@@ -97,28 +98,28 @@ fn one<F: Family<D>, const D: usize>(
         }
     }
     // Of many states the method that is compiled for their exponents.
-    if const { D > 4 } {
+    if const { D > FEW } {
         follow(Dopri5::default(), system, piece, first, tolerance, stop)
     } else {
         follow(Dop853::default(), system, piece, first, tolerance, stop)
     }
 }
 
-fn follow<K, const D: usize>(
+fn follow<K, const D: usize, const N: usize>(
     method: K,
-    system: &dyn AnySystem<Number, D>,
+    system: &dyn AnySystem<Dual<f64, N>, D>,
     piece: &Piece<D>,
     first: usize,
     tolerance: &Tolerance,
     stop: &Stop,
 ) -> Result<Flown<D>, Failure>
 where
-    K: Method<Number, D>,
+    K: Method<Dual<f64, N>, D>,
 {
     // Where derivatives by the start are asked for, those by parameters come after them.
     let variable =
         |n: usize| if n < first { Dual::variable(piece.x[n], n) } else { Dual::constant(piece.x[n]) };
-    let start = vector!(Number, D; n => variable(n));
+    let start = vector!(Dual<f64, N>, D; n => variable(n));
     let end = piece.t + piece.span;
     let norm = WithTangents(*tolerance);
     let mut driver = Driver::by(method, system, piece.t, start, Some(piece.span), &norm);
@@ -140,7 +141,7 @@ where
     for n in 0..D {
         flown.x[n] = x[n].re;
         flown.by_state[n][..first].copy_from_slice(&x[n].d[..first]);
-        let left = MOST_PARAMETERS.min(DIRECTIONS - first);
+        let left = MOST_PARAMETERS.min(N - first);
         flown.by_parameter[n][..left].copy_from_slice(&x[n].d[first..first + left]);
         flown.rate[n] = rate[n].re;
     }

@@ -1,4 +1,4 @@
-"""python -m peers [--rows 1,3] [--only udd,numba] [--quick] [--json out.json]"""
+"""python -m peers [--rows 1,3] [--only udd,numba] [--quick] [--limit limit.txt] [--json out.json]"""
 
 from __future__ import annotations
 
@@ -25,12 +25,17 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="a smoke run: short, once, the fast codes only")
     parser.add_argument("--repeats", type=int, default=7, help="turns, each code once in each")
     parser.add_argument("--seconds", type=float, default=1.0, help="what one timed run takes, about")
+    parser.add_argument("--limit", type=Path, help="what `make bench ARGS=--limit` printed on this machine")
     parser.add_argument("--json", type=Path, help="write the figures there too")
     given = parser.parse_args()
     repeats, seconds = (1, 0.02) if given.quick else (given.repeats, given.seconds)
     only = {name.strip() for name in given.only.split(",") if name.strip()}
     if given.quick and not only:
         only = {"udd", "numba", "lanes", "heyoka"}
+
+    most = table.limits(given.limit.read_text()) if given.limit else {}
+    if given.limit and not most:
+        parser.error(f"{given.limit} is not what `make bench ARGS=--limit` prints")
 
     done, wrong = [], []
     for number in sorted({int(n) for n in given.rows.split(",")}):
@@ -46,7 +51,7 @@ def main() -> int:
     versions = machine.versions()
     print(f"Machine: {machine.processor()}.")
     print("Versions: " + ", ".join(f"{name} {number}" for name, number in versions.items()) + ".\n")
-    print(table.summary(done) + "\n")
+    print(table.summary(done, most) + "\n")
     for row, results in done:
         print(table.details(row, results) + "\n")
     if given.json:

@@ -35,7 +35,8 @@ class Row:
     """One line of the table.
 
     `inspect` looks at an answer and returns what is wrong with it, or nothing. `bound` is the error that
-    every entry must meet to be compared.
+    every entry must meet to be compared. `path` is the same work for one thread among the core's own paths
+    (`make bench`), and `threads` how many take part.
     """
 
     number: int
@@ -47,6 +48,8 @@ class Row:
     smallest: int
     entries: dict[str, Callable[[], Entry]]
     inspect: Callable[[Any], str] = lambda answer: ""
+    path: str = ""
+    threads: int = 1
 
 
 @dataclass

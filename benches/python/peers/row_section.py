@@ -129,6 +129,7 @@ ROW = Row(
     number=5,
     title="section points at w = 1 to 1e-12, rtol 1e-9, one thread",
     unit="points/s",
+    path="section",
     bound=1.2e-7,
     error="5th point",
     full=COUNT,

@@ -178,6 +178,7 @@ ROW = Row(
     number=2,
     title="full Lyapunov spectrum, w = 1, rtol 1e-9, one thread",
     unit="time units/s",
+    path="spectrum",
     bound=1.2e-7,
     error="state at t = 30",
     full=5_000_000,

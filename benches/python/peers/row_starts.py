@@ -174,6 +174,8 @@ ROW = Row(
     number=4,
     title="100,000 random starts to t = 100, rtol 1e-6, two threads",
     unit="system-time-units/s",
+    path="starts",
+    threads=2,
     bound=2e-4,
     error="state at t = 30",
     full=COUNT,

@@ -261,6 +261,8 @@ ROW = Row(
     number=3,
     title="largest exponent at 1000 drives to t = 2000, rtol 1e-6, two threads",
     unit="system-time-units/s",
+    path="exponents",
+    threads=2,
     bound=2e-4,
     error="state at t = 30",
     full=COUNT,

@@ -82,6 +82,7 @@ ROW = Row(
     number=1,
     title="one trajectory, w = 1, rtol 1e-9",
     unit="time units/s",
+    path="trajectory",
     bound=BOUND,
     error="state at t = 30",
     full=10_000_000,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import statistics
 from typing import Any
 
@@ -26,20 +27,30 @@ def standing(row: Row, results: list[Result]) -> tuple[str, str, str]:
     return best, f"{statistics.median(values):.2f}", f"{min(values):.2f} to {max(values):.2f}"
 
 
-def summary(rows: list[tuple[Row, list[Result]]]) -> str:
-    """One line per row: udd, the best peer and their ratio."""
+def limits(text: str) -> dict[str, float]:
+    """The rates that one core could reach at most, from what ``make bench ARGS=--limit`` printed.
+
+    Of the instruction sets the last one is kept, which is the widest.
+    """
+    lines = re.findall(r"^(.*), Avx\w+ +\S+ +(\S+) +\d+ %$", text, re.MULTILINE)
+    return {path: float(most) for path, most in lines}
+
+
+def summary(rows: list[tuple[Row, list[Result]]], most: dict[str, float]) -> str:
+    """One line per row: udd, the best peer, their ratio, and udd's part of the machine's limit."""
     lines = [
-        "| row | unit | udd | best peer | its rate | udd / best peer | spread |",
-        "|---|---|---|---|---|---|---|",
+        "| row | unit | udd | best peer | its rate | udd / best peer | spread | of the limit |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for row, results in rows:
         best, ratio, spread = standing(row, results)
         rate = {result.name: result.rate for result in results}
         own = figure(rate.get("udd", float("nan")))
         peer = figure(rate.get(best, float("nan")))
-        lines.append(
-            f"| {row.number}. {row.title} | {row.unit} | {own} | {best} | {peer} | {ratio} | {spread} |"
-        )
+        limit = row.threads * most.get(row.path, float("nan"))
+        part = f"{100 * rate['udd'] / limit:.0f} %" if "udd" in rate and limit == limit else "-"
+        cells = (f"{row.number}. {row.title}", row.unit, own, best, peer, ratio, spread, part)
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
