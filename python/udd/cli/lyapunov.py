@@ -49,7 +49,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--spectrum",
         action="store_true",
-        help="all exponents, the Kaplan-Yorke dimension, a verdict (chaos, periodic orbit, equilibrium, "
+        help="all exponents, the Kaplan-Yorke dimension, a verdict (chaos, periodic orbit, torus, equilibrium, "
         "undecided) and the period of a periodic orbit; without it the largest exponent only",
     )
     parser.add_argument(
