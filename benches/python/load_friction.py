@@ -37,9 +37,8 @@ def evidence(records: list[udd.Measurement], drives: tuple[float, ...], name: st
 def main(count: int) -> None:
     """Print a row for each truth, set of drives, noise and length."""
     warnings.simplefilter("ignore")
-    print(
-        "| truth | W, cm/s | noise, mm | length, s | log evidence, right less other | told right | told wrong |"
-    )
+    heads = ("truth", "W, cm/s", "noise, mm", "length, s", "log evidence, right less other")
+    print("|", " | ".join([*heads, "told right", "told wrong"]), "|")
     print("|---|---|---|---|---|---|---|")
     for truth, value in TRUTHS:
         (other,) = set(AMPLITUDE) - {truth}

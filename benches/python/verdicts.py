@@ -1,7 +1,7 @@
 """How often the verdict of a spectrum is right: random starts of models whose attractors are known.
 
-Prints each wrong one. `python verdicts.py 20` takes 20 starts of each model, `python verdicts.py 20 Lorenz` those
-of names with this in it.
+Prints each wrong one. `python verdicts.py 20` takes 20 starts of each model, `python verdicts.py 20 Lorenz`
+those of names with this in it.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ def cases() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
 
 
 def beside_what_repels() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
-    """Starts beside strongly unstable cycles and equilibria, and in chaos that lasts long but not for ever."""
+    """Starts beside strongly unstable cycles and equilibria, and in chaos that lasts, but not for ever."""
     lorenz = udd.Model(["x", "y", "z"], LORENZ, {"r": 28.0})
-    # The multipliers: 4.7 each round; -5.8 (DLE); the first is 1e6 at r = 13.94, near the homoclinic orbit.
+    # Multipliers 4.7, and, next to the homoclinic orbit at r = 13.93, much larger.
     turn = udd.periodic_orbit(lorenz, [-13.76361068, -19.57875194, 27.0], period=1.5586522)
     branch = udd.continuation(
         udd.continuation(max(udd.equilibria(lorenz), key=lambda one: one.state[0]), "r", (18.0, 30.0)).find(

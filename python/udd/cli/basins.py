@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--cycles",
         action="store_true",
-        help="solve for the cycle of each attractor that comes back: its period with a bound, its multipliers",
+        help="solve for the cycle of each attractor that is one: its period with a bound, its multipliers",
     )
     add_runs(parser, 100)
     add_out(parser)
@@ -151,7 +151,8 @@ def _cycle_text(cycle: dict[str, Any]) -> str:
         f"{complex(*value):.6g}" if value[1] else f"{value[0]:.6g}" for value in cycle["multipliers"]
     )
     kind = "symmetric cycle" if cycle["symmetric"] else "cycle"
-    return f"{kind} of period {cycle['period']:.13g} (error below {cycle['period_error']:.1g}), multipliers {multipliers}"
+    period = f"{cycle['period']:.13g} (error below {cycle['period_error']:.1g})"
+    return f"{kind} of period {period}, multipliers {multipliers}"
 
 
 def _text(data: dict[str, Any]) -> str:
