@@ -188,7 +188,7 @@ class _Search:
             away = np.linalg.norm((x - around.states) / self.flow.size, axis=1).min()
             if not away < _FAR:
                 return None
-            left |= np.linalg.norm((x - start) / self.flow.size) > _LEFT
+            left = left or bool(np.linalg.norm((x - start) / self.flow.size) > _LEFT)
             if left and before > last < away and last < _NEAR:
                 at = (k - 1) * step
                 return float(at), self._height(values, start, around, float(at))[0]
@@ -267,6 +267,7 @@ class _Search:
     ) -> CycleConnection:
         """The value between two of the parameter, by more and more rounds about the cycle."""
         curve, place = min(self.branch._places, key=lambda own: abs(own[0].value(own[1].u) - low))
+        assert isinstance(curve, CycleCurve)
         near, self.facing = curve.nodes(place.u)[0], None
         self._round(curve, place.u)
         at = one[0] if abs(one[1]) < abs(other[1]) else other[0]
