@@ -165,7 +165,7 @@ def connections(
             manifold = _Manifold(flow, index, grid, rest, sign, span)
             followed += manifold.exists
             its, ended = manifold.connections(parameter)
-            found += its
+            found += [one for one in its if not any(_same(one, other) for other in found)]
             whole_search &= ended
     if not followed:
         raise ModelError("no equilibrium there has one eigenvalue alone on its side of the imaginary axis")
@@ -374,10 +374,7 @@ class _Manifold:
             return
         if not self.grid[0] <= one.value <= self.grid[-1] or abs(one.value - a.value) > 2.0 * beside:
             return
-        if all(
-            abs(one.value - other.value) > _SAME * abs(one.value) or one.kind != other.kind
-            for _, other in found
-        ):
+        if not any(_same(one, other) for _, other in found):
             found.append((part.came, one))
 
     def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
@@ -393,6 +390,10 @@ class _Manifold:
             nodes, rest = nodes[::-1].copy(), mirror * rest
         values = self.values_at(curve.value)
         return found_by(Problem(flow, values, self.index, rest, mirror, nodes, span, curve.value), parameter)
+
+
+def _same(one: Connection, other: Connection) -> bool:
+    return one.kind == other.kind and abs(one.value - other.value) < _SAME * abs(one.value)
 
 
 def _bent(away: Floats, flow: Flow) -> Floats:

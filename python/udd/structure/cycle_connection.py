@@ -148,7 +148,7 @@ class _Search:
     def __init__(self, branch: Branch, guess: Floats, time: float, sign: float, mirrored: bool) -> None:
         curve = branch._places[0][0]
         assert isinstance(curve, CycleCurve)
-        self.branch, self.flow, self.index = branch, curve.flow, curve.parameter
+        self.branch, self.flow = branch, curve.flow
         self.guess, self.time, self.sign = guess, time, sign
         self.mirror = (
             curve.flow.mirror if mirrored and curve.flow.mirror is not None else np.ones(curve.flow.dim)
@@ -158,10 +158,13 @@ class _Search:
 
     def connections(self) -> list[CycleConnection]:
         """Those between neighbouring cycles of the branch that are passed on two sides."""
-        sides = []
+        sides: list[tuple[float, float] | None] = []
         for curve, place in self.branch._places:
             assert isinstance(curve, CycleCurve)
-            sides.append(self._side(curve, place.u))
+            try:
+                sides.append(self._side(curve, place.u))
+            except IntegrationError:
+                sides.append(None)  # it goes away for good
         found = []
         for (i, one), (j, other) in pairwise(enumerate(sides)):
             if one is None or other is None or one[1] * other[1] >= 0.0:
