@@ -17,9 +17,9 @@ import udd
 
 sys.path.append(str(Path(__file__).parents[2] / "tests"))
 
-from exact_cycles import symmetric_period
+from exact_cycles import step, symmetric_period
 
-_DIGITS, _ORDER, _STEP = 50, 40, Decimal("0.1")
+_DIGITS, _STEP = 50, Decimal("0.1")
 
 
 def row(what: str, value: float, known: Decimal, bound: float) -> float:
@@ -55,24 +55,6 @@ def hopf_points() -> list[float]:
     return found
 
 
-def flow(x: list[Decimal], w: Decimal, B: Decimal, h: Decimal) -> list[Decimal]:
-    """The state of the damped equations a step later."""
-    a, b, c = ([value] for value in x)
-    for k in range(_ORDER):
-        az = sum((a[i] * c[k - i] for i in range(k + 1)), Decimal(0))
-        ay = sum((a[i] * b[k - i] for i in range(k + 1)), Decimal(0))
-        a.append((b[k] - a[k]) / (k + 1))
-        b.append(az / (k + 1))
-        c.append(((w if k == 0 else 0) - ay - B * w * c[k]) / (k + 1))
-    ends = []
-    for series in (a, b, c):
-        value = Decimal(0)
-        for term in reversed(series):
-            value = value * h + term
-        ends.append(value)
-    return ends
-
-
 def homoclinic_orbits() -> list[float]:
     """Of the saddle at z = 1/B, at the end of the cycles that the Hopf point gives rise to."""
     found = []
@@ -94,7 +76,7 @@ def homoclinic(near: Decimal, B: Decimal) -> Decimal:
     def after(w: Decimal, steps: int) -> list[list[Decimal]]:
         states = [[small, small * (1 + growing), 1 / B]]
         for _ in range(steps):
-            states.append(flow(states[-1], w, B, _STEP))
+            states.append(step(states[-1], w, _STEP, B))
         return states
 
     # It comes back nearest to the saddle once it has been far away.
