@@ -11,23 +11,28 @@ import udd
 _DIGITS, _ORDER, _STEPS = 36, 36, 40
 
 
+def step(x: list[Decimal], w: Decimal, h: Decimal, B: Decimal = Decimal(0)) -> list[Decimal]:
+    """The state of the (damped) equations a step later, by a power series."""
+    a, b, c = ([value] for value in x)
+    for k in range(_ORDER):
+        az = sum((a[i] * c[k - i] for i in range(k + 1)), Decimal(0))
+        ay = sum((a[i] * b[k - i] for i in range(k + 1)), Decimal(0))
+        a.append((b[k] - a[k]) / (k + 1))
+        b.append(az / (k + 1))
+        c.append(((w if k == 0 else 0) - ay - B * w * c[k]) / (k + 1))
+    ends = []
+    for series in (a, b, c):
+        value = Decimal(0)
+        for term in reversed(series):
+            value = value * h + term
+        ends.append(value)
+    return ends
+
+
 def _flow(x: list[Decimal], w: Decimal, time: Decimal) -> list[Decimal]:
-    """The state after a time, each step a power series."""
-    h = time / _STEPS
+    """The state after a time."""
     for _ in range(_STEPS):
-        a, b, c = ([value] for value in x)
-        for k in range(_ORDER):
-            az = sum((a[i] * c[k - i] for i in range(k + 1)), Decimal(0))
-            ay = sum((a[i] * b[k - i] for i in range(k + 1)), Decimal(0))
-            a.append((b[k] - a[k]) / (k + 1))
-            b.append(az / (k + 1))
-            c.append(((w if k == 0 else 0) - ay) / (k + 1))
-        x = []
-        for series in (a, b, c):
-            value = Decimal(0)
-            for term in reversed(series):
-                value = value * h + term
-            x.append(value)
+        x = step(x, w, time / _STEPS)
     return x
 
 

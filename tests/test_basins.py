@@ -292,3 +292,15 @@ def test_the_command_refuses_in_one_sentence(
     assert out == ""
     assert words in err
     assert len(err.splitlines()) == 1
+
+
+def test_the_terminal_solves_for_the_cycles_of_attractors(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["basins", "omega=-3:3:6", "z=-3:3:6", "--w", "6.2", "--state", "0,0.5,0", "--cycles", "--json"]
+    assert main(argv) == 0
+    attractors = json.loads(capsys.readouterr().out)["attractors"]
+    assert len(attractors) == 2
+    known = udd.periodic_orbit(udd.DLE(6.2), settle=500.0)
+    for one in attractors:
+        cycle = one["cycle"]
+        assert not cycle["symmetric"] and abs(cycle["period"] - known.period) < 1e-10
+        assert 0.0 < cycle["period_error"] < 1e-11 and len(cycle["multipliers"]) == 2

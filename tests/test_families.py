@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import integrate, special
+from scipy import integrate, optimize, special
 
 import udd
 from udd.errors import ModelError
@@ -112,3 +112,40 @@ def test_what_is_not_kept_is_refused() -> None:
     assert born.values[0] == pytest.approx(2.0 * point.value, abs=0.1)
     # One of a family: how long it lasts is nothing that has a bound.
     assert np.isnan(orbit.period_error)
+
+
+def test_pairs_of_multipliers_leave_the_unit_circle_where_another_integrator_has_it() -> None:
+    # A pendulum whose swing couples two others: where the sum of their frequencies is its own, both grow.
+    equations = ["v", "-sin(x) + c*y*z", "p", "-0.09*y + c*x*z", "q", "-0.3364*z + c*x*y"]
+    model = udd.Model(["x", "v", "y", "p", "z", "q"], equations, {"c": 0.15})
+    swing = udd.periodic_orbit(model, [0.6, 0.0, 0.0, 0.0, 0.0, 0.0], period=6.43)
+    family = udd.continuation(swing, "period", (6.4, 8.2))
+    (point,) = family.points
+    assert point.kind == "Krein collision"
+
+    def discriminant(energy: float) -> float:
+        """Of the two pairs' sums, at a swing of this energy."""
+        start = np.arccos(-energy)
+        lasts = 4 * special.ellipk((1 + energy) / 2)
+
+        def rates(t: float, s: np.ndarray) -> np.ndarray:
+            y, p, z, q = s[2:].reshape(4, 4)
+            x = s[0]
+            return np.concatenate(
+                [[s[1], -np.sin(x)], p, -0.09 * y + 0.15 * x * z, q, -0.3364 * z + 0.15 * x * y]
+            )
+
+        begin = np.concatenate([[start, 0.0], np.eye(4).ravel()])
+        end = integrate.solve_ivp(rates, [0.0, lasts], begin, "DOP853", rtol=1e-12, atol=1e-13).y[2:, -1]
+        m = end.reshape(4, 4)
+        trace = float(np.trace(m))
+        products = 0.5 * (trace**2 - float(np.trace(m @ m))) - 2.0
+        return trace**2 - 4.0 * products
+
+    energy = float(2 * optimize.brentq(lambda m: 4 * special.ellipk(m) - point.value, 1e-6, 0.9) - 1)
+    known = float(optimize.brentq(discriminant, energy - 1e-3, energy + 1e-3, xtol=1e-14))
+    # The other integrator's tolerance, over the slope of the discriminant.
+    assert point.value == pytest.approx(4 * special.ellipk((1 + known) / 2), abs=1e-9)
+    assert 0.0 < point.error < 1e-11
+    with pytest.raises(ModelError):
+        udd.continuation(point)

@@ -219,3 +219,21 @@ def test_a_disk_from_its_wheel_has_the_speed_of_the_rim() -> None:
     for bad in ({"rate": -1.0}, {"rate": 1.0, "wheel": 0.0}, {"rate": math.nan}):
         with pytest.raises(ModelError):
             udd.Disk.from_wheel(**bad)
+
+
+def test_friction_under_load_takes_the_load_from_how_the_centre_accelerates() -> None:
+    plain = udd.Disk(0.071)
+    loaded = udd.Disk(0.071, effects=[udd.effects.load_friction(a=0.4)])
+    states = np.random.default_rng(3).uniform([-9, -0.04, -0.04, 0], [9, 0.04, 0.04, 6], (50, 4))
+    rates = plain.rates(0.0, states)
+    # d^2Z/dT^2 along the plain motion, by differences of dZ/dT.
+    h = 1e-6
+    later, earlier = (plain.rates(0.0, states + step * rates)[:, 2] for step in (h, -h))
+    load = 1.0 + (later - earlier) / (2 * h) / plain.parameters["g"]
+    omega, y, z, _ = states.T
+    k = np.maximum(0.103 - 0.055 * np.abs(omega), 0.012)
+    inertia = 0.08**2 / 2 + y**2 + z**2
+    added = -0.4 * (load - 1.0) * k * omega / inertia
+    # What differences leave, of rates up to some hundred.
+    np.testing.assert_allclose(loaded.rates(0.0, states)[:, 0] - rates[:, 0], added, rtol=1e-6, atol=1e-5)
+    np.testing.assert_array_equal(loaded.rates(0.0, states)[:, 1:], rates[:, 1:])

@@ -55,6 +55,14 @@ def test_an_equilibrium():
     assert abs(found.exponents.sum() + 2.0) < 1e-8
 
 
+def test_a_motion_of_two_frequencies_is_a_torus():
+    equations = ["v", "(1-x^2)*v-x", "w", "2*(1-y^2)*w-y"]
+    found = udd.lyapunov_spectrum(udd.Model(["x", "v", "y", "w"], equations), state0=[1.0, 0.0, 0.5, 0.3])
+    assert found.verdict == "torus"
+    # Exponents along it are averages that go to zero as 1/t; the dimension is that of the torus.
+    assert found.dimension == 2.0
+
+
 def test_a_chaotic_transient_is_told_as_one():
     # Figure 16b: chaos that lives some 27,000 units and ends in rotation, which is stable.
     w, B = 3.7, 0.2

@@ -1,10 +1,12 @@
 """How often the verdict of a spectrum is right: random starts of models whose attractors are known.
 
-Prints each wrong one. `python verdicts.py 20` takes 20 starts of each model.
+Prints each wrong one. `python verdicts.py 20` takes 20 starts of each model, `python verdicts.py 20 Lorenz`
+those of names with this in it.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 import warnings
@@ -29,7 +31,32 @@ def cases() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
         ("Lorenz, r = 160", udd.Model(xyz, LORENZ, {"r": 160.0}), 5 * middle, SPREAD, {"periodic orbit"}),
         ("DLE, w = 10", udd.DLE(10.0), np.array([1.0, 1.0, 0.0]), np.full(3, 2.0), {"periodic orbit"}),
         ("DLE, w = 1", udd.DLE(1.0), np.array([1.0, 1.0, 0.0]), np.full(3, 1.0), {"chaos"}),
+        *beside_what_repels(),
         *larger(),
+    ]
+
+
+def beside_what_repels() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
+    """Starts beside strongly unstable cycles and equilibria, and in chaos that lasts, but not for ever."""
+    lorenz = udd.Model(["x", "y", "z"], LORENZ, {"r": 28.0})
+    # Multipliers 4.7, and, next to the homoclinic orbit at r = 13.93, much larger.
+    turn = udd.periodic_orbit(lorenz, [-13.76361068, -19.57875194, 27.0], period=1.5586522)
+    branch = udd.continuation(
+        udd.continuation(max(udd.equilibria(lorenz), key=lambda one: one.state[0]), "r", (18.0, 30.0)).find(
+            "Hopf"
+        )[0],
+        period=2.0,
+    )
+    long = branch.solution(len(branch) - 1)
+    near = np.full(3, 1e-6)
+    damped = udd.DLE(3.75, B=0.2)
+    transient = np.array([np.sqrt(3.75), np.sqrt(3.75), -3.5])
+    return [
+        ("at an unstable cycle", lorenz, turn.state, near, {"chaos"}),
+        ("at one before the Hopf", long.model, long.state, near, {"equilibrium"}),
+        ("at a saddle-focus", udd.DLE(1.0), np.array([1.0, 1.0, 0.0]), near, {"chaos"}),
+        ("in a transient", damped, transient, np.full(3, 0.1), {"equilibrium"}),
+        ("in Lorenz's, r = 22", lorenz.with_parameters({"r": 22.0}), np.zeros(3), SPREAD, {"equilibrium"}),
     ]
 
 
@@ -41,19 +68,21 @@ def larger() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
     six = udd.Model(["x", "a", "y", "b", "z", "c"], chain)
     return [
         ("one state", udd.Model(["x"], ["x-x^3"]), np.zeros(1), np.full(1, 2.0), {"equilibrium"}),
-        # Two frequencies without a common measure: none of the three.
-        ("four, a torus", two, np.zeros(4), np.full(4, 2.0), {"undecided"}),
+        # Two frequencies without a common measure.
+        ("four, a torus", two, np.zeros(4), np.full(4, 2.0), {"torus"}),
         ("five, chaos", five, np.array([0, 0, 25.0, 0, 0]), np.array([10, 10, 10, 2, 2.0]), {"chaos"}),
         # Beside the cycle there is a stable torus, with two exponents zero.
-        ("six, cycle or torus", six, np.zeros(6), np.full(6, 2.0), {"periodic orbit", "undecided"}),
+        ("six, cycle or torus", six, np.zeros(6), np.full(6, 2.0), {"periodic orbit", "torus"}),
     ]
 
 
-def main(count: int) -> None:
+def main(count: int, wanted: str) -> None:
     """Print for each case how many verdicts are right."""
     warnings.simplefilter("ignore")
     random = np.random.default_rng(11)
     for name, model, middle, spread, right in cases():
+        if not re.search(wanted, name):
+            continue
         begin, wrong = time.perf_counter(), []
         for start in middle + spread * random.uniform(-1.0, 1.0, (count, len(middle))):
             found = udd.lyapunov_spectrum(model, state0=start)
@@ -67,4 +96,4 @@ def main(count: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 84)
+    main(int((sys.argv[1:] or ["84"])[0]), (sys.argv[2:] or [""])[0])

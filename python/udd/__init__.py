@@ -21,6 +21,7 @@ _PUBLIC = {
     "Discovery": "udd.discovery",
     "Covariant": "udd.spectra",
     "Connections": "udd.structure",
+    "CycleConnection": "udd.structure",
     "Diagram": "udd.structure",
     "Disk": "udd.models",
     "Ensemble": "udd.ensembles",
@@ -47,6 +48,7 @@ _PUBLIC = {
     "connection": "udd.structure",
     "connections": "udd.structure",
     "continuation": "udd.structure",
+    "cycle_connections": "udd.structure",
     "covariant_vectors": "udd.spectra",
     "diagram": "udd.structure",
     "discover": "udd.discovery",
@@ -121,6 +123,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import Cascade as Cascade
     from udd.structure import Connection as Connection
     from udd.structure import Connections as Connections
+    from udd.structure import CycleConnection as CycleConnection
     from udd.structure import Diagram as Diagram
     from udd.structure import Equilibrium as Equilibrium
     from udd.structure import Lifetimes as Lifetimes
@@ -130,6 +133,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from udd.structure import connection as connection
     from udd.structure import connections as connections
     from udd.structure import continuation as continuation
+    from udd.structure import cycle_connections as cycle_connections
     from udd.structure import diagram as diagram
     from udd.structure import equilibria as equilibria
     from udd.structure import lifetimes as lifetimes

@@ -27,6 +27,7 @@ __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
 _Floats = NDArray[np.float64]
 
 _SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_STAYS = 1e-3  # an exponent that is smaller than this, per typical time, is as good as zero
 _FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
 _LATE = 4  # times that a motion that nearly comes back is looked at again
 _POINTS = 600  # section points in which a periodic motion shows itself
@@ -44,9 +45,11 @@ class Spectrum:
         From the scatter of the means over blocks of the run.
     dimension : float
         The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero.
-    verdict : {"chaos", "periodic orbit", "equilibrium", "undecided"}
+    verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "undecided"}
         What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which
-        comes back or rests; chaos by a largest exponent at least four standard errors above zero.
+        comes back or rests; chaos by a largest exponent at least four standard errors above zero; a torus
+        (quasiperiodic motion) by two exponents or more that are smaller than 1e-3 per typical time, and none
+        above.
     period : float
         The period of a periodic orbit, else NaN.
     invariants : dict of str to float
@@ -215,11 +218,17 @@ def lyapunov_spectrum(
     if fate.ordered:
         verdict = fate.kind
     else:
-        verdict = "chaos" if fate.kind == "aperiodic" and _positive(found) else "undecided"
+        verdict = "undecided"
+        if fate.kind == "aperiodic" and _positive(found):
+            verdict = "chaos"
+        elif fate.kind == "aperiodic" and _on_torus(model, found):
+            verdict = "torus"
     order = np.argsort(-values, kind="stable")
     values, errors = values[order], errors[order]
     # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
     dimension = {"equilibrium": 0.0, "periodic orbit": 1.0}.get(verdict) or kaplan_yorke(values)
+    if verdict == "torus":
+        dimension = kaplan_yorke(np.where(np.abs(values) < _STAYS / slow, 0.0, values))
     return Spectrum(
         values,
         errors,
@@ -239,6 +248,16 @@ def lyapunov_spectrum(
 def _positive(found: _core._Orbits) -> bool:
     """Whether neighbouring orbits part."""
     return bool(found["value"][0, 0] > _SIGMAS * found["standard_error"][0, 0])
+
+
+def _on_torus(model: Model, found: _core._Orbits) -> bool:
+    """Whether distances stay as they are in two directions, and grow in none."""
+    from udd.branching.coordinates import coordinates_of
+
+    # Angles that nothing depends on neither grow nor shrink on any motion.
+    free = int((~np.isfinite(coordinates_of(model, found["end"]).size)).sum())
+    value, zero = found["value"][0], _STAYS / model.slow
+    return bool(value.max() < zero and (np.abs(value) < zero).sum() - free >= 2)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import argparse
 import warnings
 from typing import TYPE_CHECKING, Any
 
-from udd.errors import IncompleteWarning, UddError
+from udd.errors import IncompleteWarning, ModelError, UddError
 
 from .answer import Answer, watched
 from .chosen import add_models, add_runs, axis_of, model_of, runs_of, starts_of
@@ -15,6 +15,8 @@ from .saving import PICTURES, add_out, checked, save
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from udd.models import Model
 
 
 def add(commands: Any) -> None:
@@ -26,6 +28,11 @@ def add(commands: Any) -> None:
         nargs="+",
         metavar="NAME=FIRST:LAST:N",
         help="one to three components of the state with their values at the start, such as omega=-3:3:100",
+    )
+    parser.add_argument(
+        "--cycles",
+        action="store_true",
+        help="solve for the cycle of each attractor that is one: its period with a bound, its multipliers",
     )
     add_runs(parser, 100)
     add_out(parser)
@@ -56,12 +63,40 @@ def run(args: argparse.Namespace) -> Answer:
             **runs_of(args),
             partial=True,
         )
+    cycles = _cycles(model_of(args, {}), found) if args.cycles else {}
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
     save(args.out, found, lambda ax: draw(found, ax))
     stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
     data = {**summary_of(found), "complete": not stopped, "files": args.out}
+    for one in data["attractors"]:
+        if one["number"] in cycles:
+            one["cycle"] = cycles[one["number"]]
     return Answer(_text(data), data, 130 if stopped else 0)
+
+
+def _cycles(model: Model, found: xr.Dataset) -> dict[int, dict[str, Any]]:
+    """The cycle of each attractor that is one."""
+    from udd.structure import periodic_orbit
+
+    cycles = {}
+    for k in found["number"].to_numpy():
+        one = found.sel(number=k)
+        if not float(one["period_time"]) > 0.0:
+            continue
+        try:
+            orbit = periodic_orbit(model, one)
+        except ModelError as error:
+            warnings.warn(f"attractor {k}: {error}", stacklevel=2)
+            continue
+        cycles[int(k)] = {
+            "period": orbit.period,
+            "period_error": orbit.period_error,
+            "symmetric": orbit.symmetric,
+            "multipliers": [[value.real, value.imag] for value in orbit.multipliers.tolist()],
+            "state": orbit.state.tolist(),
+        }
+    return cycles
 
 
 def _component(text: str) -> tuple[str, Any]:
@@ -111,6 +146,15 @@ def summary_of(found: xr.Dataset) -> dict[str, Any]:
     }
 
 
+def _cycle_text(cycle: dict[str, Any]) -> str:
+    multipliers = ", ".join(
+        f"{complex(*value):.6g}" if value[1] else f"{value[0]:.6g}" for value in cycle["multipliers"]
+    )
+    kind = "symmetric cycle" if cycle["symmetric"] else "cycle"
+    period = f"{cycle['period']:.13g} (error below {cycle['period_error']:.1g})"
+    return f"{kind} of period {period}, multipliers {multipliers}"
+
+
 def _text(data: dict[str, Any]) -> str:
     size = " x ".join(f"{n} {name}" for name, n in data["grid"].items())
     lines = [f"{data['model']}, {size}"]
@@ -121,6 +165,8 @@ def _text(data: dict[str, Any]) -> str:
             what += f", {one['kind']}"
             what += f" {one['period']}, T = {one['period_time']:.8g}" if one["kind"] == "periodic" else ""
             what += f", mirror image of {one['mirror']}" if one["mirror"] not in (0, one["number"]) else ""
+            if "cycle" in one:
+                what += f"; {_cycle_text(one['cycle'])}"
         lines.append(f"  {100 * end['fraction']:.4g} +- {100 * end['standard_error']:.2g} %: {what}")
     exponent = data["uncertainty_exponent"]
     if exponent["value"] == exponent["value"]:

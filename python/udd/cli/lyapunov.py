@@ -49,8 +49,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--spectrum",
         action="store_true",
-        help="all exponents, the Kaplan-Yorke dimension, a verdict (chaos, periodic orbit, equilibrium, "
-        "undecided) and the period of a periodic orbit; without it the largest exponent only",
+        help="all exponents, the Kaplan-Yorke dimension, a verdict (chaos, periodic orbit, torus, "
+        "equilibrium, undecided) and the period of a periodic orbit; without it the largest exponent only",
     )
     parser.add_argument(
         "--t", type=float, help="length of the run at most (default 100000, with --spectrum 200000)"

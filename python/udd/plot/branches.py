@@ -28,6 +28,7 @@ _MARKS = {
     "symmetry breaking": ("D", "#cc79a7"),
     "period doubling": ("o", "#e69f00"),
     "Neimark-Sacker": ("p", "#56b4e9"),
+    "Krein collision": ("X", "#56b4e9"),
     "branch point": ("^", "#999999"),
     "border collision": ("x", "#999999"),
 }

@@ -5,6 +5,7 @@ from .branches import continuation
 from .cascades import Cascade, cascade
 from .connecting import Connection, connection
 from .connection_search import Connections, connections
+from .cycle_connection import CycleConnection, cycle_connections
 from .diagrams import Diagram, diagram
 from .loci import Locus, locus
 from .orbits import periodic_orbit
@@ -18,6 +19,7 @@ __all__ = [
     "Cascade",
     "Connection",
     "Connections",
+    "CycleConnection",
     "Diagram",
     "Equilibrium",
     "Lifetimes",
@@ -27,6 +29,7 @@ __all__ = [
     "connection",
     "connections",
     "continuation",
+    "cycle_connections",
     "diagram",
     "equilibria",
     "lifetimes",

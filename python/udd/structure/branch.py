@@ -32,7 +32,8 @@ class BifurcationPoint:
     kind : str
         Of equilibria and cycles: "fold", "branch point"; of equilibria: "Hopf", "border collision" (on a
         surface where the law changes, the branch goes on) and "nonsmooth fold" (there, it turns back); of
-        cycles: "symmetry breaking", "period doubling", "Neimark-Sacker".
+        cycles: "symmetry breaking", "period doubling", "Neimark-Sacker"; of families of cycles: "Krein
+        collision", where two pairs of multipliers meet on the unit circle and leave it.
     parameter : str
     value : float
         The parameter's value.

@@ -83,14 +83,15 @@ class Connection:
     def fold_ratio(self) -> float:
         """By what the distance of a branch's folds from the value shrinks from fold to fold; NaN of saddles.
 
-        They lie on both sides in turn: ``exp(-pi rho/omega)`` for the pair ``rho +- i omega``.
+        They lie on both sides in turn: ``exp(-pi rho/omega)`` for the pair ``rho +- i omega``. This is
+        Shil'nikov's limit for many folds; there is no bound of how far any one fold is off.
         """
         pair = self.leading
         return float(np.exp(-np.pi * abs(pair.real) / pair.imag)) if pair.imag else float("nan")
 
     @property
     def fold_spacing(self) -> float:
-        """By what the period grows from one fold to the next: ``pi/omega``; NaN of saddles."""
+        """By what the period grows from fold to fold in that limit: ``pi/omega``; NaN of saddles."""
         return float(np.pi / self.leading.imag) if self.leading.imag else float("nan")
 
     def __repr__(self) -> str:

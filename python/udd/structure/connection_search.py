@@ -23,54 +23,56 @@ from .rests import equilibria, refined
 __all__ = ["Connections", "connections"]
 
 _FINE = 24  # states looked at in a typical time
-_AWAY = 1e-3  # from the equilibrium, in typical sizes, the manifold begins as a straight line
+_ASIDE = 1e-3  # from equilibria, in typical sizes, begin runs that show the extent of the motion
+_AWAY = 1e-6  # from the equilibrium, in typical sizes, the manifold begins as a straight line
 _LEFT = 0.1  # further away it has left the equilibrium,
 _LEAVES = 80.0  # which takes as many typical times at most
 _SHOWN = 20.0  # typical times that show the extent of the motion
 _FAR = 30.0  # typical sizes, beyond which nothing comes back
-_NEAR = 3.0  # a passage at a larger distance is none
+_BEND = 3.0  # typical sizes beyond which distances count less and less
+_APART = 0.6  # curves that stay nearer than this to each other are alike
+_NEAR = 1.0  # a passage at a larger distance is none
 _LOOSE = 10.0  # times 1e-13: so accurate are the runs
 _CLOSE = 3e-2  # from so near a passage Newton's method starts,
-_NARROW = 1e-11  # or from an interval this narrow: towards a slow spiral passages come nearer slowly
+_TRIED = 1e-6  # or from an interval this narrow: towards a slow spiral passages come nearer slowly;
+_NARROW = 1e-12  # none is cut that is narrower
+_BESIDE = 1e3  # widths of an interval, within which what passes as soon is what is known
+_SOONER = 0.5  # typical times
 _TRIES = 4  # to find an equilibrium
-_FINER = 4  # so often values are added where the manifold stays longest
-_PARTS = 8  # into which an interval is cut between values on whose sides it passes differ,
-_ROUNDS = 14  # so often at most
-_BEFORE = 1.5  # typical times by which passages at neighbouring values differ at most
-_LATER = 15.0  # ... by which it passes later next to a connection
-_TURN = 3.0  # ... that a turn about an equilibrium takes at most
-_BESIDE = 4.0  # steps of the grid by which Newton's method may move a connection
+_PARTS = 4  # into which an interval is cut
+_MOST = 30_000  # curves are compared at most
+_ROWS = 2000  # curves followed together
+_SAME = 1e-11  # relative distance of connections that are one
 
 
-@dataclass(frozen=True)
-class _Passage:
-    """Where a manifold passes an equilibrium: when, how near, on which side of its other manifold."""
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """One side of an equilibrium's manifold of one dimension: states (k, r) at equal distances of time.
 
-    t: float
-    distance: float
-    side: float
-
-
-_Nearest = tuple[float, _Passage, Floats, Floats]
-
-
-@dataclass(frozen=True)
-class _Bracket:
-    """Two values between which the side changes on which an equilibrium (or its mirror image) is passed.
-
-    And the nearest passage seen between: the value, the passage, the manifold, the equilibrium.
+    With the left eigenvector that tells the side of the other manifold, and the first state that has left.
     """
 
-    low: float
-    high: float
-    before: _Passage
-    after: _Passage
-    image: bool
+    value: float
     rest: Floats
-    nearest: _Nearest | None = None
+    left: Floats
+    path: Floats
+    left_at: float
 
 
-_Compared = tuple[float, Floats, dict[bool, list[_Passage]], int]
+@dataclass(frozen=True)
+class _Part:
+    """Where two curves part: when they came near the equilibrium that parts them, and were nearest to it.
+
+    Whether it is the mirror image, and how near they were: infinite where none parts them.
+    """
+
+    came: int
+    nearest: int
+    image: bool
+    distance: float
+
+
+_Found = tuple[int, Connection]  # when it came near the equilibrium at its end
 
 
 class Connections(list[Connection]):
@@ -95,7 +97,7 @@ def connections(
     parameter: str,
     bounds: Sequence[float],
     *,
-    n: int = 1000,
+    n: int = 300,
     longest: float | None = None,
 ) -> Connections:
     """The homoclinic and heteroclinic orbits of an interval of a parameter.
@@ -108,10 +110,10 @@ def connections(
     bounds : (float, float)
         Of the parameter, both finite.
     n : int
-        At so many values, equally far apart, the manifolds are compared.
+        At so many values, equally far apart, the manifolds are compared at first.
     longest : float, optional
-        For so long manifolds are followed after they have left their equilibrium, by default 10 typical
-        times.
+        Connections are looked for that come near the equilibrium at their end within this time after they
+        have left the one at their beginning, by default 10 typical times.
 
     Returns
     -------
@@ -126,11 +128,12 @@ def connections(
     Notes
     -----
     Of each equilibrium that has one eigenvalue alone on its side of the imaginary axis, the manifold along it
-    is a pair of curves, followed forward or backward in time. Where such a curve passes the equilibrium, or
-    its mirror image, on another side than at the next value of the parameter, there is a connection between
-    the two; it is found by narrowing the interval, and by Newton's method as :func:`udd.connection` does. Two
-    connections between neighbouring values are missed, as are those that take longer. Where the manifold
-    goes away for good, values are added where it stays longest, and where it passes more or fewer times.
+    is a pair of curves, followed forward or backward in time. An interval at whose ends these curves take
+    different courses is cut again and again; where they part at the equilibrium, or at its mirror image,
+    which they pass on two sides, there is a connection between, and Newton's method finds it as
+    :func:`udd.connection` does. About a connection with a slow spiral there are infinitely many others, which
+    take longer. Missed are those between neighbouring values at which the curves take one course, and a few
+    that lie nearer to each other than 1e-7.
 
     Examples
     --------
@@ -150,7 +153,7 @@ def connections(
     span = number("longest", 10.0 * flow.clock if longest is None else longest, above=0.0)
     rests = [flow.reduced(rest.state) for rest in there]
     found: list[Connection] = []
-    followed = 0
+    followed, whole_search = 0, True
     for k, rest in enumerate(rests):
         mirror = flow.mirror
         if mirror is not None and any(np.allclose(mirror * rest, other, atol=1e-9) for other in rests[:k]):
@@ -161,16 +164,18 @@ def connections(
                 continue  # so are the two sides of this one
             manifold = _Manifold(flow, index, grid, rest, sign, span)
             followed += manifold.exists
-            for connection in manifold.connections(parameter):
-                if all(abs(connection.value - one.value) > 1e-9 * abs(one.value) for one in found):
-                    found.append(connection)
+            its, ended = manifold.connections(parameter)
+            found += [one for one in its if not any(_same(one, other) for other in found)]
+            whole_search &= ended
     if not followed:
         raise ModelError("no equilibrium there has one eigenvalue alone on its side of the imaginary axis")
     found.sort(key=lambda one: one.value)
     search = (
         f"{followed} manifolds compared at {len(grid)} values of {parameter} from {low:g} to {high:g}, "
-        f"each followed for {span:.4g}: shorter pairs and longer ones may exist"
+        f"each followed for {span:.4g}: longer ones may exist"
     )
+    if not whole_search:
+        search += ", and others in intervals that were not narrowed to the end"
     return Connections(found, search)
 
 
@@ -183,7 +188,7 @@ def _extent(model: Model, rests: list[Floats]) -> Floats:
         # What blows up does so later than half of the time, or than a quarter, ...
         for part in 0.5 ** np.arange(8):
             try:
-                aside = rest + _AWAY * (1.0 + np.abs(rest))
+                aside = rest + _ASIDE * (1.0 + np.abs(rest))
                 seen += [*simulate(model, part * times, aside, method="auto").state]
                 break
             except IntegrationError:
@@ -216,7 +221,7 @@ class _Manifold:
 
     def rest_near(self, value: float, guess: Floats) -> Floats | None:
         """The equilibrium near a guess; where Powell's method stalls, from a little beside it."""
-        aside = np.random.default_rng(8).uniform(-_AWAY, _AWAY, (_TRIES, len(guess)))
+        aside = np.random.default_rng(8).uniform(-_ASIDE, _ASIDE, (_TRIES, len(guess)))
         for shift in (np.zeros(len(guess)), *aside):
             found = refined(self.flow, self.values_at(value), guess + shift * self.flow.size)
             if found is not None:
@@ -237,49 +242,46 @@ class _Manifold:
                 return float(numbers[k].real), turn * vector, turn * left
         return None
 
-    def passages(
-        self, values: Floats, rests: list[Floats], longest: float
-    ) -> tuple[list[dict[bool, list[_Passage]]], list[Floats]]:
-        """Passages by the equilibrium, or its mirror image (True), at each value; the states on the way."""
+    def curves(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
+        """The curve at each value, from beside the equilibrium until it has gone far or time is up."""
+        found: list[_Curve] = []
+        for first in range(0, len(values), _ROWS):
+            part = slice(first, first + _ROWS)
+            found += self._followed(values[part], rests[part])
+        return found
+
+    def _followed(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
         flow, step = self.flow, self.flow.clock / _FINE
         size, count = flow.size, len(values)
         ways = [self.alone(value, rest) for value, rest in zip(values.tolist(), rests, strict=True)]
-        going = np.array([way is not None for way in ways])
-        states = [
-            rest + size * (self.sign * _AWAY * way[1] if way is not None else 0.0)
-            for rest, way in zip(rests, ways, strict=True)
-        ]
-        x = np.array(states)
-        time = np.array([np.sign(way[0]) if way is not None else 1.0 for way in ways])
+        center, left = np.array(rests), np.zeros((count, flow.dim))
+        x, time = center.copy(), np.ones(count)
+        for i, way in enumerate(ways):
+            if way is not None:
+                x[i] += size * self.sign * _AWAY * way[1]
+                time[i], left[i] = np.sign(way[0]), way[2]
         rows = np.tile(flow.values, (count, 1))
         rows[:, self.index] = values
-        paths = [[state.copy()] for state in x]
-        left_at = np.full(count, np.inf)
-        center = np.array(rests)
-        for k in range(1, round(_FINE * (_LEAVES + longest / flow.clock))):
+        going = np.array([way is not None for way in ways])
+        states, away_at, end = [x.copy()], np.full(count, np.inf), np.zeros(count, dtype=np.intp)
+        # Between values that are hardly apart it is seen late on which side an equilibrium is passed.
+        rates = [abs(way[0]) for way in ways if way is not None]
+        lasts = self.longest - float(np.log(_NARROW)) / min(rates, default=1.0)
+        for k in range(1, round(_FINE * (_LEAVES + lasts / flow.clock))):
             own = np.flatnonzero(going)
             if not len(own):
                 break
             x[own] = self._on(rows[own], x[own], time[own] * step)
+            states.append(x.copy())
+            end[own] = k
             scaled = np.linalg.norm((x - center) / size, axis=1)
-            for i in own.tolist():
-                paths[i].append(x[i].copy())
-                if scaled[i] > _LEFT and not np.isfinite(left_at[i]):
-                    left_at[i] = k * step
-                if not scaled[i] < _FAR or k * step > left_at[i] + longest:
-                    going[i] = False
-        found = []
-        for i, way in enumerate(ways):
-            images = {False: rests[i]}
-            if flow.mirror is not None and not np.allclose(flow.mirror * rests[i], rests[i], atol=1e-9):
-                images[True] = flow.mirror * rests[i]
-            table = {}
-            for image, target in images.items():
-                table[image] = (
-                    [] if way is None else self._by(np.array(paths[i]), target, way[2], image, left_at[i])
-                )
-            found.append(table)
-        return found, [np.array(path) for path in paths]
+            away_at = np.where(going & (scaled > _LEFT), np.minimum(away_at, k), away_at)
+            going &= (scaled < _FAR) & ((k - away_at) * step < lasts)
+        path = np.array(states)
+        return [
+            _Curve(value, rests[i], left[i], path[: end[i] + 1, i], away_at[i])
+            for i, value in enumerate(values.tolist())
+        ]
 
     def _on(self, rows: Floats, x: Floats, spans: Floats) -> Floats:
         """The states a step later; infinite where the run blows up."""
@@ -292,144 +294,109 @@ class _Manifold:
         parts = (slice(None, half), slice(half, None))
         return np.concatenate([self._on(rows[part], x[part], spans[part]) for part in parts])
 
-    def _by(self, path: Floats, target: Floats, left: Floats, image: bool, after: float) -> list[_Passage]:
-        """Minima of the distance from a target once the manifold has left its equilibrium."""
+    def connections(self, parameter: str) -> tuple[list[Connection], bool]:
+        """Those at which the curve changes its course, and whether the search came to an end."""
+        values = np.array([v for v, rest in zip(self.grid, self.rests, strict=True) if rest is not None])
+        if not self.exists:
+            return [], True
+        spacing = float(self.grid[1] - self.grid[0])
+        curves = self.curves(values, [rest for rest in self.rests if rest is not None])
+        # Where the equilibrium was lost between two values, nothing is compared.
+        pairs = [(a, b) for a, b in pairwise(curves) if b.value - a.value < 1.5 * spacing]
+        found: list[_Found] = []
+        followed = 0
+        while pairs and followed < _MOST:
+            wide = []
+            for a, b in pairs:
+                part = self._part(a, b)
+                if part is None:
+                    continue
+                self._try(a, b, part, parameter, found)
+                if b.value - a.value > _NARROW * max(abs(a.value), abs(b.value)):
+                    wide.append((a, b))
+            cuts = [np.linspace(a.value, b.value, _PARTS + 1)[1:-1] for a, b in wide]
+            guesses = [a.rest for a, _ in wide for _ in range(_PARTS - 1)]
+            values = np.concatenate([np.zeros(0), *cuts])
+            near = [self.rest_near(v, guess) for v, guess in zip(values.tolist(), guesses, strict=True)]
+            rests = [guess if rest is None else rest for rest, guess in zip(near, guesses, strict=True)]
+            between = self.curves(values, rests)
+            followed += len(between)
+            pairs = []
+            for k, (a, b) in enumerate(wide):
+                inner = between[k * (_PARTS - 1) : (k + 1) * (_PARTS - 1)]
+                pairs += list(pairwise([a, *inner, b]))
+        return [one for _, one in found], not pairs
+
+    def _part(self, a: _Curve, b: _Curve) -> _Part | None:
+        """Where two curves part; none where they are alike for as long as is asked."""
+        flow = self.flow
+        many = min(len(a.path), len(b.path))
+        one, other = (_bent(c.path[:many] - c.rest, flow) for c in (a, b))
+        apart = np.flatnonzero(np.linalg.norm(one - other, axis=1) > _APART)
+        left = max(a.left_at, b.left_at)
+        if not len(apart) or not left < apart[0]:
+            return None
+        first, last = int(left) + 1, int(apart[0])
+        latest = left + _FINE * self.longest / flow.clock
+        best = None
+        ways = [(False, np.ones(flow.dim))]
+        if flow.mirror is not None and not np.allclose(flow.mirror * a.rest, a.rest, atol=1e-9):
+            ways.append((True, flow.mirror))
+        for image, mirror in ways:
+            away = [(c.path[first : last + 1] - mirror * c.rest) / flow.size for c in (a, b)]
+            side = [far @ (mirror * c.left) for far, c in zip(away, (a, b), strict=True)]
+            distance = np.maximum(*(np.linalg.norm(far, axis=1) for far in away))
+            beside = np.where(side[0] * side[1] < 0.0, distance, np.inf)
+            k = int(np.argmin(beside))
+            if beside[k] < (_NEAR if best is None else best.distance):
+                # It came when it was last further away.
+                far = np.flatnonzero(distance[: k + 1] > _NEAR)
+                came = first + (int(far[-1]) if len(far) else 0)
+                best = _Part(came, first + k, image, float(beside[k]))
+        part = best or _Part(last, last, False, np.inf)
+        return part if part.came <= latest else None
+
+    def _try(self, a: _Curve, b: _Curve, part: _Part, parameter: str, found: list[_Found]) -> None:
+        """Newton's method, where two curves pass an equilibrium on its two sides."""
+        width = b.value - a.value
+        narrow = width < _TRIED * max(abs(a.value), abs(b.value))
+        if not (part.distance < _CLOSE or (narrow and np.isfinite(part.distance))):
+            return
+        kind = "heteroclinic" if part.image else "homoclinic"
+        beside = _BESIDE * width
+        for came, one in found:
+            known = one.kind == kind and abs(came - part.came) < _SOONER * _FINE
+            if known and a.value - beside <= one.value <= b.value + beside:
+                return
+        try:
+            one = self._solved(a, part.nearest, part.image, parameter)
+        except (ModelError, IntegrationError):
+            return
+        if not self.grid[0] <= one.value <= self.grid[-1] or abs(one.value - a.value) > 2.0 * beside:
+            return
+        if not any(_same(one, other) for _, other in found):
+            found.append((part.came, one))
+
+    def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
         flow, step = self.flow, self.flow.clock / _FINE
-        away = (path - target) / flow.size
-        distance = np.linalg.norm(away, axis=1)
-        sides = away @ (left * flow.mirror if image and flow.mirror is not None else left)
-        inner = (distance[1:-1] < distance[:-2]) & (distance[1:-1] <= distance[2:]) & (distance[1:-1] < _NEAR)
-        where = (1 + np.flatnonzero(inner)).tolist()
-        found: list[_Passage] = []
-        for k in where:
-            passage = _Passage(float(k * step), float(distance[k]), float(sides[k]))
-            if passage.t <= after:
-                continue
-            # On a spiral towards the target it comes nearer with every turn.
-            if (
-                found
-                and passage.distance < found[-1].distance
-                and passage.t - found[-1].t < _TURN * flow.clock
-            ):
-                found.pop()
-            found.append(passage)
-        return found
-
-    def _compared(self) -> list[_Compared]:
-        """Values with what is passed there: those of the grid, and more where the manifold stays longest.
-
-        Next to a connection it stays for long near the equilibrium that it passes, and may pass it once more.
-        """
-        values = [float(v) for v, rest in zip(self.grid, self.rests, strict=True) if rest is not None]
-        rests = [rest for rest in self.rests if rest is not None]
-        seen: list[_Compared] = []
-        for _ in range(_FINER):
-            if not values or not self.exists:
-                break
-            tables, paths = self.passages(np.array(values), rests, self.longest)
-            seen += zip(values, rests, tables, map(len, paths), strict=True)
-            seen.sort(key=lambda one: one[0])
-            values, rests = [], []
-            for before, here, after in zip(seen, seen[1:], seen[2:], strict=False):
-                if before[3] < here[3] >= after[3] and here[3] > 1 + after[3]:
-                    values += np.linspace(before[0], after[0], 2 * _PARTS + 1)[1:-1].tolist()
-                    rests += [here[1]] * (2 * _PARTS - 1)
-            for before, after in pairwise(seen):
-                # One side of a connection may lead away at once.
-                if any(len(before[2][image]) != len(after[2].get(image, [])) for image in before[2]):
-                    values += np.linspace(before[0], after[0], _PARTS + 1)[1:-1].tolist()
-                    rests += [before[1]] * (_PARTS - 1)
-            values, rests = values[: len(self.grid)], rests[: len(self.grid)]
-            own = {one[0] for one in seen}
-            chosen = [k for k, value in enumerate(values) if value not in own and value not in values[:k]]
-            near = [self.rest_near(values[k], rests[k]) for k in chosen]
-            values = [values[k] for k, rest in zip(chosen, near, strict=True) if rest is not None]
-            rests = [rest for rest in near if rest is not None]
-        return seen
-
-    def connections(self, parameter: str) -> list[Connection]:
-        """Those between neighbouring values on whose sides it passes differ."""
-        seen = self._compared()
-        brackets = []
-        for (value, rest, table, _), (after, _, later, _) in pairwise(seen):
-            if after - value > 1.5 * float(self.grid[1] - self.grid[0]):
-                continue  # the equilibrium was lost between
-            for image, passages in table.items():
-                for passage in passages:
-                    other = _same(passage, later.get(image, []), self.flow.clock)
-                    if other is not None and passage.side * other.side < 0.0:
-                        brackets.append(_Bracket(value, after, passage, other, image, rest))
-        spacing, found = float(self.grid[1] - self.grid[0]), []
-        for _ in range(_ROUNDS):
-            brackets = self._narrowed(brackets)
-            left = []
-            for bracket in brackets:
-                if bracket.nearest is None:
-                    continue
-                wide = bracket.high - bracket.low > _NARROW * max(abs(bracket.low), abs(bracket.high))
-                if wide and bracket.nearest[1].distance > _CLOSE:
-                    left.append(bracket)
-                    continue
-                try:
-                    one = self._solved(*bracket.nearest, bracket.image, parameter)
-                except (ModelError, IntegrationError):
-                    continue
-                if abs(one.value - bracket.nearest[0]) < _BESIDE * spacing:
-                    found.append(one)
-            brackets = left
-        return found
-
-    def _narrowed(self, brackets: list[_Bracket]) -> list[_Bracket]:
-        """The parts of brackets in which the side changes; all of them are compared at once."""
-        values, rests = [], []
-        for bracket in brackets:
-            for value in np.linspace(bracket.low, bracket.high, _PARTS + 1)[1:-1].tolist():
-                rest = self.rest_near(value, bracket.rest)
-                values.append(value)
-                rests.append(bracket.rest if rest is None else rest)
-        if not values:
-            return []
-        # Nearer to the connection it passes later.
-        longest = self.longest + _LATER * self.flow.clock
-        tables, paths = self.passages(np.array(values), rests, longest)
-        narrowed = []
-        for b, bracket in enumerate(brackets):
-            least = min(bracket.before.t, bracket.after.t) - _BEFORE * self.flow.clock
-            low, before, after, high = bracket.low, bracket.before, bracket.after, bracket.high
-            nearest: _Nearest | None = None
-            for k in range(b * (_PARTS - 1), (b + 1) * (_PARTS - 1)):
-                passage = next((one for one in tables[k].get(bracket.image, []) if one.t > least), None)
-                if passage is None:
-                    continue
-                if nearest is None or passage.distance < nearest[1].distance:
-                    nearest = values[k], passage, paths[k], rests[k]
-                if passage.side * bracket.before.side > 0.0:
-                    low, before = values[k], passage
-                else:
-                    high, after = values[k], passage
-                    break
-            narrowed.append(_Bracket(low, high, before, after, bracket.image, bracket.rest, nearest))
-        return narrowed
-
-    def _solved(
-        self, value: float, passage: _Passage, path: Floats, rest: Floats, image: bool, parameter: str
-    ) -> Connection:
-        flow, step = self.flow, self.flow.clock / _FINE
-        last = round(passage.t / step)
-        pieces = pieces_for(flow, passage.t)
+        pieces = pieces_for(flow, last * step)
         every = max(1, last // pieces)
         where = np.arange(last % every, last + 1, every)
-        nodes, span = path[where], float((len(where) - 1) * every * step)
+        nodes, span = curve.path[where], float((len(where) - 1) * every * step)
         mirror = flow.mirror if image and flow.mirror is not None else np.ones(flow.dim)
-        way = self.alone(value, rest)
+        rest, way = curve.rest, self.alone(curve.value, curve.rest)
         if way is not None and way[0] < 0.0:
             # Followed backward: the orbit comes from the target.
             nodes, rest = nodes[::-1].copy(), mirror * rest
-        problem = Problem(flow, self.values_at(value), self.index, rest, mirror, nodes, span, value)
-        return found_by(problem, parameter)
+        values = self.values_at(curve.value)
+        return found_by(Problem(flow, values, self.index, rest, mirror, nodes, span, curve.value), parameter)
 
 
-def _same(passage: _Passage, others: list[_Passage], clock: float) -> _Passage | None:
-    """The passage at about the same time."""
-    near = [other for other in others if abs(other.t - passage.t) < _BEFORE * clock]
-    return min(near, key=lambda other: abs(other.t - passage.t)) if near else None
+def _same(one: Connection, other: Connection) -> bool:
+    return one.kind == other.kind and abs(one.value - other.value) < _SAME * abs(one.value)
+
+
+def _bent(away: Floats, flow: Flow) -> Floats:
+    """Scaled distances from the equilibrium; beyond what is typical only the direction counts."""
+    scaled = np.nan_to_num(away / flow.size, posinf=1e9, neginf=-1e9)
+    return np.asarray(scaled / np.sqrt(1.0 + (scaled**2).sum(axis=1, keepdims=True) / _BEND**2))

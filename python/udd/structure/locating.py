@@ -43,7 +43,7 @@ COARSE = 100.0  # by this factor runs are less accurate where the error is told
 def changes(before: Signs, after: Signs) -> list[str]:
     """Which functions change their signs."""
     names = []
-    for name in ("fold", "plus", "minus", "torus"):
+    for name in ("fold", "plus", "minus", "torus", "collision"):
         a, b = getattr(before, name), getattr(after, name)
         if a * b < 0.0:
             names.append(name)
@@ -86,6 +86,10 @@ def found_between(
         elif name == "minus":
             symmetric = isinstance(curve, CycleCurve) and curve.symmetric
             kind = "symmetry breaking" if symmetric else "period doubling"
+        elif name == "collision":
+            if not 1e-6 < abs(np.angle(here.pair)) < np.pi - 1e-6 or abs(abs(here.pair) - 1.0) > 1e-3:
+                continue  # on the real axis: unstable before and after
+            kind = "Krein collision"
         else:
             pair = here.pair
             if (

@@ -24,6 +24,7 @@ FUNCTIONS = {
     "period doubling": "minus",
     "Hopf": "torus",
     "Neimark-Sacker": "torus",
+    "Krein collision": "collision",
 }
 
 
@@ -44,6 +45,9 @@ class Signs:
         bifurcations where they are a complex pair.
     surfaces : ndarray
         Of equilibria: the functions of the law's switching surfaces.
+    collision : float
+        Of families where something is kept: zero where two pairs of multipliers meet, negative where they
+        have left the unit circle (or the real axis) together; NaN with fewer pairs.
     values : ndarray of complex
         Multipliers across the flow of the map that closes the orbit, or eigenvalues.
     """
@@ -54,6 +58,7 @@ class Signs:
     torus: float
     surfaces: Floats
     values: np.ndarray
+    collision: float = float("nan")
 
     @property
     def pair(self) -> complex:
@@ -93,7 +98,7 @@ def signs_at(curve: RestCurve | CycleCurve, place: Place) -> Signs:
 def _of_family(curve: FamilyCurve, place: Place, found: Multipliers) -> Signs:
     """The functions where something is kept: one multiplier is 1, the others are pairs with the product 1.
 
-    The fold is one of the kept quantity, and collisions of pairs on the unit circle are not told.
+    The fold is one of the kept quantity.
     """
     values = found.values
     others = np.delete(np.arange(len(values)), np.argmin(np.abs(values - 1.0)))
@@ -101,7 +106,19 @@ def _of_family(curve: FamilyCurve, place: Place, found: Multipliers) -> Signs:
     first = place.tangent[: curve.flow.dim]
     fold = float(curve.slope(place.u) @ first) * np.sqrt(curve.pieces)
     plus, minus = (_less(log, phases, unit) for unit in (1.0, -1.0))
-    return Signs(fold, plus, minus, float("nan"), np.zeros(0), values)
+    return Signs(fold, plus, minus, float("nan"), np.zeros(0), values, _discriminant(values[others]))
+
+
+def _discriminant(values: np.ndarray) -> float:
+    """Of the polynomial whose roots are the ``value + 1/value`` of two pairs, scaled.
+
+    A simple zero where they meet, however near to each other the values themselves are there.
+    """
+    if len(values) != 4:
+        return float("nan")
+    sums = values.sum().real
+    products = 0.5 * (values.sum() ** 2 - (values**2).sum()).real - 2.0
+    return float((sums**2 - 4.0 * products) / (1.0 + sums**2 + abs(products)))
 
 
 def _less(log: Floats, phases: np.ndarray, unit: float) -> float:

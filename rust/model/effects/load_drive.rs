@@ -19,8 +19,6 @@ impl Law for LoadDrive {
 
     #[inline(always)]
     fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
-        let acceleration = (at.g * at.y - at.k * at.omega - at.w * at.z * at.omega) / at.inertia;
-        let excess = -(at.z * at.omega.square() + at.y * acceleration) / at.g;
-        slots.vertical -= p[0] * at.w * excess;
+        slots.vertical -= p[0] * at.w * at.excess_load();
     }
 }

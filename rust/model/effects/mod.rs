@@ -44,6 +44,16 @@ pub struct At<S> {
     pub contact: Contact<S>,
 }
 
+impl<S: Scalar> At<S> {
+    /// `F/g - 1` of the contact's force along the drive, `F = g + d^2Z/dT^2`, in the plain model.
+    #[inline(always)]
+    fn excess_load(&self) -> S {
+        let acceleration =
+            (self.g * self.y - self.k * self.omega - self.w * self.z * self.omega) / self.inertia;
+        -(self.z * self.omega.square() + self.y * acceleration) / self.g
+    }
+}
+
 /// Where effects enter the equations, summed over the effects.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots<S> {
@@ -272,6 +282,7 @@ library! {
     slip::Slip,
     radial_slip::RadialSlip,
     load_drive::LoadDrive,
+    load_friction::LoadFriction,
     lateral_slip::LateralSlip,
     wheel_ripple::WheelRipple,
     drive_ripple::DriveRipple,

@@ -1,0 +1,68 @@
+"""Connections of equilibria with saddle cycles, against published values and another integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+import udd
+from udd.errors import ModelError
+
+
+def branch_of(model: udd.Model, parameter: str, bounds: tuple[float, float], period: float) -> udd.Branch:
+    rest = max(udd.equilibria(model), key=lambda one: one.state[0])
+    hopf = udd.continuation(rest, parameter, bounds).find("Hopf")[0]
+    return udd.continuation(hopf, period=period)
+
+
+def saddle_of(model: udd.Model) -> udd.Equilibrium:
+    return min(udd.equilibria(model), key=lambda one: abs(one.state[0]))
+
+
+def test_lorenz_has_the_one_where_his_chaos_becomes_an_attractor() -> None:
+    lorenz = udd.Model(["x", "y", "z"], ["10*(y-x)", "r*x-y-x*z", "x*y-8/3*z"], {"r": 20.0})
+    (one,) = udd.cycle_connections(branch_of(lorenz, "r", (18.0, 30.0), 3.0), saddle_of(lorenz))
+    # Published: r_A = 24.06 (J. Kaplan and J. Yorke, 1979), with more digits 24.0579 (C. Sparrow, 1982).
+    assert one.kind == "equilibrium to cycle"
+    assert one.value == pytest.approx(24.0579, abs=1e-4)
+    assert 0.0 < one.error < 1e-10
+
+
+def test_the_damped_dle_has_one_and_another_integrator_agrees() -> None:
+    model = udd.DLE(2.5, B=0.2)
+    (one,) = udd.cycle_connections(branch_of(model, "w", (1.0, 9.0), 16.0), saddle_of(model))
+    assert 0.0 < one.error < 1e-10
+
+    def turns(w: float) -> float:
+        """How large the turns about the rotating state are in the end, relative to the saddle cycle's."""
+        growing = (-1.0 + np.sqrt(1.0 + 4.0 / 0.2)) / 2.0
+        run = integrate.solve_ivp(
+            lambda t, s: [s[1] - s[0], s[0] * s[2], w - s[0] * s[1] - 0.2 * w * s[2]],
+            [0.0, 150.0],
+            np.array([0.0, 0.0, 5.0]) + 1e-8 * np.array([1.0, 1.0 + growing, 0.0]),
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-13,
+            max_step=0.2,
+        )
+        # The first passage at the cycle is over after some 30, nothing leaves it within 60.
+        late = run.y[2][run.t > 110.0]
+        return float(np.ptp(late))
+
+    cycle = np.ptp(one.cycle.trajectory(200).state[:, 2])
+    inside, outside = (turns(one.value + d) / cycle for d in (1e-5, -1e-5))
+    assert min(inside, outside) < 0.998 < 1.002 < max(inside, outside)
+
+
+def test_what_it_does_not_serve_is_told() -> None:
+    model = udd.DLE(2.5, B=0.2)
+    branch = branch_of(model, "w", (1.0, 9.0), 16.0)
+    with pytest.raises(ModelError, match="a branch of cycles"):
+        udd.cycle_connections(saddle_of(model), branch)  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match="an equilibrium is needed"):
+        udd.cycle_connections(branch, branch)  # type: ignore[arg-type]
+    circle = udd.Model(["x", "v"], ["v", "-sin(x)"])
+    family = udd.continuation(udd.periodic_orbit(circle, [1.0, 0.0]), "period", (6.6, 7.0))
+    with pytest.raises(ModelError, match="over a parameter of a model"):
+        udd.cycle_connections(family, saddle_of(model))
