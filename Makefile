@@ -80,6 +80,7 @@ lint-rust: .venv/.made
 lint-python: .venv/.ready-user .venv/.ready-lint
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/lint-imports
 	$(STEP) "mypy" $(BIN)/mypy --strict python/udd
 	$(STEP) "stubtest" $(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
 

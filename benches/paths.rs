@@ -12,18 +12,21 @@ use criterion::{Criterion, Throughput};
 use limit::Steps;
 use nalgebra::{SMatrix, SVector};
 use rayon::ThreadPoolBuilder;
-use udd::estimate::{DiskCamera, Estimator, Free, Options, Point, Record, Role, Sensor, Set};
+use udd::analysis::{
+    CancelFlag, Ensemble, ExecutionContext, Lyapunov, LyapunovOptions, MethodChoice, Output, Section,
+    SectionRun, trajectory,
+};
+use udd::estimate::{
+    DiskCamera, Estimator, FilmParameters, FreeParameter, Options, Record, Role, Sensor, Unknowns,
+};
 use udd::formula::{Expression, Names};
 use udd::integrate::{Dopri5, Tolerance, propagate};
 use udd::model::effects::{Effect, Kind};
-use udd::model::{DiskFamily, DleFamily, Either, Family, OwnFamily};
-use udd::run::{
-    Crew, Ensemble, Lyapunov, LyapunovOptions, Output, Section, Sections, Stepper, Stop, trajectory,
-};
+use udd::model::{DiskFamily, DleFamily, Either, Family, FormulaFamily};
 use udd::scalar::Isa;
 
 /// The disk as the module has it.
-type Four = Either<DiskFamily, OwnFamily<4>>;
+type Four = Either<DiskFamily, FormulaFamily<4>>;
 
 /// One piece of work, always the same, on one thread.
 struct Path {
@@ -55,9 +58,9 @@ fn tolerance(rtol: f64) -> Tolerance {
     Tolerance { rtol, atol: 1e-3 * rtol }
 }
 
-fn with_crew<T>(isa: Isa, work: impl FnOnce(Crew<'_>) -> T) -> T {
-    let (done, stop) = (AtomicUsize::new(0), Stop::new());
-    black_box(work(Crew { threads: 1, isa, done: &done, stop: &stop }))
+fn with_crew<T>(isa: Isa, work: impl FnOnce(ExecutionContext<'_>) -> T) -> T {
+    let (done, stop) = (AtomicUsize::new(0), CancelFlag::new());
+    black_box(work(ExecutionContext { threads: 1, isa, done: &done, stop: &stop }))
 }
 
 /// Spread over the cube of side 4 around the origin.
@@ -78,7 +81,7 @@ fn drives(n: u32) -> Vec<Vec<f64>> {
 fn ensemble<F: Family<3> + 'static>(
     name: &'static str,
     (family, values): (F, Vec<f64>),
-    stepper: Stepper,
+    stepper: MethodChoice,
     rtol: f64,
     starts: Vec<[f64; 3]>,
     end: u32,
@@ -89,18 +92,19 @@ fn ensemble<F: Family<3> + 'static>(
         let times = [0.0, f64::from(end)];
         let tolerance = tolerance(rtol);
         let (family, values, starts) = (&family, &values[..], &starts[..]);
-        with_crew(isa, |crew| {
-            Ensemble { family, values, starts, times: &times, tolerance, stepper }.run(crew)
+        with_crew(isa, |context| {
+            Ensemble { family, values, starts, times: &times, tolerance, stepper }.run(context)
         });
     };
     Path::new(name, units, work)
 }
 
 /// A model as text, none of those whose series are written out: Lorenz's of 1963.
-fn lorenz() -> (OwnFamily<3>, Vec<f64>) {
+fn lorenz() -> (FormulaFamily<3>, Vec<f64>) {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let equations = ["sigma*(y-x)", "x*(rho-z)-y", "x*y-beta*z"];
-    let family = OwnFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]));
+    let family =
+        FormulaFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]));
     (family.unwrap(), vec![10.0, 28.0, 8.0 / 3.0])
 }
 
@@ -112,7 +116,7 @@ fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>
     let steps = move || series(wanted.clone(), vec![START], rtol, N, units as f64);
     let work = move |isa| {
         let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[START], options };
-        with_crew(isa, |crew| orbits.run::<N>(crew));
+        with_crew(isa, |context| orbits.run::<N>(context));
     };
     Path::new(name, units, work).counted(steps)
 }
@@ -136,7 +140,7 @@ fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "B"]));
     let function =
         Expression::parse("z", Names { states: &states, parameters: &parameters, rates: true }).unwrap();
-    let wanted = Sections {
+    let wanted = SectionRun {
         family: &DleFamily,
         values,
         starts: &[START],
@@ -147,7 +151,7 @@ fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
         bounded: [true; 3],
         tolerance: tolerance(TIGHT),
     };
-    let found = with_crew(isa, |crew| wanted.run(crew));
+    let found = with_crew(isa, |context| wanted.run(context));
     found.iter().flatten().map(|crossings| crossings.end.0).collect()
 }
 
@@ -161,7 +165,9 @@ fn disk(name: &'static str, effects: &[(Kind, &[f64])], end: u32) -> Path {
         let times: Vec<f64> = (0..=25 * end).map(|i| 0.04 * f64::from(i)).collect();
         let (x0, tolerance) = ([1.0, 0.01, -0.02, 0.3], tolerance(TIGHT));
         let (method, output) = (Dopri5::default(), Output::At(&times));
-        black_box(trajectory(&system, method, output, x0, &tolerance, false, (&Stop::new(), None)).unwrap());
+        black_box(
+            trajectory(&system, method, output, x0, &tolerance, false, (&CancelFlag::new(), None)).unwrap(),
+        );
     };
     Path::new(name, u64::from(end), work)
 }
@@ -185,7 +191,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
     let mut model = DISK.to_vec();
     let free = [0, 3, 4].map(|j| {
         model[j] *= 1.05;
-        Free { role: Role::Model(j), film: None, mean: DISK[j], sd: f64::INFINITY }
+        FreeParameter { role: Role::Model(j), film: None, mean: DISK[j], sd: f64::INFINITY }
     });
     let estimator = Estimator {
         family,
@@ -197,9 +203,13 @@ fn fit(name: &'static str, frames: usize) -> Path {
         known: None,
     };
     let work = move |_| {
-        let set = Set { model: model.clone(), camera: vec![0.0; DiskCamera::PARAMETERS.len()], clock: 0.0 };
-        let start = Point { states: states.clone(), sets: vec![set] };
-        black_box(estimator.solve(start, &Options::default(), &Stop::new()).unwrap());
+        let set = FilmParameters {
+            model: model.clone(),
+            camera: vec![0.0; DiskCamera::PARAMETERS.len()],
+            clock: 0.0,
+        };
+        let start = Unknowns { states: states.clone(), sets: vec![set] };
+        black_box(estimator.solve(start, &Options::default(), &CancelFlag::new()).unwrap());
     };
     Path::new(name, frames as u64, work)
 }
@@ -208,14 +218,14 @@ fn paths() -> Vec<Path> {
     let one = || vec![vec![1.0, 0.0]];
     let dle = || (DleFamily, vec![1.0, 0.0]);
     vec![
-        ensemble("trajectory", dle(), Stepper::Taylor, TIGHT, vec![START], 10_000)
+        ensemble("trajectory", dle(), MethodChoice::Taylor, TIGHT, vec![START], 10_000)
             .counted(|| series(vec![vec![1.0, 0.0]], vec![START], TIGHT, 0, 1e4)),
-        ensemble("trajectory by dopri5", dle(), Stepper::Dopri5, LOOSE, vec![START], 2_000),
-        ensemble("starts", dle(), Stepper::Taylor, LOOSE, starts(400), 100)
+        ensemble("trajectory by dopri5", dle(), MethodChoice::Dopri5, LOOSE, vec![START], 2_000),
+        ensemble("starts", dle(), MethodChoice::Taylor, LOOSE, starts(400), 100)
             .counted(|| series(vec![vec![1.0, 0.0]], starts(400), LOOSE, 0, 4e4)),
-        ensemble("starts by dopri5", dle(), Stepper::Dopri5, LOOSE, starts(400), 100),
-        ensemble("trajectory of own model", lorenz(), Stepper::Taylor, TIGHT, vec![START], 500),
-        ensemble("starts of own model", lorenz(), Stepper::Taylor, LOOSE, starts(400), 10),
+        ensemble("starts by dopri5", dle(), MethodChoice::Dopri5, LOOSE, starts(400), 100),
+        ensemble("trajectory of own model", lorenz(), MethodChoice::Taylor, TIGHT, vec![START], 500),
+        ensemble("starts of own model", lorenz(), MethodChoice::Taylor, LOOSE, starts(400), 10),
         exponents::<1>("exponents", LOOSE, drives(64), 500),
         exponents::<3>("spectrum", TIGHT, one(), 2_000),
         exponents::<3>("spectra", TIGHT, drives(64), 100),

@@ -9,14 +9,15 @@
 // Formulas over components are read with their indices.
 #![allow(clippy::needless_range_loop)]
 
+pub mod analysis;
 pub mod estimate;
 pub mod formula;
+pub mod image;
 pub mod integrate;
 pub mod memory;
 pub mod model;
 pub mod observe;
-pub mod picture;
-pub mod run;
+
 pub mod scalar;
 pub mod tape;
 mod unroll;

@@ -20,10 +20,10 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use udd::integrate::{Driver, ErrorNorm, Taylor, Tolerance, WithTangents, order};
+use udd::analysis::batch::rows;
+use udd::integrate::{ErrorNorm, Integrator, Taylor, Tolerance, WithTangents, order};
 use udd::model::{DleFamily, Family};
-use udd::run::rows;
-use udd::scalar::{Dual, Instructions, Isa, Packet, Scalar, Work};
+use udd::scalar::{Dual, InstructionSet, Isa, Packet, Scalar, Work};
 
 /// What the steps of a path are counted from.
 pub struct Steps {
@@ -80,7 +80,7 @@ impl Steps {
             let system = DleFamily.build(&values);
             let method = Taylor::new(&tape, values, order(&self.tolerance), Isa::best());
             let mut driver =
-                Driver::by(method, system, 0.0, begin(*rows::of(&self.starts, job)), None, &norm);
+                Integrator::by(method, system, 0.0, begin(*rows::of(&self.starts, job)), None, &norm);
             while driver.t() < SPAN {
                 driver.advance(SPAN).expect("a smooth run");
             }
@@ -116,7 +116,7 @@ impl Work for Fused {
     type Output = f64;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> f64 {
+    fn run<V: InstructionSet>(self) -> f64 {
         match V::ISA {
             Isa::Avx512 => rate::<Packet<8, V>>(),
             Isa::Avx2 => rate::<Packet<4, V>>(),

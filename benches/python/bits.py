@@ -121,7 +121,7 @@ def _loop() -> Iterator[tuple[str, Callable[[], list[object]]]]:
         return [found.verdict.encode(), *(effect.expression.encode() for effect in found.effects)]
 
     def film() -> list[object]:
-        with as_file(files("udd") / "data" / "sample.mp4") as path:
+        with as_file(files("udd") / "demo" / "sample.mp4") as path:
             return [udd.track(path).values]
 
     def drawn() -> list[object]:

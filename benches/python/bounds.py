@@ -15,7 +15,7 @@ import numpy as np
 
 import udd
 
-sys.path.append(str(Path(__file__).parents[2] / "tests"))
+sys.path.append(str(Path(__file__).parents[2] / "tests" / "support"))
 
 from exact_cycles import step, symmetric_period
 

@@ -6,7 +6,7 @@ from typing import TypeAlias, TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.models import Model
+from udd.models.base import Model
 
 _Floats = NDArray[np.float64]
 

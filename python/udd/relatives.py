@@ -23,9 +23,10 @@ Pendulums have the paper's dimensionless form, ``theta = 0`` hanging, and the st
 
 from __future__ import annotations
 
-from udd._validate import number
-from udd.errors import ModelError
+from udd._util.validation import number
 from udd.models import Model
+
+from .errors import ModelError
 
 __all__ = [
     "cycloidal_pendulum",

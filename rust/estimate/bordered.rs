@@ -2,9 +2,9 @@
 
 use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 
-use super::rows::{Rows, Squares, add, combine, dot, padded};
-use super::{Columns, EstimateError, Linear, Record};
-use crate::scalar::{Instructions, Isa, Real, Work};
+use super::row_matrix::{OuterProductSum, RowMatrix, add, combine, dot, padded};
+use super::{EstimateError, Linearisation, ParameterJacobian, Record};
+use crate::scalar::{InstructionSet, Isa, Real, Work};
 use crate::unroll::vector;
 
 /// The normal equations of the least squares. The right-hand side is the last column of the borders, and of
@@ -16,18 +16,18 @@ pub struct Bordered<const D: usize> {
     /// Couples frame `i + 1` (rows) with frame `i` (columns).
     pub below: Vec<SMatrix<f64, D, D>>,
     /// `D` rows for each frame: its coupling with the parameters, and its right-hand side. What follows is idle.
-    pub border: Rows,
+    pub border: RowMatrix,
     /// The parameters' coupling with themselves, their right-hand side, and the sum of squares: a row for each,
     /// as wide as the border's, in which the numbers from the diagonal on to the right count.
-    pub corner: Rows,
+    pub corner: RowMatrix,
 }
 
 impl<const D: usize> Bordered<D> {
     /// The Gauss-Newton equations of a linearised record for the parameters of some columns, without priors.
     /// `precision[i]` is the inverse variance of the model's error over link `i`, per state.
     pub fn new<const M: usize>(
-        linear: &Linear<D, M>,
-        columns: &Columns,
+        linear: &Linearisation<D, M>,
+        columns: &ParameterJacobian,
         record: &Record<M>,
         precision: &[SVector<f64, D>],
     ) -> Self {
@@ -36,15 +36,15 @@ impl<const D: usize> Bordered<D> {
 
     /// Room for none yet.
     pub(super) fn empty() -> Self {
-        let none = || Rows::zeros(0, 0);
+        let none = || RowMatrix::zeros(0, 0);
         Self { diagonal: Vec::new(), below: Vec::new(), border: none(), corner: none() }
     }
 
     /// As [`new`](Self::new), in the room of these equations: fresh memory costs as much as what is done in it.
     pub(super) fn anew<const M: usize>(
         self,
-        linear: &Linear<D, M>,
-        columns: &Columns,
+        linear: &Linearisation<D, M>,
+        columns: &ParameterJacobian,
         record: &Record<M>,
         precision: &[SVector<f64, D>],
     ) -> Self {
@@ -65,14 +65,14 @@ impl<const D: usize> Bordered<D> {
     }
 
     /// Eliminates the states.
-    pub fn eliminate(self, t: &[f64]) -> Result<Eliminated<D>, EstimateError> {
+    pub fn eliminate(self, t: &[f64]) -> Result<ReducedSystem<D>, EstimateError> {
         f64::work(Isa::best(), Elimination { system: self, t })
     }
 }
 
 struct Assembly<'a, const D: usize, const M: usize> {
-    linear: &'a Linear<D, M>,
-    columns: &'a Columns,
+    linear: &'a Linearisation<D, M>,
+    columns: &'a ParameterJacobian,
     record: &'a Record<M>,
     precision: &'a [SVector<f64, D>],
     room: Bordered<D>,
@@ -83,7 +83,7 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
     const WIDE: bool = D == 4;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Bordered<D> {
+    fn run<V: InstructionSet>(self) -> Bordered<D> {
         let Self { linear, columns, record, precision, room: mut system } = self;
         let (n, p) = (record.t.len(), columns.seen.width());
         let width = padded(p + 1);
@@ -93,11 +93,11 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
         }
         system.border.become_zeros(n * D, width);
         system.corner.become_zeros(p + 1, width);
-        let mut squares = Squares::new(width, 1.0);
+        let mut squares = OuterProductSum::new(width, 1.0);
         // Misfits in units of their noise, of this frame and of the one before.
         let (mut one, mut other) = (Whitened::<D, M>::new(width), Whitened::<D, M>::new(width));
         let (mut now, mut before) = (&mut one, &mut other);
-        let mut rows = Rows::zeros(M.max(D), width);
+        let mut rows = RowMatrix::zeros(M.max(D), width);
         for i in 0..n {
             std::mem::swap(&mut now, &mut before);
             now.fill(linear, columns, record, i);
@@ -201,16 +201,22 @@ struct Whitened<const D: usize, const M: usize> {
     there: [bool; M],
     h: [SVector<f64, D>; M],
     /// By the parameters, and the misfits themselves behind them.
-    columns: Rows,
+    columns: RowMatrix,
 }
 
 impl<const D: usize, const M: usize> Whitened<D, M> {
     fn new(width: usize) -> Self {
-        Self { there: [false; M], h: [zeros(); M], columns: Rows::zeros(M, width) }
+        Self { there: [false; M], h: [zeros(); M], columns: RowMatrix::zeros(M, width) }
     }
 
     #[inline(always)]
-    fn fill(&mut self, linear: &Linear<D, M>, columns: &Columns, record: &Record<M>, i: usize) {
+    fn fill(
+        &mut self,
+        linear: &Linearisation<D, M>,
+        columns: &ParameterJacobian,
+        record: &Record<M>,
+        i: usize,
+    ) {
         let root = root(&record.information[i]);
         let (sight, p) = (&linear.sights[i], columns.seen.width());
         for m in 0..M {
@@ -262,16 +268,16 @@ struct Elimination<'a, const D: usize> {
 }
 
 impl<const D: usize> Work for Elimination<'_, D> {
-    type Output = Result<Eliminated<D>, EstimateError>;
+    type Output = Result<ReducedSystem<D>, EstimateError>;
     const WIDE: bool = D == 4;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Self::Output {
+    fn run<V: InstructionSet>(self) -> Self::Output {
         // Frame by frame, what is eliminated takes the place of what it was.
         let Bordered { diagonal: mut pivots, below: mut links, border: mut solved, mut corner } = self.system;
         let (n, p, width) = (pivots.len(), corner.count() - 1, solved.width());
         let (mut log_determinant, all) = (0.0, corner.at(p, p));
-        let mut squares = Squares::new(width, -1.0);
+        let mut squares = OuterProductSum::new(width, -1.0);
         let mut rest = vec![0.0; D * width];
         for i in 0..n {
             let mut pivot = pivots[i];
@@ -319,7 +325,7 @@ impl<const D: usize> Work for Elimination<'_, D> {
         let explained = all - corner.at(p, p);
         let schur = DMatrix::from_fn(p, p, |i, j| corner.at(i.min(j), i.max(j)));
         let gradient = DVector::from_fn(p, |j, _| corner.at(j, p));
-        Ok(Eliminated { pivots, links, solved, corner, schur, gradient, log_determinant, explained })
+        Ok(ReducedSystem { pivots, links, solved, corner, schur, gradient, log_determinant, explained })
     }
 }
 
@@ -347,14 +353,14 @@ fn row_product<const D: usize>(a: &SMatrix<f64, D, D>, r: usize, b: &SMatrix<f64
 
 /// The normal equations after the states were eliminated.
 #[derive(Clone, Debug)]
-pub struct Eliminated<const D: usize> {
+pub struct ReducedSystem<const D: usize> {
     /// Lower triangular.
     pivots: Vec<SMatrix<f64, D, D>>,
     /// What couples frame `i + 1` with frame `i`, in units of the pivot of `i`.
     links: Vec<SMatrix<f64, D, D>>,
     /// The borders in units of the pivots.
-    solved: Rows,
-    corner: Rows,
+    solved: RowMatrix,
+    corner: RowMatrix,
     /// The parameters' matrix and right-hand side with the states optimal: `schur dtheta = gradient`.
     pub schur: DMatrix<f64>,
     pub gradient: DVector<f64>,
@@ -364,7 +370,7 @@ pub struct Eliminated<const D: usize> {
     explained: f64,
 }
 
-impl<const D: usize> Eliminated<D> {
+impl<const D: usize> ReducedSystem<D> {
     /// Room for other equations.
     pub(super) fn into_room(self) -> Bordered<D> {
         Bordered { diagonal: self.pivots, below: self.links, border: self.solved, corner: self.corner }
@@ -394,9 +400,9 @@ impl<const D: usize> Eliminated<D> {
     }
 
     /// How uncertain the states are, given the parameters' covariance.
-    pub fn uncertain(&self, parameters: &DMatrix<f64>) -> Uncertain<D> {
+    pub fn uncertain(&self, parameters: &DMatrix<f64>) -> Covariances<D> {
         let (n, width) = (parameters.nrows(), padded(parameters.nrows()));
-        let mut root = Rows::zeros(n, width);
+        let mut root = RowMatrix::zeros(n, width);
         if let Some(lower) = nalgebra::Cholesky::new(parameters.clone()) {
             let lower = lower.l();
             for j in 0..n {
@@ -411,35 +417,35 @@ impl<const D: usize> Eliminated<D> {
 
 /// The states' uncertainty, frame by frame.
 #[derive(Clone, Debug)]
-pub struct Uncertain<const D: usize> {
+pub struct Covariances<const D: usize> {
     /// A root of the parameters' covariance: its columns are independent changes. What follows them is zero.
-    pub root: Rows,
+    pub root: RowMatrix,
     /// Their covariance were the parameters known.
     pub conditional: Vec<SMatrix<f64, D, D>>,
     /// `D` rows for each frame: by how much they move with each of those changes.
-    pub shifts: Rows,
+    pub shifts: RowMatrix,
 }
 
-impl<const D: usize> Uncertain<D> {
+impl<const D: usize> Covariances<D> {
     /// The covariance of each frame's state, the parameters' uncertainty included.
     pub fn covariance(&self) -> Vec<SMatrix<f64, D, D>> {
         Isa::best().run_narrow(FullCovariance(self))
     }
 
     /// The variance of what is seen, given how it changes with each frame's state and with the parameters.
-    pub fn seen<const M: usize>(&self, linear: &Linear<D, M>) -> Vec<SVector<f64, M>> {
+    pub fn seen<const M: usize>(&self, linear: &Linearisation<D, M>) -> Vec<SVector<f64, M>> {
         Isa::best().run_narrow(SeenVariance { of: self, linear })
     }
 }
 
-struct FullCovariance<'a, const D: usize>(&'a Uncertain<D>);
+struct FullCovariance<'a, const D: usize>(&'a Covariances<D>);
 
 impl<const D: usize> Work for FullCovariance<'_, D> {
     type Output = Vec<SMatrix<f64, D, D>>;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Self::Output {
-        let Uncertain { conditional, shifts, .. } = self.0;
+    fn run<V: InstructionSet>(self) -> Self::Output {
+        let Covariances { conditional, shifts, .. } = self.0;
         let mut covariance = conditional.clone();
         for i in 0..covariance.len() {
             let all = &mut covariance[i];
@@ -455,16 +461,16 @@ impl<const D: usize> Work for FullCovariance<'_, D> {
 }
 
 struct SeenVariance<'a, const D: usize, const M: usize> {
-    of: &'a Uncertain<D>,
-    linear: &'a Linear<D, M>,
+    of: &'a Covariances<D>,
+    linear: &'a Linearisation<D, M>,
 }
 
 impl<const D: usize, const M: usize> Work for SeenVariance<'_, D, M> {
     type Output = Vec<SVector<f64, M>>;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Self::Output {
-        let Uncertain { root, conditional, shifts } = self.of;
+    fn run<V: InstructionSet>(self) -> Self::Output {
+        let Covariances { root, conditional, shifts } = self.of;
         let mut moved = vec![0.0; root.width()];
         let mut variances: Vec<SVector<f64, M>> = vec![zeros(); conditional.len()];
         for i in 0..variances.len() {
@@ -490,20 +496,20 @@ impl<const D: usize, const M: usize> Work for SeenVariance<'_, D, M> {
 }
 
 struct StateCovariance<'a, const D: usize> {
-    of: &'a Eliminated<D>,
-    root: Rows,
+    of: &'a ReducedSystem<D>,
+    root: RowMatrix,
 }
 
 impl<const D: usize> Work for StateCovariance<'_, D> {
-    type Output = Uncertain<D>;
+    type Output = Covariances<D>;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Self::Output {
-        let Eliminated { pivots, links, solved, .. } = self.of;
+    fn run<V: InstructionSet>(self) -> Self::Output {
+        let ReducedSystem { pivots, links, solved, .. } = self.of;
         let (n, width) = (pivots.len(), self.root.width());
-        let (mut states, mut shifts) = (vec![zeros(); n], Rows::zeros(n * D, width));
+        let (mut states, mut shifts) = (vec![zeros(); n], RowMatrix::zeros(n * D, width));
         let mut conditional: SMatrix<f64, D, D> = zeros();
-        let (mut alone, mut factors) = (Rows::zeros(D, width), vec![0.0; self.root.count()]);
+        let (mut alone, mut factors) = (RowMatrix::zeros(D, width), vec![0.0; self.root.count()]);
         for i in (0..n).rev() {
             // The inverse of the pivot, and with it what this frame takes from the next.
             let inverse = lower_inverse(&pivots[i]);
@@ -530,7 +536,7 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
             }
             states[i] = conditional;
         }
-        Uncertain { root: self.root, conditional: states, shifts }
+        Covariances { root: self.root, conditional: states, shifts }
     }
 }
 

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::linearise::invert;
-use super::{Bordered, Eliminated, EstimateError, Estimator, Free, Linear, Point, Sensor};
+use super::{
+    Bordered, EstimateError, Estimator, FreeParameter, Linearisation, ReducedSystem, Sensor, Unknowns,
+};
+use crate::analysis::CancelFlag;
 use crate::model::Family;
-use crate::run::Stop;
 
 /// Trials of one step, ever shorter.
 const MOST_TRIALS: i32 = 12;
@@ -53,9 +55,9 @@ impl Cost {
 /// A minimum and its surroundings.
 #[derive(Clone, Debug)]
 pub struct Solution<const D: usize, const M: usize> {
-    pub point: Point<D>,
+    pub point: Unknowns<D>,
     /// The record linearised around it.
-    pub linear: Arc<Linear<D, M>>,
+    pub linear: Arc<Linearisation<D, M>>,
     pub cost: Cost,
     pub converged: bool,
     pub iterations: usize,
@@ -76,9 +78,9 @@ pub struct Solution<const D: usize, const M: usize> {
 }
 
 /// A point, the record linearised around it, and its cost.
-struct Here<const D: usize, const M: usize> {
-    point: Point<D>,
-    linear: Arc<Linear<D, M>>,
+struct Iterate<const D: usize, const M: usize> {
+    point: Unknowns<D>,
+    linear: Arc<Linearisation<D, M>>,
     cost: Cost,
 }
 
@@ -106,7 +108,7 @@ where
     }
 
     /// The cost at a point around which the record is linearised.
-    fn cost(&self, point: &Point<D>, linear: &Linear<D, M>) -> Cost {
+    fn cost(&self, point: &Unknowns<D>, linear: &Linearisation<D, M>) -> Cost {
         let mut cost = Cost { misfit: self.misfit_cost(&linear.misfits()), ..Cost::default() };
         let precision = self.precision();
         for i in 0..linear.flow.len() {
@@ -121,14 +123,14 @@ where
         cost
     }
 
-    fn look(&self, point: Point<D>, room: Linear<D, M>) -> Result<Here<D, M>, EstimateError> {
+    fn look(&self, point: Unknowns<D>, room: Linearisation<D, M>) -> Result<Iterate<D, M>, EstimateError> {
         let linear = Arc::new(self.linearise_in(&point, room)?);
         let cost = self.cost(&point, &linear);
-        Ok(Here { point, linear, cost })
+        Ok(Iterate { point, linear, cost })
     }
 
     /// Adds the free parameters' priors to normal equations at a point.
-    pub(super) fn add_priors(&self, point: &Point<D>, system: &mut Bordered<D>) {
+    pub(super) fn add_priors(&self, point: &Unknowns<D>, system: &mut Bordered<D>) {
         for (j, free) in self.free.iter().enumerate() {
             system.prior(j, point.get(free), free.mean, free.sd);
         }
@@ -137,13 +139,14 @@ where
     /// Minimises the cost from a start.
     pub fn solve(
         &self,
-        start: Point<D>,
+        start: Unknowns<D>,
         options: &Options,
-        stop: &Stop,
+        stop: &CancelFlag,
     ) -> Result<Solution<D, M>, EstimateError> {
         let linear = self.around(&start)?;
-        let mut here = Here { cost: self.cost(&start, &linear), point: start, linear };
-        let (precision, mut room, mut spare) = (self.precision(), Bordered::empty(), Linear::default());
+        let mut here = Iterate { cost: self.cost(&start, &linear), point: start, linear };
+        let (precision, mut room, mut spare) =
+            (self.precision(), Bordered::empty(), Linearisation::default());
         let mut damping = 0.0;
         let mut still = 0;
         let mut iteration = 0;
@@ -179,12 +182,12 @@ where
     /// curvature makes it too long, and damping would all but stop it. Then it is damped ever more strongly.
     fn lower(
         &self,
-        here: &Here<D, M>,
-        reduced: &Eliminated<D>,
+        here: &Iterate<D, M>,
+        reduced: &ReducedSystem<D>,
         full: Step<D>,
         damping: &mut f64,
-        mut room: Linear<D, M>,
-    ) -> Result<Option<Here<D, M>>, EstimateError> {
+        mut room: Linearisation<D, M>,
+    ) -> Result<Option<Iterate<D, M>>, EstimateError> {
         let mut step = if *damping == 0.0 { full } else { self.step(reduced, *damping)? };
         let mut length = 1.0;
         for trial in 1..=MOST_TRIALS {
@@ -212,7 +215,7 @@ where
     }
 
     /// The step to the minimum of the linearised problem; the parameters damped.
-    fn step(&self, reduced: &Eliminated<D>, damping: f64) -> Result<Step<D>, EstimateError> {
+    fn step(&self, reduced: &ReducedSystem<D>, damping: f64) -> Result<Step<D>, EstimateError> {
         let mut information = reduced.schur.clone();
         for j in 0..information.nrows() {
             information[(j, j)] *= 1.0 + damping;
@@ -223,7 +226,7 @@ where
     }
 
     /// A point moved by a part of a step.
-    fn moved(&self, point: &Point<D>, step: &Step<D>, length: f64) -> Point<D> {
+    fn moved(&self, point: &Unknowns<D>, step: &Step<D>, length: f64) -> Unknowns<D> {
         let mut moved = point.clone();
         for i in 0..moved.states.len() {
             for k in 0..D {
@@ -239,8 +242,8 @@ where
     /// What is asked of the minimum, at a point that is above it by what is `left` to gain.
     fn finish(
         &self,
-        Here { point, linear, cost }: Here<D, M>,
-        reduced: &Eliminated<D>,
+        Iterate { point, linear, cost }: Iterate<D, M>,
+        reduced: &ReducedSystem<D>,
         left: f64,
         (iterations, converged): (usize, bool),
     ) -> Result<Solution<D, M>, EstimateError> {
@@ -263,12 +266,12 @@ where
 }
 
 /// The room that a linearisation took, where nobody else has it.
-fn room_of<const D: usize, const M: usize>(linear: Arc<Linear<D, M>>) -> Linear<D, M> {
+fn room_of<const D: usize, const M: usize>(linear: Arc<Linearisation<D, M>>) -> Linearisation<D, M> {
     Arc::try_unwrap(linear).unwrap_or_default()
 }
 
 /// Where a matrix of information has no inverse: the parameters that can change together.
-pub(super) fn undetermined(free: &[Free], information: &DMatrix<f64>) -> EstimateError {
+pub(super) fn undetermined(free: &[FreeParameter], information: &DMatrix<f64>) -> EstimateError {
     let n = free.len().min(information.nrows());
     let scale: Vec<f64> = (0..n).map(|j| information[(j, j)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::bordered::root;
-use super::{EstimateError, Estimator, Point, Sensor};
+use super::{EstimateError, Estimator, Sensor, Unknowns};
 use crate::model::Family;
 
 /// A filter foretells nothing before it has seen so many frames.
@@ -20,7 +20,7 @@ where
     /// A Kalman filter runs along the point's states, where everything is linear, with all parameters held. It
     /// estimates the states' deviations and the noise, which may remember itself; the noise is counted in
     /// units of its standard deviation. `vague` is what is known of a state where a run starts.
-    pub fn innovations(&self, point: &Point<D>, vague: &[f64; D]) -> Result<Vec<[f64; M]>, EstimateError> {
+    pub fn innovations(&self, point: &Unknowns<D>, vague: &[f64; D]) -> Result<Vec<[f64; M]>, EstimateError> {
         let record = &self.record;
         let linear = Self { free: Vec::new(), known: None, ..self.clone() }.linearise(point)?;
         let precision = self.precision();

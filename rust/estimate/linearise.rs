@@ -5,14 +5,16 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::bordered::zeros;
-use super::columns::{Beyond, Columns, WIDTH, Wide, acting, camera, clock, columns_of, model, rates, tagged};
-use super::flow::Link;
-use super::follow::{Law, variable};
-use super::rows::Rows;
-use super::{EstimateError, Estimator, Free, Point, Sensor, Set};
+use super::link_propagation::{Law, variable};
+use super::link_response::Transition;
+use super::parameter_jacobian::{
+    ExtraColumns, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, rates, tagged,
+};
+use super::row_matrix::RowMatrix;
+use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Sensor, Unknowns};
+use crate::analysis::batch::parallel::in_parts;
 use crate::model::Family;
-use crate::run::parallel::in_parts;
-use crate::scalar::{Instructions, Isa, Scalar, Work, constants};
+use crate::scalar::{InstructionSet, Isa, Scalar, Work, constants};
 use crate::unroll::vector;
 
 /// Frames are looked at by so many at least: each takes about a microsecond.
@@ -20,27 +22,27 @@ const TOGETHER: usize = 16;
 
 /// A frame's residual `misfit = seen - h`, and `dh/dx`.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight<const D: usize, const M: usize> {
+pub struct ObservationResidual<const D: usize, const M: usize> {
     pub misfit: SVector<f64, M>,
     pub h: SMatrix<f64, M, D>,
 }
 
 /// Residuals and derivatives, frame by frame and link by link; the columns are those of parameters.
 #[derive(Clone, Debug, Default)]
-pub struct Linear<const D: usize, const M: usize> {
-    pub sights: Vec<Sight<D, M>>,
-    pub flow: Vec<Link<D>>,
-    pub columns: Columns,
+pub struct Linearisation<const D: usize, const M: usize> {
+    pub sights: Vec<ObservationResidual<D, M>>,
+    pub flow: Vec<Transition<D>>,
+    pub columns: ParameterJacobian,
 }
 
 /// A record linearised around a point, shared by all who ask for more there.
 #[derive(Clone, Debug)]
-pub struct Known<const D: usize, const M: usize> {
-    pub point: Arc<Point<D>>,
-    pub linear: Arc<Linear<D, M>>,
+pub struct CachedLinearisation<const D: usize, const M: usize> {
+    pub point: Arc<Unknowns<D>>,
+    pub linear: Arc<Linearisation<D, M>>,
 }
 
-impl<const D: usize, const M: usize> Linear<D, M> {
+impl<const D: usize, const M: usize> Linearisation<D, M> {
     /// The residuals of what was seen.
     pub fn misfits(&self) -> Vec<SVector<f64, M>> {
         let mut all = Vec::with_capacity(self.sights.len());
@@ -66,12 +68,12 @@ where
     C: Sensor<D, M>,
 {
     /// Linearises the record around a point with respect to the states and to the free parameters.
-    pub fn linearise(&self, point: &Point<D>) -> Result<Linear<D, M>, EstimateError> {
-        self.linearise_in(point, Linear::default())
+    pub fn linearise(&self, point: &Unknowns<D>) -> Result<Linearisation<D, M>, EstimateError> {
+        self.linearise_in(point, Linearisation::default())
     }
 
     /// The same, shared; where it is [known](Estimator::known) it is not computed again.
-    pub(super) fn around(&self, point: &Point<D>) -> Result<Arc<Linear<D, M>>, EstimateError> {
+    pub(super) fn around(&self, point: &Unknowns<D>) -> Result<Arc<Linearisation<D, M>>, EstimateError> {
         match &self.known {
             Some(known) if *known.point == *point => Ok(known.linear.clone()),
             _ => self.linearise(point).map(Arc::new),
@@ -81,34 +83,34 @@ where
     /// The same, in the room of another: fresh memory costs as much as what is done in it.
     pub(super) fn linearise_in(
         &self,
-        point: &Point<D>,
-        room: Linear<D, M>,
-    ) -> Result<Linear<D, M>, EstimateError> {
-        let Linear { mut sights, flow, columns: Columns { mut seen, mut state } } = room;
+        point: &Unknowns<D>,
+        room: Linearisation<D, M>,
+    ) -> Result<Linearisation<D, M>, EstimateError> {
+        let Linearisation { mut sights, flow, columns: ParameterJacobian { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
         let flow = self.flow(point, &laws, flow)?;
         let timed = self.timed(point);
         self.own_state_rows(point, &flow, &timed, &mut state)?;
         self.sights(point, &laws, &timed, &mut sights, &mut seen);
-        Ok(Linear { sights, flow, columns: Columns { seen, state } })
+        Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } })
     }
 
     /// What is seen of every frame, and its rows of the free parameters.
     fn sights(
         &self,
-        point: &Point<D>,
+        point: &Unknowns<D>,
         laws: &[Law<F::Built<Wide>, Wide>],
         timed: &[bool],
-        sights: &mut Vec<Sight<D, M>>,
-        seen: &mut Rows,
+        sights: &mut Vec<ObservationResidual<D, M>>,
+        seen: &mut RowMatrix,
     ) {
         let (n, p) = (self.record.t.len(), self.free.len());
         seen.become_zeros(n * M, p);
         // All are filled anew.
-        sights.resize(n, Sight { misfit: zeros(), h: zeros() });
+        sights.resize(n, ObservationResidual { misfit: zeros(), h: zeros() });
         let beyond = self.beyond(point);
         let views = views(&point.sets, &self.free, timed);
-        let mut slots: Vec<(&mut Sight<D, M>, &mut [f64])> = Vec::with_capacity(n);
+        let mut slots: Vec<(&mut ObservationResidual<D, M>, &mut [f64])> = Vec::with_capacity(n);
         let mut blocks = seen.blocks_mut(M);
         for sight in sights.iter_mut() {
             slots.push((sight, blocks.next().unwrap_or_default()));
@@ -146,8 +148,8 @@ struct View {
     clock: Vec<usize>,
 }
 
-fn views(sets: &[Set], free: &[Free], timed: &[bool]) -> Vec<View> {
-    let one = |(film, set): (usize, &Set)| {
+fn views(sets: &[FilmParameters], free: &[FreeParameter], timed: &[bool]) -> Vec<View> {
+    let one = |(film, set): (usize, &FilmParameters)| {
         let tagged = |own: &[_]| (tagged(&set.camera, own, 0), columns_of(own));
         View {
             plain: constants(&set.camera),
@@ -162,12 +164,12 @@ fn views(sets: &[Set], free: &[Free], timed: &[bool]) -> Vec<View> {
 /// One frame's share of a linearisation.
 struct Look<'a, F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     of: &'a Estimator<F, C, D, M>,
-    point: &'a Point<D>,
+    point: &'a Unknowns<D>,
     law: &'a Law<F::Built<Wide>, Wide>,
     view: &'a View,
-    beyond: &'a [Beyond<F::Built<Wide>>],
+    beyond: &'a [ExtraColumns<F::Built<Wide>>],
     i: usize,
-    sight: &'a mut Sight<D, M>,
+    sight: &'a mut ObservationResidual<D, M>,
     rows: &'a mut [f64],
 }
 
@@ -175,7 +177,7 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Instructions>(self) {
+    fn run<V: InstructionSet>(self) {
         let Self { of: Estimator { sensor, record, .. }, point, law, view, i, sight, rows, .. } = self;
         let (film, p) = (record.film[i], rows.len() / M);
         let (state, t) = (&point.states[i], record.t[i] * point.sets[film].pace());
@@ -202,7 +204,7 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
             let rate = rates(&law.system, clocked, &x);
             fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &view.clock);
         }
-        for Beyond { columns, laws } in self.beyond {
+        for ExtraColumns { columns, laws } in self.beyond {
             let rate = rates(&laws[film].system, t, &x);
             fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &columns[film]);
         }

@@ -12,31 +12,31 @@
 //! column per candidate, give the [`score`](Estimator::score) of every effect the model may lack.
 
 mod bordered;
-mod columns;
 mod evidence;
-mod flow;
-mod follow;
-mod forecast;
+mod frequency_scan;
 mod gauss_newton;
 mod innovations;
 mod linearise;
+mod link_propagation;
+mod link_response;
+mod parameter_jacobian;
 mod record;
-mod rows;
+mod row_matrix;
 mod score;
 mod sensor;
-mod waves;
+mod window_filter;
 
-pub use bordered::{Bordered, Eliminated, Uncertain};
-pub use columns::Columns;
-pub use flow::{Link, PLACES_PER_LINK, Place, Places};
-pub use forecast::Filtered;
+pub use bordered::{Bordered, Covariances, ReducedSystem};
+pub use frequency_scan::{BASIS, FrequencyProbe};
 pub use gauss_newton::{Cost, Options, Solution};
-pub use linearise::{Known, Linear, Sight};
-pub use record::{Free, Point, Record, Role, Set};
-pub use rows::Rows;
+pub use linearise::{CachedLinearisation, Linearisation, ObservationResidual};
+pub use link_response::{PLACES_PER_LINK, QuadraturePoint, QuadraturePoints, Transition};
+pub use parameter_jacobian::ParameterJacobian;
+pub use record::{FilmParameters, FreeParameter, Record, Role, Unknowns};
+pub use row_matrix::RowMatrix;
 pub use score::{Candidate, Score};
 pub use sensor::{AngleSensor, Direct, DiskCamera, Sensor};
-pub use waves::{BASIS, Probe};
+pub use window_filter::Filtered;
 
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;
@@ -52,14 +52,14 @@ where
     pub sensor: C,
     pub record: Record<M>,
     /// Which parameters are free, with their priors; in the order of the borders.
-    pub free: Vec<Free>,
+    pub free: Vec<FreeParameter>,
     /// Standard deviation of the model's error per state and square root of a second: the error
     /// over an interval `dt` has variance `q^2 dt`.
     pub diffusion: [f64; D],
     pub tolerance: Tolerance,
     /// The record linearised around some point already: this record as this sensor sees it, for this family, these
     /// free parameters and this tolerance. Its noise, the priors and the diffusion may differ.
-    pub known: Option<Known<D, M>>,
+    pub known: Option<CachedLinearisation<D, M>>,
 }
 
 /// Why an estimate failed.

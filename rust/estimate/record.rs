@@ -13,7 +13,7 @@ pub struct Record<const M: usize> {
     pub information: Vec<SMatrix<f64, M, M>>,
     /// Whether frame `i + 1` continues the motion of frame `i`; false where a new run starts.
     pub linked: Vec<bool>,
-    /// Which film each frame belongs to, and so which [`Set`] of parameters holds.
+    /// Which film each frame belongs to, and so which [`FilmParameters`] of parameters holds.
     pub film: Vec<usize>,
     /// How much of a frame's noise is still there in the next one, per channel: its autocorrelation.
     pub memory: [f64; M],
@@ -67,7 +67,7 @@ pub enum Role {
 
 /// A free parameter with a Gaussian prior.
 #[derive(Clone, Copy, Debug)]
-pub struct Free {
+pub struct FreeParameter {
     pub role: Role,
     /// The film that it belongs to; none where all films share it.
     pub film: Option<usize>,
@@ -76,7 +76,7 @@ pub struct Free {
     pub sd: f64,
 }
 
-impl Free {
+impl FreeParameter {
     /// Whether frames of this film depend on it.
     pub fn acts_on(&self, film: usize) -> bool {
         self.film.is_none_or(|own| own == film)
@@ -85,7 +85,7 @@ impl Free {
 
 /// The parameters that hold for one film.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Set {
+pub struct FilmParameters {
     /// The model's parameters, free or not.
     pub model: Vec<f64>,
     /// The camera's parameters, free or not.
@@ -94,7 +94,7 @@ pub struct Set {
     pub clock: f64,
 }
 
-impl Set {
+impl FilmParameters {
     /// The value of a parameter.
     pub fn get(&self, role: Role) -> f64 {
         match role {
@@ -120,21 +120,21 @@ impl Set {
 
 /// A value of all unknowns.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point<const D: usize> {
+pub struct Unknowns<const D: usize> {
     /// The state at every frame.
     pub states: Vec<[f64; D]>,
     /// The parameters of every film.
-    pub sets: Vec<Set>,
+    pub sets: Vec<FilmParameters>,
 }
 
-impl<const D: usize> Point<D> {
+impl<const D: usize> Unknowns<D> {
     /// The value of a free parameter.
-    pub fn get(&self, free: &Free) -> f64 {
+    pub fn get(&self, free: &FreeParameter) -> f64 {
         self.sets[free.film.unwrap_or(0)].get(free.role)
     }
 
     /// Changes a free parameter.
-    pub fn shift(&mut self, free: &Free, change: f64) {
+    pub fn shift(&mut self, free: &FreeParameter, change: f64) {
         for (film, set) in self.sets.iter_mut().enumerate() {
             if free.acts_on(film) {
                 *set.get_mut(free.role) += change;

@@ -3,14 +3,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::bordered::Bordered;
-use super::columns::{Columns, TimeOrigin};
-use super::flow::Places;
 use super::gauss_newton::undetermined;
 use super::linearise::invert;
-use super::rows::Rows;
-use super::{EstimateError, Estimator, Free, Linear, Point, Role, Sensor};
+use super::link_response::QuadraturePoints;
+use super::parameter_jacobian::{ParameterJacobian, TimeOrigin};
+use super::row_matrix::RowMatrix;
+use super::{EstimateError, Estimator, FreeParameter, Linearisation, Role, Sensor, Unknowns};
+use crate::analysis::batch::parallel::try_map;
 use crate::model::Family;
-use crate::run::parallel::try_map;
 
 /// The candidates' amplitudes near zero, everything else optimal: the cost falls by
 /// `2 gradient . c - c . information c` when they take the values `c`.
@@ -41,7 +41,7 @@ where
     C: Sensor<D, M>,
 {
     /// Scores candidates around a minimum, all together. The states and all free parameters are eliminated.
-    pub fn score(&self, point: &Point<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
+    pub fn score(&self, point: &Unknowns<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
         let linear = self.around(point)?;
         let places = self.places(point)?;
         let (mut size, mut columns) = (0, linear.columns.clone());
@@ -57,15 +57,15 @@ where
     /// The columns of a candidate's amplitudes.
     pub(super) fn candidate_columns(
         &self,
-        point: &Point<D>,
-        places: &[Places<D>],
+        point: &Unknowns<D>,
+        places: &[QuadraturePoints<D>],
         candidate: &Candidate<F>,
         origin: TimeOrigin,
-    ) -> Columns {
+    ) -> ParameterJacobian {
         let wider = |model: &Vec<f64>| [model.as_slice(), &candidate.more].concat();
         let values: Vec<Vec<f64>> = point.sets.iter().map(|set| wider(&set.model)).collect();
-        let one = |&role: &Role| Free { role, film: None, mean: 0.0, sd: f64::INFINITY };
-        let free: Vec<Free> = candidate.amplitudes.iter().map(one).collect();
+        let one = |&role: &Role| FreeParameter { role, film: None, mean: 0.0, sd: f64::INFINITY };
+        let free: Vec<FreeParameter> = candidate.amplitudes.iter().map(one).collect();
         self.columns(point, places, (&candidate.family, &values), &free, origin)
     }
 
@@ -75,8 +75,8 @@ where
     /// Where the groups are not as many columns as there are.
     pub fn score_groups(
         &self,
-        point: &Point<D>,
-        columns: &Columns,
+        point: &Unknowns<D>,
+        columns: &ParameterJacobian,
         groups: &[usize],
     ) -> Result<Vec<Score>, EstimateError> {
         let linear = self.around(point)?;
@@ -92,8 +92,8 @@ where
         let scores = try_map(batches.len(), &|i| {
             let (first, sizes) = &batches[i];
             let end = first + sizes.iter().sum::<usize>();
-            let part = |rows: &Rows| rows.part(*first..end);
-            let more = Columns { seen: part(&columns.seen), state: part(&columns.state) };
+            let part = |rows: &RowMatrix| rows.part(*first..end);
+            let more = ParameterJacobian { seen: part(&columns.seen), state: part(&columns.state) };
             self.score_beside(point, &linear, &linear.columns.beside(&more), sizes)
         })?;
         Ok(scores.concat())
@@ -102,9 +102,9 @@ where
     /// The scores of the columns that follow those of the free parameters in `columns`, in groups.
     pub(super) fn score_beside(
         &self,
-        point: &Point<D>,
-        linear: &Linear<D, M>,
-        columns: &Columns,
+        point: &Unknowns<D>,
+        linear: &Linearisation<D, M>,
+        columns: &ParameterJacobian,
         groups: &[usize],
     ) -> Result<Vec<Score>, EstimateError> {
         let own = self.free.len();

@@ -1,13 +1,13 @@
 //! The one stepping loop.
 
-use super::control::{Controller, initial_step};
-use super::landing::{Landed, Landing, Look, TARGETS, WALL, Watch, union};
-use super::method::{Course, Method, Point, Trial};
+use super::event_location::{EventIteration, EventStatus, Look, SurfaceMonitor, TARGETS, WALL, union};
+use super::method::{Course, Method, StepStart, Trial};
 use super::runge_kutta::Dopri5;
 use super::saltation::pass;
+use super::step_size::{PiController, initial_step};
 use super::tolerance::{ErrorNorm, Failure, Tolerance};
 use crate::model::{AnySystem, MAX_SURFACES, Sides, System, choose, sides_of};
-use crate::scalar::{self, Instructions, Isa, Mask, Real, Scalar};
+use crate::scalar::{self, InstructionSet, Isa, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
 /// What the work was, summed over the lanes.
@@ -81,17 +81,17 @@ impl<M: Mask> Progress<M> {
     }
 }
 
-/// A run in progress, or one in each lane: every [`trial`](Driver::trial) tries a step in all of them.
+/// A run in progress, or one in each lane: every [`trial`](Integrator::trial) tries a step in all of them.
 ///
 /// Lanes have their own time, step size and fate. Between steps the law is smooth: a step ends on the
 /// first switching surface it meets, to 1e-12 of the surface function's size in the step, and the next
 /// one starts on the other side. Everything derived from a run (samples, events, tangents, sections,
 /// exponents) is built on this loop.
-pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>> {
+pub struct Integrator<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>> {
     system: M,
     method: K,
     norm: E,
-    controller: Controller<S::Real>,
+    controller: PiController<S::Real>,
     run: Run<S, D>,
 }
 
@@ -99,13 +99,13 @@ pub struct Driver<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S, D>>
 struct Run<S: Scalar, const D: usize> {
     /// Whether lanes end on the wall.
     wall: bool,
-    at: Point<S, D>,
+    at: StepStart<S, D>,
     /// The size of the next trial step, of the sign of the direction.
     h: S::Real,
     /// The last accepted step: its start and its size.
     from: S::Real,
     size: S::Real,
-    landing: Landing<S::Real>,
+    landing: EventIteration<S::Real>,
     /// Sides changed since time last moved on.
     flips: S::Real,
     /// When the run began; jumps of the law since the time beside.
@@ -126,7 +126,7 @@ struct Work<R> {
     grazes: R,
 }
 
-impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
+impl<M, S, const D: usize, E, K> Integrator<M, S, D, E, K>
 where
     S: Scalar,
     M: System<S, D>,
@@ -145,7 +145,7 @@ where
     /// The same by a method made beforehand.
     pub fn by(method: K, system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
         let run = Run::new(&system, t, x);
-        let mut driver = Self { system, method, norm: *norm, controller: Controller::new(K::ORDER), run };
+        let mut driver = Self { system, method, norm: *norm, controller: PiController::new(K::ORDER), run };
         // Packets are only short with their own instructions.
         if const { S::Real::LANES > 1 } {
             S::Real::work(Isa::Baseline, Begin { driver: &mut driver, t, x, h });
@@ -161,7 +161,7 @@ where
         self
     }
 
-    /// Starts anew in these lanes, as [`new`](Driver::new) does.
+    /// Starts anew in these lanes, as [`new`](Integrator::new) does.
     #[inline(always)]
     pub fn start(&mut self, lanes: S::Mask, t: S::Real, x: [S; D], h: Option<S::Real>) {
         let run = &mut self.run;
@@ -205,7 +205,7 @@ where
     }
 
     /// Goes on with another system, to whose parameters these values belong; lanes whose parameters
-    /// change are to be [started](Driver::start) anew.
+    /// change are to be [started](Integrator::start) anew.
     #[inline(always)]
     pub fn set_system(&mut self, system: M, values: &[S]) {
         self.system = system;
@@ -335,7 +335,7 @@ where
             Progress { moved: accepted.and(failed.not()), crossed: [S::mask(false); TARGETS], failed };
         if const { !M::SMOOTH } && targets {
             let lanes = progress.moved.and(run.undecided.not());
-            let watch = Watch::new(&self.system, &run.at, run.wall, self.norm.state());
+            let watch = SurfaceMonitor::new(&self.system, &run.at, run.wall, self.norm.state());
             let look = watch.look(&self.method, trial.size, lanes);
             if union(&look.beyond).or(landing).or(run.undecided).any() {
                 let accepted = progress.moved;
@@ -380,11 +380,11 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         };
         Self {
             wall: false,
-            at: Point { t, x, sides },
+            at: StepStart { t, x, sides },
             h: zero,
             from: t,
             size: zero,
-            landing: Landing::new(),
+            landing: EventIteration::new(),
             flips: zero,
             start: t,
             jumps: (zero, t),
@@ -451,7 +451,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
     ) {
         let never = S::mask(false);
         let at = self.at;
-        let watch = Watch::new(law, &at, self.wall, tolerance);
+        let watch = SurfaceMonitor::new(law, &at, self.wall, tolerance);
         let leaving = accepted.and(self.undecided);
         let found = watch.find(method, trial.size, accepted.and(leaving.not()), look);
         let crossing = union(&found.crossing);
@@ -459,7 +459,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         let clear = accepted.and(crossing.or(stale).not());
         let mut trial = *trial;
         let mut crossed = [never; TARGETS];
-        let mut landed = Landed { there: never, grazed: never };
+        let mut landed = EventStatus { there: never, grazed: never };
 
         if landing.any() {
             // What landing lanes want is the value of their own target.
@@ -594,7 +594,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
             self.flips = S::Real::select(stuck, S::Real::zero(), self.flips);
             turned = lanes.and(stuck.not());
         }
-        let Point { t, x, sides } = &mut self.at;
+        let StepStart { t, x, sides } = &mut self.at;
         let grazes = pass(&law, target, *t, self.size, x, sides, turned);
         self.work.grazes = tick(grazes, self.work.grazes, 1.0);
         self.begin((law, method), turned);
@@ -641,7 +641,7 @@ struct FirstStep<'a, S: Scalar> {
 
 /// The start in all lanes.
 struct Begin<'a, M, S: Scalar, const D: usize, E, K> {
-    driver: &'a mut Driver<M, S, D, E, K>,
+    driver: &'a mut Integrator<M, S, D, E, K>,
     t: S::Real,
     x: [S; D],
     h: Option<S::Real>,
@@ -657,7 +657,7 @@ where
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Instructions>(self) {
+    fn run<V: InstructionSet>(self) {
         self.driver.start(S::mask(true), self.t, self.x, self.h);
     }
 }
@@ -673,12 +673,12 @@ impl<M: System<S, D>, S: Scalar, const D: usize> scalar::Work for Starting<'_, '
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Instructions>(self) {
+    fn run<V: InstructionSet>(self) {
         self.run.start_on_sides(self.system, self.first);
     }
 }
 
-impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
+impl<M, S, const D: usize, E, K> Integrator<M, S, D, E, K>
 where
     S: Scalar<Real = f64, Mask = bool>,
     M: System<S, D>,
@@ -715,7 +715,7 @@ where
     }
 }
 
-impl<M, S, const D: usize, E, K> Driver<M, S, D, E, K>
+impl<M, S, const D: usize, E, K> Integrator<M, S, D, E, K>
 where
     S: Scalar,
     M: System<S, D>,
@@ -745,7 +745,7 @@ fn tick<R: Real>(lanes: R::Mask, count: R, by: f64) -> R {
 
 /// At a start exactly on a surface the side is the one the flow goes to.
 #[inline(always)]
-fn start_sides<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &mut Point<S, D>, h: S::Real) {
+fn start_sides<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &mut StepStart<S, D>, h: S::Real) {
     for j in 0..system.surfaces() {
         let value = system.surface(j, S::lift(at.t), &at.x, &at.sides).real();
         let on = S::Mask::from_lanes(|i| value.lane(i) == 0.0);

@@ -14,7 +14,7 @@ pub(super) const EIGHTHS: &[f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875
 
 /// Where a run stands, lane by lane.
 #[derive(Clone, Copy, Debug)]
-pub struct Point<S: Scalar, const D: usize> {
+pub struct StepStart<S: Scalar, const D: usize> {
     pub t: S::Real,
     pub x: [S; D],
     /// The side of each switching surface that the law is taken on.
@@ -52,19 +52,19 @@ pub trait Method<S: Scalar, const D: usize> {
     fn set_parameters(&mut self, _values: &[S]) {}
 
     /// Gets ready to step from `at`, in these lanes; the others keep what they have.
-    fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask);
+    fn begin(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>, lanes: S::Mask);
 
     /// Tries a step of size `h`.
     fn attempt(
         &mut self,
         system: &impl System<S, D>,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D>;
 
     /// Completes the polynomial of the last trial.
-    fn extend(&mut self, system: &impl System<S, D>, at: &Point<S, D>);
+    fn extend(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>);
 
     /// Goes on from the end of the last trial, in these lanes.
     fn accept(&mut self, lanes: S::Mask);
@@ -102,7 +102,7 @@ pub trait Method<S: Scalar, const D: usize> {
 
 /// What landing asks of a [`Method`] whose type is forgotten. See the methods of the same names.
 pub(super) trait Course<S: Scalar, const D: usize> {
-    fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &Point<S, D>, lanes: S::Mask);
+    fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &StepStart<S, D>, lanes: S::Mask);
     fn accept(&mut self, lanes: S::Mask);
     fn at(&self, dt: S::Real) -> [S; D];
     fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D];
@@ -111,7 +111,7 @@ pub(super) trait Course<S: Scalar, const D: usize> {
 }
 
 impl<S: Scalar, const D: usize, K: Method<S, D>> Course<S, D> for K {
-    fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &Point<S, D>, lanes: S::Mask) {
+    fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &StepStart<S, D>, lanes: S::Mask) {
         Method::begin(self, &law, at, lanes);
     }
     fn accept(&mut self, lanes: S::Mask) {

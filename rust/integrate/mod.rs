@@ -1,28 +1,28 @@
 //! How a step is taken.
 //!
 //! [`tableau`] holds methods as data, [`step()`] is pure, [`control`] chooses step sizes, [`root`] finds
-//! zeros; a [`Method`] takes steps and has their polynomials. [`Driver`] puts them together: the one
+//! zeros; a [`Method`] takes steps and has their polynomials. [`Integrator`] puts them together: the one
 //! stepping loop, on which every derived object is built.
 
-pub mod control;
 mod dop853;
 mod driver;
-mod landing;
+mod event_location;
 mod method;
 mod propagate;
 mod rodas;
 pub mod root;
 mod runge_kutta;
 mod saltation;
+pub mod step_size;
 mod steps;
 pub mod tableau;
 mod taylor;
 mod tolerance;
 
 pub use dop853::Dop853Scheme;
-pub use driver::{Counts, Driver, Ending, Progress};
-pub use landing::{Probes, TARGETS, WALL, beyond};
-pub use method::{MOST_PROBES, Method, Point, Trial};
+pub use driver::{Counts, Ending, Integrator, Progress};
+pub use event_location::{Probes, TARGETS, WALL, beyond};
+pub use method::{MOST_PROBES, Method, StepStart, Trial};
 pub use propagate::propagate;
 pub use rodas::Rodas;
 pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};

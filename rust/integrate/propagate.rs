@@ -1,6 +1,6 @@
 //! From one time to another, nothing kept on the way.
 
-use super::driver::Driver;
+use super::driver::Integrator;
 use super::tolerance::{Failure, Tolerance};
 use crate::model::{AnySystem, System};
 use crate::scalar::Scalar;
@@ -38,8 +38,8 @@ where
         return Ok(x0);
     }
     // Its type is forgotten: one function for each kind of number.
-    let mut driver: Driver<&dyn AnySystem<S, D>, S, D> =
-        Driver::new(system, t0, x0, Some(t1 - t0), tolerance);
+    let mut driver: Integrator<&dyn AnySystem<S, D>, S, D> =
+        Integrator::new(system, t0, x0, Some(t1 - t0), tolerance);
     while driver.t() != t1 {
         driver.advance(t1)?;
         if driver.counts().accepted > MOST_STEPS {

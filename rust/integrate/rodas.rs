@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::method::{Method, Point, QUARTERS, Trial};
+use super::method::{Method, QUARTERS, StepStart, Trial};
 use super::tolerance::ErrorNorm;
 use crate::model::System;
 use crate::scalar::{Dual, Scalar};
@@ -127,7 +127,7 @@ const INNER: [[f64; STAGES]; 3] = [
 /// The rates' derivatives by the state, `[n][k]` that of rate `n` by component `k`, and by time.
 type Slopes<const D: usize> = ([[f64; D]; D], [f64; D]);
 /// The same at any time and state.
-type SlopesAt<'a, const D: usize> = dyn Fn(&Point<f64, D>) -> Slopes<D> + 'a;
+type SlopesAt<'a, const D: usize> = dyn Fn(&StepStart<f64, D>) -> Slopes<D> + 'a;
 
 /// Rodas5P: G. Steinebach, BIT Numer. Math. 63 (2023) 27. Order 5 with an embedded order 4, stiffly accurate, each
 /// stage a linear system with the same matrix; the continuous extension has order 4.
@@ -137,7 +137,7 @@ pub struct Rodas<'a, const D: usize> {
     /// The derivatives at any time and state. Whose law it is is forgotten, as in all that is compiled for this method.
     slopes_at: Box<SlopesAt<'a, D>>,
     /// Where the derivatives are known, and what they are.
-    known: Option<Point<f64, D>>,
+    known: Option<StepStart<f64, D>>,
     slopes: Slopes<D>,
     /// The last trial: its size, and its polynomial's coefficients over the part of it.
     h: f64,
@@ -150,7 +150,7 @@ impl<'a, const D: usize> Rodas<'a, D> {
         by_state: impl System<Dual<f64, D>, D> + 'a,
         by_time: impl System<Dual<f64, 1>, D> + 'a,
     ) -> Self {
-        let slopes_at = Box::new(move |at: &Point<f64, D>| {
+        let slopes_at = Box::new(move |at: &StepStart<f64, D>| {
             let varied = vector!(Dual<f64, D>, D; n => Dual::variable(at.x[n], n));
             let still = vector!(Dual<f64, 1>, D; n => Dual::constant(at.x[n]));
             let by_state = by_state.rates(Dual::constant(at.t), &varied, &at.sides);
@@ -162,8 +162,8 @@ impl<'a, const D: usize> Rodas<'a, D> {
     }
 
     /// Finds the derivatives where a step starts, unless they are known from one that failed.
-    fn differentiate(&mut self, at: &Point<f64, D>) {
-        let same = |known: &Point<f64, D>| (known.t, known.x, known.sides) == (at.t, at.x, at.sides);
+    fn differentiate(&mut self, at: &StepStart<f64, D>) {
+        let same = |known: &StepStart<f64, D>| (known.t, known.x, known.sides) == (at.t, at.x, at.sides);
         if self.known.as_ref().is_some_and(same) {
             return;
         }
@@ -178,12 +178,12 @@ impl<const D: usize> Method<f64, D> for Rodas<'_, D> {
     const SERIES: bool = false;
     const PROBES: &'static [f64] = QUARTERS;
 
-    fn begin(&mut self, _system: &impl System<f64, D>, _at: &Point<f64, D>, _lanes: bool) {}
+    fn begin(&mut self, _system: &impl System<f64, D>, _at: &StepStart<f64, D>, _lanes: bool) {}
 
     fn attempt(
         &mut self,
         system: &impl System<f64, D>,
-        at: &Point<f64, D>,
+        at: &StepStart<f64, D>,
         h: f64,
         norm: &impl ErrorNorm<f64, D>,
     ) -> Trial<f64, D> {
@@ -228,7 +228,7 @@ impl<const D: usize> Method<f64, D> for Rodas<'_, D> {
         Trial { x, size: h, error: norm.of_step(&last, &at.x, &x) }
     }
 
-    fn extend(&mut self, _system: &impl System<f64, D>, _at: &Point<f64, D>) {}
+    fn extend(&mut self, _system: &impl System<f64, D>, _at: &StepStart<f64, D>) {}
 
     fn accept(&mut self, _lanes: bool) {}
 

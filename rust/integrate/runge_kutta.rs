@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::dop853::Dop853Scheme;
-use super::method::{EIGHTHS, MOST_PROBES, Method, Point, QUARTERS, Trial};
+use super::method::{EIGHTHS, MOST_PROBES, Method, QUARTERS, StepStart, Trial};
 use super::tableau::{DormandPrince, Scheme};
 use super::tolerance::ErrorNorm;
 use crate::model::{Sides, System};
@@ -160,7 +160,7 @@ where
     }
 
     #[inline(always)]
-    fn begin(&mut self, system: &impl System<S, D>, at: &Point<S, D>, lanes: S::Mask) {
+    fn begin(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>, lanes: S::Mask) {
         let rate = system.rates(S::lift(at.t), &at.x, &at.sides);
         self.first = vector!(S, D; n => S::select(lanes, rate[n], self.first[n]));
     }
@@ -169,7 +169,7 @@ where
     fn attempt(
         &mut self,
         system: &impl System<S, D>,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
@@ -189,7 +189,7 @@ where
     }
 
     #[inline(always)]
-    fn extend(&mut self, system: &impl System<S, D>, at: &Point<S, D>) {
+    fn extend(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>) {
         for i in T::TABLEAU.stages..N {
             let x = stage::<T, S, D, N, P>(i, &self.x, &self.stages, self.h);
             self.stages[i] = system.rates(S::lift(at.t + self.h.scale(T::TABLEAU.c[i])), &x, &at.sides);

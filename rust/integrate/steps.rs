@@ -1,6 +1,6 @@
 //! A single run, whatever its model and its method.
 
-use super::driver::{Counts, Driver, Ending};
+use super::driver::{Counts, Ending, Integrator};
 use super::method::Method;
 use super::tolerance::{ErrorNorm, Failure};
 use crate::model::{Sides, System};
@@ -8,7 +8,7 @@ use crate::model::{Sides, System};
 /// So many steps are taken without a look at anything but the time.
 const MOST: usize = 64;
 
-/// A [`Driver`] over plain numbers, its model and its method forgotten: what looks at every step of a run is then
+/// A [`Integrator`] over plain numbers, its model and its method forgotten: what looks at every step of a run is then
 /// compiled once for each number of states. See the driver's methods of the same names.
 pub trait Steps<const D: usize> {
     /// Takes accepted steps up to `end`, until one reaches the time `wanted` or does not end freely, but only so many
@@ -29,7 +29,7 @@ pub trait Steps<const D: usize> {
     fn stable(&self) -> f64;
 }
 
-impl<M, E, K, const D: usize> Steps<D> for Driver<M, f64, D, E, K>
+impl<M, E, K, const D: usize> Steps<D> for Integrator<M, f64, D, E, K>
 where
     M: System<f64, D>,
     E: ErrorNorm<f64, D> + Copy,

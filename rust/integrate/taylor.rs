@@ -1,9 +1,9 @@
 //! The Taylor method.
 
-use super::method::{EIGHTHS, MOST_PROBES, Method, Point, Trial};
+use super::method::{EIGHTHS, MOST_PROBES, Method, StepStart, Trial};
 use super::tolerance::{ErrorNorm, Tolerance};
 use crate::model::System;
-use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
+use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work};
 use crate::tape::{HIGH, Jets, LOW, Tape};
 use crate::unroll::vector;
 
@@ -51,7 +51,7 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// a series with gaps, such as one in powers of t^4, where the last terms fall into one. Where it has levelled
     /// off entirely the polynomial may be wrong on the way only.
     #[inline(never)]
-    fn obey(&mut self, at: &Point<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
+    fn obey(&mut self, at: &StepStart<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
         let from = vector!(S::Real, D; n => at.x[n].real());
         let flat = if self.tape.levels_off() { self.jets.flat(self.tape) } else { S::mask(false) };
         let mut bad = S::mask(false);
@@ -92,7 +92,7 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
 /// units of what its error may be.
 struct Defect<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
-    at: &'a Point<S, D>,
+    at: &'a StepStart<S, D>,
     from: &'a [S::Real; D],
     size: S::Real,
     dt: S::Real,
@@ -103,7 +103,7 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Defect<'_, '_, S, D
     type Output = S::Real;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> S::Real {
+    fn run<V: InstructionSet>(self) -> S::Real {
         let Self { method, at, from, size, dt, norm } = self;
         let x = method.jets.real_at(dt, &[true; D]);
         let rates = method.jets.rates(method.tape, at.t + dt, &x, &at.sides);
@@ -131,12 +131,12 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     }
 
     #[inline(always)]
-    fn begin(&mut self, _system: &impl System<S, D>, _at: &Point<S, D>, _lanes: S::Mask) {}
+    fn begin(&mut self, _system: &impl System<S, D>, _at: &StepStart<S, D>, _lanes: S::Mask) {}
 
     fn attempt(
         &mut self,
         _system: &impl System<S, D>,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
@@ -152,7 +152,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         trial
     }
 
-    fn extend(&mut self, _system: &impl System<S, D>, _at: &Point<S, D>) {}
+    fn extend(&mut self, _system: &impl System<S, D>, _at: &StepStart<S, D>) {}
 
     #[inline(always)]
     fn accept(&mut self, _lanes: S::Mask) {}
@@ -186,7 +186,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 /// A step, compiled once for each instruction set.
 struct Attempt<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
-    at: &'a Point<S, D>,
+    at: &'a StepStart<S, D>,
     h: S::Real,
     norm: &'a E,
 }
@@ -197,7 +197,7 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
     const WIDE: bool = size_of::<S>() > 8 * size_of::<f64>() || D == 3 && size_of::<S>() == size_of::<f64>();
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Trial<S, D> {
+    fn run<V: InstructionSet>(self) -> Trial<S, D> {
         let Self { method, at, h, norm } = self;
         // Divisions: beside the series they cost little.
         let weights = norm.weights(&at.x);

@@ -1,7 +1,7 @@
 //! A system whose type is forgotten.
 
 use super::{Sides, System};
-use crate::integrate::{Point, Probes, TARGETS};
+use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
 /// Any [`System`]. What is asked of it seldom, against the steps of a run, is compiled for a `dyn AnySystem` once for each
@@ -19,7 +19,7 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn wall(&self, x: &[S; D]) -> Option<S>;
     fn beyond(
         &self,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
@@ -56,7 +56,7 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     }
     fn beyond(
         &self,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
@@ -95,7 +95,7 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     }
     fn beyond(
         &self,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],

@@ -1,7 +1,7 @@
 //! The upward-driven disk with friction and effects.
 
-use super::effects::{At, Contact, Dry, Effect, Slots, Term};
-use super::stick::{REVERSAL, Slider, Sticking};
+use super::effects::{Contact, Contributions, Dry, Effect, EffectInputs, Term};
+use super::stick_slip::{REVERSAL, Slider, Sticking};
 use super::{Family, Momentum, Parameter, Sides, System, choose, parameter};
 use crate::scalar::{Dual, Mask, Scalar};
 
@@ -80,20 +80,38 @@ impl<S: Scalar> Disk<S> {
         [omega, y, z, beta]: [A; 4],
         contact: &Contact<S>,
         sides: &Sides<S>,
-    ) -> At<A> {
+    ) -> EffectInputs<A> {
         let speed = A::select(sides[REVERSAL], omega, -omega);
         let f = &self.friction;
         let k = A::select(sides[KINK], lift(f.k1) - lift(f.k2) * speed, lift(f.k0));
         let radius = lift(self.radius);
         let inertia = radius.square().scale(0.5) + y.square() + z.square();
         let contact = Contact { sign: lift(contact.sign), bristle: lift(contact.bristle) };
-        At { t, omega, speed, y, z, beta, k, inertia, w: lift(self.w), g: lift(self.g), radius, contact }
+        EffectInputs {
+            t,
+            omega,
+            speed,
+            y,
+            z,
+            beta,
+            k,
+            inertia,
+            w: lift(self.w),
+            g: lift(self.g),
+            radius,
+            contact,
+        }
     }
 
     /// `(u, W_c - W)` of the effects that `wanted` selects.
     #[inline(always)]
-    fn slip<A: Scalar>(&self, lift: impl Fn(S) -> A, at: &At<A>, wanted: Momentum) -> Slots<A> {
-        let mut slots = Slots::default();
+    fn slip<A: Scalar>(
+        &self,
+        lift: impl Fn(S) -> A,
+        at: &EffectInputs<A>,
+        wanted: Momentum,
+    ) -> Contributions<A> {
+        let mut slots = Contributions::default();
         for term in &self.effects {
             if term.momentum == Some(wanted) {
                 term.slip(&lift, at, &mut slots);
@@ -109,7 +127,7 @@ impl<S: Scalar> Disk<S> {
         let at = self.at(|s| s, t, *x, contact, sides);
         let (mut dy, mut dz) = (z * omega, self.w - y * omega);
 
-        let mut forces = Slots::default();
+        let mut forces = Contributions::default();
         let mut slips = false;
         for term in &self.effects {
             match term.momentum {

@@ -1,7 +1,7 @@
 //! One of two models of the same dimension.
 
 use super::{Family, Parameter, Sides, System};
-use crate::integrate::{Point, Probes, TARGETS};
+use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
 /// A model of one kind or of another, told apart when the program runs.
@@ -69,7 +69,7 @@ where
     #[inline(always)]
     fn beyond(
         &self,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],

@@ -6,26 +6,26 @@
 //! a smooth law, and lands on the surface before it changes the side.
 
 mod any;
-mod bristle;
 mod disk;
 mod dle;
 pub mod effects;
 mod either;
-mod own;
+mod formula_model;
+mod lugre;
 mod pendulum;
-pub mod stick;
+pub mod stick_slip;
 
 pub use any::AnySystem;
-pub use bristle::Bristled;
 pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
-pub use effects::{Effect, Momentum, Treatment};
+pub use effects::{Effect, FrictionModel, Momentum};
 pub use either::Either;
-pub use own::{Own, OwnFamily};
+pub use formula_model::{FormulaFamily, Own};
+pub use lugre::WithLuGre;
 pub use pendulum::{Pendulum, PendulumFamily};
-pub use stick::Sticking;
+pub use stick_slip::Sticking;
 
-use crate::integrate::{Point, Probes, TARGETS, beyond};
+use crate::integrate::{Probes, StepStart, TARGETS, beyond};
 use crate::scalar::{Mask, Scalar};
 
 /// The most switching surfaces a model can have.
@@ -87,7 +87,7 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     /// Looks on which side of every surface, and of the wall, a step's places are; see [`beyond`].
     fn beyond(
         &self,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
@@ -139,7 +139,7 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     #[inline(always)]
     fn beyond(
         &self,
-        at: &Point<S, D>,
+        at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],

@@ -1,7 +1,7 @@
 //! A plain pendulum with a fixed pivot: what the loop is tried on with other people's data.
 
-use super::effects::{At, Contact, Dry, Effect, Slots, Term};
-use super::stick::{REVERSAL, Slider, Sticking};
+use super::effects::{Contact, Contributions, Dry, Effect, EffectInputs, Term};
+use super::stick_slip::{REVERSAL, Slider, Sticking};
 use super::{Family, Parameter, Sides, System, choose, parameter};
 use crate::scalar::{Mask, Scalar};
 
@@ -41,9 +41,9 @@ impl<S: Scalar> Pendulum<S> {
     ) -> (S, Dry<S>) {
         let (sin, cos) = theta.sin_cos();
         let y = self.length * sin;
-        let mut forces = Slots::default();
+        let mut forces = Contributions::default();
         if !self.effects.is_empty() {
-            let at = At {
+            let at = EffectInputs {
                 t,
                 omega,
                 speed: S::select(sides[REVERSAL], omega, -omega),

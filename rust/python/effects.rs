@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::model::effects::{Body, EffectParameter, Kind, Momentum, Role, Slot, Treatment};
+use crate::model::effects::{Body, EffectParameter, FrictionModel, Kind, Momentum, Role, Slot};
 
 /// Every effect: a list of dicts with the keys name, title, equation, meaning, bodies, slots, momenta, treatments
 /// and parameters; each parameter is a dict with the keys name, unit, default, range, role and scan.
@@ -20,8 +20,11 @@ fn effect_library(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("bodies", spec.bodies.iter().map(|&body: &Body| body.name()).collect::<Vec<_>>())?;
         entry.set_item("slots", spec.slots.iter().map(|&slot: &Slot| slot.name()).collect::<Vec<_>>())?;
         entry.set_item("momenta", spec.momenta.iter().map(|&m: &Momentum| m.name()).collect::<Vec<_>>())?;
-        let treatments: &[Treatment] = if kind.dry() { Treatment::ALL } else { &[] };
-        entry.set_item("treatments", treatments.iter().map(|&t: &Treatment| t.name()).collect::<Vec<_>>())?;
+        let treatments: &[FrictionModel] = if kind.dry() { FrictionModel::ALL } else { &[] };
+        entry.set_item(
+            "treatments",
+            treatments.iter().map(|&t: &FrictionModel| t.name()).collect::<Vec<_>>(),
+        )?;
         let parameters = spec.parameters.iter().map(|p| parameter(py, p)).collect::<PyResult<Vec<_>>>()?;
         entry.set_item("parameters", parameters)?;
         list.append(entry)?;

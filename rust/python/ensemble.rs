@@ -8,10 +8,10 @@ use pyo3::types::PyDict;
 use super::jobs::{self, Jobs, outcome_code};
 use super::model::{AnyModel, with_wide_model};
 use super::simulate::stepper;
+use crate::analysis::{Ensemble, EnsembleRun, ExecutionContext, rows};
 use crate::integrate::Tolerance;
 use crate::memory;
 use crate::model::Family;
-use crate::run::{Crew, Ensemble, Passage, rows};
 
 /// Columns, one row for each run.
 struct Table {
@@ -49,11 +49,11 @@ fn collect<F: Family<D>, A: Family<D>, const D: usize>(
     ensemble: &Ensemble<'_, F, D>,
     alone: &A,
     mut table: Table,
-    crew: Crew<'_>,
+    context: ExecutionContext<'_>,
 ) -> Table {
-    for passage in ensemble.run_beside(alone, crew) {
+    for passage in ensemble.run_beside(alone, context) {
         match passage {
-            Some(Passage { states, t, x, outcome }) => {
+            Some(EnsembleRun { states, t, x, outcome }) => {
                 table.push(states.as_flattened(), t, &x, outcome_code(outcome));
             }
             None => table.push(&[], f64::NAN, &[f64::NAN; D], jobs::INTERRUPTED),
@@ -97,7 +97,7 @@ fn ensemble<'py>(
         let table = Table::new(rows::count(&values, &starts), times.len(), dimension)?;
         let ensemble =
             Ensemble { family, values: &values, starts: &starts, times: &times, tolerance, stepper };
-        let (table, signal) = watched.watch(py, |crew| collect(&ensemble, alone, table, crew))?;
+        let (table, signal) = watched.watch(py, |context| collect(&ensemble, alone, table, context))?;
         (table, dimension, signal)
     });
     jobs::lost(py, signal, &table.outcome)?;

@@ -8,11 +8,11 @@ use pyo3::types::PyDict;
 use super::errors::FitError;
 use super::fitted::{Array, Asked, Data, Fitted, fitted, problem};
 use super::interrupt;
-use super::linearised::Linearised;
+use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
 use crate::estimate::{
-    AngleSensor, BASIS, Candidate, DiskCamera, EstimateError, Free, Options, PLACES_PER_LINK, Probe, Role,
-    Rows, Score, Sensor, Set,
+    AngleSensor, BASIS, Candidate, DiskCamera, EstimateError, FilmParameters, FreeParameter, FrequencyProbe,
+    Options, PLACES_PER_LINK, Role, RowMatrix, Score, Sensor,
 };
 use crate::model::effects::Kind;
 use crate::model::{Effect, Either};
@@ -69,7 +69,7 @@ fn measured((t, seen, information, linked, film, memory): &DataTuple<'_>) -> Dat
     }
 }
 
-fn frees(free: &[FreeTuple]) -> PyResult<Vec<Free>> {
+fn frees(free: &[FreeTuple]) -> PyResult<Vec<FreeParameter>> {
     let one = |(role, index, film, mean, sd): &FreeTuple| {
         let role = match role.as_str() {
             "model" => Role::Model(*index),
@@ -77,13 +77,13 @@ fn frees(free: &[FreeTuple]) -> PyResult<Vec<Free>> {
             "clock" => Role::Clock,
             other => return Err(PyValueError::new_err(format!("unknown role {other:?}"))),
         };
-        Ok(Free { role, film: *film, mean: *mean, sd: *sd })
+        Ok(FreeParameter { role, film: *film, mean: *mean, sd: *sd })
     };
     free.iter().map(one).collect()
 }
 
-fn sets(sets: Vec<SetTuple>) -> Vec<Set> {
-    sets.into_iter().map(|(model, camera, clock)| Set { model, camera, clock }).collect()
+fn sets(sets: Vec<SetTuple>) -> Vec<FilmParameters> {
+    sets.into_iter().map(|(model, camera, clock)| FilmParameters { model, camera, clock }).collect()
 }
 
 /// The problem that is asked of a model.
@@ -194,7 +194,8 @@ fn score_ripples<'py>(
         amplitudes.extend([Role::Model(first), Role::Model(first + 1)]);
         more.extend([0.0, 0.0, f]);
     }
-    let probe = Probe { candidate: Candidate { family: wide, more, amplitudes }, frequencies: basis };
+    let probe =
+        FrequencyProbe { candidate: Candidate { family: wide, more, amplitudes }, frequencies: basis };
     let (states, own, linear) = start;
     let (data, states) = (measured(&data), self::wide(&states));
     let (diffusion, linear) = (Some(&diffusion[..]), linear.as_ref().map(Py::get));
@@ -243,7 +244,7 @@ fn score_columns<'py>(
         let message = format!("columns must have the shape ({}, {d}, {c})", n - 1);
         return Err(PyValueError::new_err(message));
     }
-    let mut columns = Rows::zeros((n - 1) * d, c);
+    let mut columns = RowMatrix::zeros((n - 1) * d, c);
     for (i, own) in at_end.numbers.chunks(c.max(1)).enumerate() {
         columns.row_mut(i).copy_from_slice(own);
     }

@@ -7,15 +7,16 @@ use nalgebra::{SMatrix, SVector};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::linearised::Linearised;
+use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
+use crate::analysis::CancelFlag;
 use crate::estimate::{
-    AngleSensor, Candidate, Columns, Cost, Direct, DiskCamera, EstimateError, Estimator, Free, Known,
-    Options, Point, Record, Role, Rows, Score, Sensor, Set,
+    AngleSensor, CachedLinearisation, Candidate, Cost, Direct, DiskCamera, EstimateError, Estimator,
+    FilmParameters, FreeParameter, Options, ParameterJacobian, Record, Role, RowMatrix, Score, Sensor,
+    Unknowns,
 };
 use crate::integrate::Tolerance;
-use crate::model::{Either, Family, OwnFamily};
-use crate::run::Stop;
+use crate::model::{Either, Family, FormulaFamily};
 
 /// A frame's flow is followed much more closely than the model's smallest assumed error.
 const TOLERANCE: Tolerance = Tolerance { rtol: 1e-7, atol: 1e-9 };
@@ -51,8 +52,8 @@ pub struct Asked<'a> {
     /// None where nothing was measured.
     pub data: Option<&'a Data>,
     pub states: &'a Array,
-    pub sets: Vec<Set>,
-    pub free: Vec<Free>,
+    pub sets: Vec<FilmParameters>,
+    pub free: Vec<FreeParameter>,
     /// None where it plays no part.
     pub diffusion: Option<&'a [f64]>,
     /// What a solve left at this point.
@@ -81,7 +82,7 @@ impl Asked<'_> {
                 return wrong("t, seen, information, linked and film have different lengths".into());
             }
         }
-        let fits = |set: &Set| set.model.len() == model && set.camera.len() == camera;
+        let fits = |set: &FilmParameters| set.model.len() == model && set.camera.len() == camera;
         if self.sets.is_empty() || !self.sets.iter().all(fits) {
             return wrong("every film needs the model's and the camera's parameters".into());
         }
@@ -117,7 +118,7 @@ pub struct Size {
 /// A solution, its arrays flat.
 pub struct Solved {
     pub states: Vec<f64>,
-    pub sets: Vec<Set>,
+    pub sets: Vec<FilmParameters>,
     pub covariance: Vec<f64>,
     pub state_covariance: Vec<f64>,
     pub misfit: Vec<f64>,
@@ -133,15 +134,15 @@ pub struct Solved {
 /// An estimator at a point; see the methods of the same names in `rust/estimate`. Arrays are flat.
 pub trait Fitted: Send + Sync {
     fn size(&self) -> Size;
-    fn solve(self: Box<Self>, options: &Options, stop: &Stop) -> Result<Solved, EstimateError>;
+    fn solve(self: Box<Self>, options: &Options, stop: &CancelFlag) -> Result<Solved, EstimateError>;
     /// The candidates: wider models of the same kind, and which of their parameters are amplitudes.
     fn score(&self, candidates: Vec<(AnyModel, Vec<usize>)>) -> PyResult<Score>;
     /// The columns: what they add to the states at the links' ends.
-    fn score_groups(&self, state: Rows, groups: &[usize]) -> Result<Vec<Score>, EstimateError>;
+    fn score_groups(&self, state: RowMatrix, groups: &[usize]) -> Result<Vec<Score>, EstimateError>;
     /// Times, states and responses.
     fn places(&self) -> Result<[Vec<f64>; 3], EstimateError>;
     /// The states at the first and at the last frames, and the covariances there.
-    fn filter(&self, windows: &[(usize, usize)], stop: &Stop) -> Result<[Vec<f64>; 3], EstimateError>;
+    fn filter(&self, windows: &[(usize, usize)], stop: &CancelFlag) -> Result<[Vec<f64>; 3], EstimateError>;
     /// `vague`: one per state.
     fn innovations(&self, vague: &[f64]) -> Result<Vec<f64>, EstimateError>;
     /// After the point's states, which are the starts, of these films at these times.
@@ -151,7 +152,7 @@ pub trait Fitted: Send + Sync {
 /// An estimator at a point, and how a model of its own kind is told from others.
 pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     pub estimator: Estimator<F, C, D, M>,
-    pub point: Point<D>,
+    pub point: Unknowns<D>,
     own: fn(AnyModel) -> Option<(F, Vec<f64>)>,
 }
 
@@ -185,7 +186,10 @@ pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
 }
 
 /// A user's own model with what sees its states.
-fn seen_as_it_is<const D: usize>(family: OwnFamily<D>, values: &[f64]) -> (OwnFamily<D>, &[f64], Direct<D>) {
+fn seen_as_it_is<const D: usize>(
+    family: FormulaFamily<D>,
+    values: &[f64],
+) -> (FormulaFamily<D>, &[f64], Direct<D>) {
     let states = family.states();
     let mut angles = [false; D];
     for n in 0..D {
@@ -219,7 +223,7 @@ where
     if let Some(given) = asked.diffusion {
         diffusion.copy_from_slice(given);
     }
-    let point = Point { states: asked.states.numbers.as_chunks().0.to_vec(), sets: asked.sets };
+    let point = Unknowns { states: asked.states.numbers.as_chunks().0.to_vec(), sets: asked.sets };
     let tolerance = TOLERANCE;
     let mut estimator =
         Estimator { family, sensor, record, free: asked.free, diffusion, tolerance, known: None };
@@ -237,7 +241,7 @@ where
         Size { frames, free, states: D, channels: M }
     }
 
-    fn solve(self: Box<Self>, options: &Options, stop: &Stop) -> Result<Solved, EstimateError> {
+    fn solve(self: Box<Self>, options: &Options, stop: &CancelFlag) -> Result<Solved, EstimateError> {
         let Self { estimator, point, .. } = *self;
         let s = estimator.solve(point, options, stop)?;
         Ok(Solved {
@@ -252,7 +256,10 @@ where
             evidence: s.evidence,
             converged: s.converged,
             iterations: s.iterations,
-            linear: Linearised::new(estimator, Known { point: Arc::new(s.point), linear: s.linear }),
+            linear: Linearised::new(
+                estimator,
+                CachedLinearisation { point: Arc::new(s.point), linear: s.linear },
+            ),
         })
     }
 
@@ -269,9 +276,9 @@ where
         Ok(self.estimator.score(&self.point, &all)?)
     }
 
-    fn score_groups(&self, state: Rows, groups: &[usize]) -> Result<Vec<Score>, EstimateError> {
-        let seen = Rows::zeros(self.estimator.record.t.len() * M, state.width());
-        self.estimator.score_groups(&self.point, &Columns { seen, state }, groups)
+    fn score_groups(&self, state: RowMatrix, groups: &[usize]) -> Result<Vec<Score>, EstimateError> {
+        let seen = RowMatrix::zeros(self.estimator.record.t.len() * M, state.width());
+        self.estimator.score_groups(&self.point, &ParameterJacobian { seen, state }, groups)
     }
 
     fn places(&self) -> Result<[Vec<f64>; 3], EstimateError> {
@@ -286,7 +293,7 @@ where
         Ok([t, states, numbers(&responses)])
     }
 
-    fn filter(&self, windows: &[(usize, usize)], stop: &Stop) -> Result<[Vec<f64>; 3], EstimateError> {
+    fn filter(&self, windows: &[(usize, usize)], stop: &CancelFlag) -> Result<[Vec<f64>; 3], EstimateError> {
         let (mut first, mut last, mut covariance) = (Vec::new(), Vec::new(), Vec::new());
         for end in self.estimator.filter(&self.point, windows, &Options::default(), stop)? {
             first.extend_from_slice(&end.first);

@@ -9,16 +9,16 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::run::Stop;
+use crate::analysis::CancelFlag;
 
 /// How often the calling thread looks for signals.
 const POLL: Duration = Duration::from_millis(20);
 
 /// Runs `work` on another thread, from which it may use all cores, with the interpreter lock released.
 ///
-/// The calling thread looks for signals meanwhile; on Ctrl-C it sets the [`Stop`], waits for the work
+/// The calling thread looks for signals meanwhile; on Ctrl-C it sets the [`CancelFlag`], waits for the work
 /// to end, and raises `KeyboardInterrupt`. A panic becomes a `RuntimeError`.
-pub fn run<T, E>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T, E> + Send) -> PyResult<T>
+pub fn run<T, E>(py: Python<'_>, work: impl FnOnce(&CancelFlag) -> Result<T, E> + Send) -> PyResult<T>
 where
     T: Send,
     E: Into<PyErr> + Send,
@@ -34,7 +34,7 @@ where
 pub fn watch<T: Send>(
     py: Python<'_>,
     tick: &dyn Fn() -> PyResult<()>,
-    work: impl FnOnce(&Stop) -> T + Send,
+    work: impl FnOnce(&CancelFlag) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
     let (mut work, mut result) = (Some(work), None);
     let signal = watch_any(py, tick, &mut |stop| {
@@ -47,9 +47,9 @@ pub fn watch<T: Send>(
 fn watch_any(
     py: Python<'_>,
     tick: &dyn Fn() -> PyResult<()>,
-    work: &mut (dyn FnMut(&Stop) + Send),
+    work: &mut (dyn FnMut(&CancelFlag) + Send),
 ) -> PyResult<PyResult<()>> {
-    let stop = Stop::new();
+    let stop = CancelFlag::new();
     let done = AtomicBool::new(false);
     let caller = thread::current();
     thread::scope(|scope| {

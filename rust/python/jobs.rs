@@ -10,8 +10,8 @@ use pyo3::prelude::*;
 use super::errors::ModelError;
 use super::interrupt;
 use super::model::AnyModel;
+use crate::analysis::{ExecutionContext, Outcome};
 use crate::integrate::Failure;
-use crate::run::{Crew, Outcome};
 use crate::scalar::Isa;
 
 /// The outcome of a run as a number: its place in `udd`'s list of outcomes.
@@ -55,18 +55,18 @@ impl<'a, 'py> Jobs<'a, 'py> {
         Self { threads, done: AtomicUsize::new(0), progress }
     }
 
-    /// As [`interrupt::watch`]: what the work on a crew yields, and a signal that came meanwhile.
+    /// As [`interrupt::watch`]: what the work on all threads results in, and a signal that came meanwhile.
     pub fn watch<T: Send>(
         &self,
         py: Python<'py>,
-        work: impl FnOnce(Crew<'_>) -> T + Send,
+        work: impl FnOnce(ExecutionContext<'_>) -> T + Send,
     ) -> PyResult<(T, PyResult<()>)> {
         let (threads, done, progress) = (self.threads, &self.done, self.progress);
         let tick = || match progress {
             Some(call) => call.call1((done.load(Ordering::Relaxed),)).map(drop),
             None => Ok(()),
         };
-        interrupt::watch(py, &tick, |stop| work(Crew { threads, isa: Isa::best(), done, stop }))
+        interrupt::watch(py, &tick, |stop| work(ExecutionContext { threads, isa: Isa::best(), done, stop }))
     }
 }
 

@@ -7,9 +7,12 @@ use pyo3::types::PyDict;
 use super::interrupt;
 use super::jobs::{self, Jobs, outcome_code};
 use super::model::{AnyModel, state, with_wide_model};
+use crate::analysis::{
+    CancelFlag, CovariantFrames, ExecutionContext, Exponents, Lyapunov, LyapunovOptions, frames as frames_of,
+    rows,
+};
 use crate::integrate::{Dopri5, Failure, Taylor, Tolerance, order};
 use crate::model::{AnySystem, Family};
-use crate::run::{Crew, Exponents, Frames, Lyapunov, LyapunovOptions, Stop, frames as frames_of, rows};
 use crate::scalar::{Dual, Isa, constants};
 
 /// Columns, one row for each orbit.
@@ -47,12 +50,16 @@ impl Table {
     }
 }
 
-fn table<F: Family<D>, const D: usize>(orbits: &Lyapunov<'_, F, D>, all: bool, crew: Crew<'_>) -> Table {
+fn table<F: Family<D>, const D: usize>(
+    orbits: &Lyapunov<'_, F, D>,
+    all: bool,
+    context: ExecutionContext<'_>,
+) -> Table {
     // Of many states one exponent alone is not worth its compilation.
     if const { D <= 4 } && !all {
-        return collect(&orbits.run::<1>(crew));
+        return collect(&orbits.run::<1>(context));
     }
-    collect(&orbits.run::<D>(crew))
+    collect(&orbits.run::<D>(context))
 }
 
 fn collect<const D: usize, const N: usize>(orbits: &[Option<Exponents<D, N>>]) -> Table {
@@ -112,7 +119,7 @@ fn lyapunov<'py>(
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
         let dimension = starts[0].len();
-        let (table, signal) = jobs.watch(py, |crew| table(&orbits, all, crew))?;
+        let (table, signal) = jobs.watch(py, |context| table(&orbits, all, context))?;
         (table, dimension, signal)
     });
     signal?;
@@ -173,8 +180,8 @@ fn follow<F: Family<D>, const D: usize>(
     x0: [f64; D],
     span: (f64, usize),
     tolerance: &Tolerance,
-    stop: &Stop,
-) -> Result<Frames<D>, Failure> {
+    stop: &CancelFlag,
+) -> Result<CovariantFrames<D>, Failure> {
     let wide: Vec<Dual<f64, D>> = constants(values);
     // Its type is forgotten: models of as many states share what follows.
     let system: &dyn AnySystem<Dual<f64, D>, D> = &family.build(&wide);

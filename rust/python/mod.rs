@@ -5,12 +5,12 @@ mod ensemble;
 mod errors;
 mod estimate;
 mod fitted;
+mod image;
 mod interrupt;
 mod jobs;
-mod linearised;
+mod linearisation_cache;
 mod lyapunov;
 mod model;
-mod picture;
 mod section;
 mod shooting;
 mod simulate;
@@ -34,7 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     ensemble::register(module)?;
     shooting::register(module)?;
     estimate::register(module)?;
-    picture::register(module)?;
+    image::register(module)?;
     // Redundant with the stub, which would have to repeat it.
     module.delattr("__all__")?;
     Ok(())

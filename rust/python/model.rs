@@ -7,28 +7,28 @@ use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 
 use super::errors::ModelError;
+use crate::analysis::batch::rows::tape;
 use crate::formula::is_reserved;
-use crate::model::effects::{Body, Formula, Kind, Slot, Source, Treatment};
+use crate::model::effects::{Body, Formula, FrictionModel, Kind, Slot, Source};
 use crate::model::{
-    Bristled, DiskFamily, DleFamily, Effect, Either, Family, Momentum, OwnFamily, PendulumFamily, System,
-    sides_of,
+    DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, Momentum, PendulumFamily, System,
+    WithLuGre, sides_of,
 };
-use crate::run::rows::tape;
 
 /// Any model with its parameter values, in the order of its family's parameters.
 ///
 /// Models of as many states share what is compiled for that number.
 #[derive(Clone, Debug)]
 pub enum AnyModel {
-    One(OwnFamily<1>, Vec<f64>),
-    Two(Either<PendulumFamily, OwnFamily<2>>, Vec<f64>),
-    Three(Either<DleFamily, OwnFamily<3>>, Vec<f64>),
-    Four(Either<DiskFamily, OwnFamily<4>>, Vec<f64>),
+    One(FormulaFamily<1>, Vec<f64>),
+    Two(Either<PendulumFamily, FormulaFamily<2>>, Vec<f64>),
+    Three(Either<DleFamily, FormulaFamily<3>>, Vec<f64>),
+    Four(Either<DiskFamily, FormulaFamily<4>>, Vec<f64>),
     /// With LuGre friction, whose bristles are one more state.
-    Five(Either<Bristled<DiskFamily>, OwnFamily<5>>, Vec<f64>),
-    Six(OwnFamily<6>, Vec<f64>),
+    Five(Either<WithLuGre<DiskFamily>, FormulaFamily<5>>, Vec<f64>),
+    Six(FormulaFamily<6>, Vec<f64>),
     /// Apart from the others of three states, whose laws are smooth.
-    BristledPendulum(Bristled<PendulumFamily>, Vec<f64>),
+    BristledPendulum(WithLuGre<PendulumFamily>, Vec<f64>),
 }
 
 /// Runs the expression with the model's family and values, whatever its dimension. The DLE is told apart before: its law
@@ -134,14 +134,14 @@ impl AnyModel {
         let model = match kind.as_str() {
             "dle" => AnyModel::Three(Either::First(DleFamily), values),
             "disk" if bristles => {
-                AnyModel::Five(Either::First(Bristled(DiskFamily { effects, edge })), values)
+                AnyModel::Five(Either::First(WithLuGre(DiskFamily { effects, edge })), values)
             }
             "disk" => AnyModel::Four(Either::First(DiskFamily { effects, edge }), values),
             "pendulum" => {
                 able(&effects, Body::Pendulum)?;
                 let family = PendulumFamily { effects };
                 match bristles {
-                    true => AnyModel::BristledPendulum(Bristled(family), values),
+                    true => AnyModel::BristledPendulum(WithLuGre(family), values),
                     false => AnyModel::Two(Either::First(family), values),
                 }
             }
@@ -160,15 +160,14 @@ impl AnyModel {
     pub fn to_fit(model: &Bound<'_, PyAny>) -> PyResult<Self> {
         let model = Self::from_python(model)?;
         let effects: &[Effect] = match &model {
-            AnyModel::Four(Either::First(family), _) | AnyModel::Five(Either::First(Bristled(family)), _) => {
-                &family.effects
-            }
-            AnyModel::Two(Either::First(family), _) | AnyModel::BristledPendulum(Bristled(family), _) => {
+            AnyModel::Four(Either::First(family), _)
+            | AnyModel::Five(Either::First(WithLuGre(family)), _) => &family.effects,
+            AnyModel::Two(Either::First(family), _) | AnyModel::BristledPendulum(WithLuGre(family), _) => {
                 &family.effects
             }
             _ => &[],
         };
-        if let Some(effect) = effects.iter().find(|effect| effect.treatment != Treatment::Smoothed) {
+        if let Some(effect) = effects.iter().find(|effect| effect.treatment != FrictionModel::Smoothed) {
             let (name, treatment) = (effect.name(), effect.treatment.name());
             return Err(ModelError::new_err(format!(
                 "a fit needs smoothed friction: give {name} the treatment smoothed, not {treatment}"
@@ -232,9 +231,9 @@ impl AnyModel {
 
 /// What a user's own model consists of: the states' names, the rates' formulas, the parameters' names.
 /// and which states are angles.
-type OwnSpec = (Vec<String>, Vec<String>, Vec<String>, Vec<String>);
+type FormulaModelSpec = (Vec<String>, Vec<String>, Vec<String>, Vec<String>);
 
-fn own((states, equations, parameters, angles): &OwnSpec, values: Vec<f64>) -> PyResult<AnyModel> {
+fn own((states, equations, parameters, angles): &FormulaModelSpec, values: Vec<f64>) -> PyResult<AnyModel> {
     for (i, name) in states.iter().chain(parameters).enumerate() {
         let what = if i < states.len() { "state" } else { "parameter" };
         if is_reserved(name) {
@@ -254,7 +253,7 @@ fn own((states, equations, parameters, angles): &OwnSpec, values: Vec<f64>) -> P
     macro_rules! parsed {
         ($($d:literal $Kind:ident |$family:ident| $held:expr),+) => {
             match states.len() {
-                $($d => OwnFamily::<$d>::parse(states, &texts, parameters).map(|family| {
+                $($d => FormulaFamily::<$d>::parse(states, &texts, parameters).map(|family| {
                     let $family = family.with_angles(angles);
                     AnyModel::$Kind($held, values)
                 }),)+
@@ -291,7 +290,7 @@ fn able(effects: &[Effect], body: Body) -> PyResult<()> {
 
 /// Whether the effects' friction comes from bristles.
 fn bristled(effects: &[Effect]) -> PyResult<bool> {
-    let bristles = |effect: &&Effect| effect.treatment == Treatment::Lugre;
+    let bristles = |effect: &&Effect| effect.treatment == FrictionModel::Lugre;
     if !effects.iter().any(|effect| bristles(&effect)) {
         return Ok(false);
     }
@@ -334,9 +333,9 @@ fn effect((name, momentum, treatment, formula): &EffectSpec) -> PyResult<Effect>
         return Err(ModelError::new_err(format!("the effect {name} cannot enter the momentum that way")));
     }
     let treatment = match treatment.as_deref() {
-        None => Treatment::Smoothed,
+        None => FrictionModel::Smoothed,
         Some(given) => {
-            let found = Treatment::ALL.iter().copied().find(|treatment| treatment.name() == given);
+            let found = FrictionModel::ALL.iter().copied().find(|treatment| treatment.name() == given);
             found.filter(|_| effect.kind().is_some_and(Kind::dry)).ok_or_else(|| {
                 ModelError::new_err(format!("the effect {name} has no treatment called {given}"))
             })?

@@ -8,20 +8,20 @@ use pyo3::types::PyDict;
 use super::errors::ModelError;
 use super::jobs::{self, Jobs};
 use super::model::{AnyModel, with_wide_model};
+use crate::analysis::{CrossingOutcome, Crossings, ExecutionContext, Section, SectionRun};
 use crate::formula::{Expression, Names};
 use crate::integrate::Tolerance;
 use crate::memory;
 use crate::model::Family;
-use crate::run::{Crew, Crossings, Ended, Section, Sections};
 
-fn code(ended: Ended) -> u8 {
+fn code(ended: CrossingOutcome) -> u8 {
     match ended {
-        Ended::Finished => jobs::FINISHED,
-        Ended::Ejected => jobs::EJECTED,
-        Ended::TimeRanOut => jobs::TIME_RAN_OUT,
-        Ended::Failed(failure) => jobs::failure_code(failure),
-        Ended::Interrupted => jobs::INTERRUPTED,
-        Ended::Escaped => jobs::ESCAPED,
+        CrossingOutcome::Finished => jobs::FINISHED,
+        CrossingOutcome::Ejected => jobs::EJECTED,
+        CrossingOutcome::TimeRanOut => jobs::TIME_RAN_OUT,
+        CrossingOutcome::Failed(failure) => jobs::failure_code(failure),
+        CrossingOutcome::Interrupted => jobs::INTERRUPTED,
+        CrossingOutcome::Escaped => jobs::ESCAPED,
     }
 }
 
@@ -99,12 +99,12 @@ impl Table {
 }
 
 fn collect<F: Family<D>, const D: usize>(
-    sections: &Sections<'_, F, D>,
+    sections: &SectionRun<'_, F, D>,
     mut table: Table,
-    crew: Crew<'_>,
+    context: ExecutionContext<'_>,
 ) -> Table {
-    let all = sections.run(crew);
-    if all.iter().any(|one| one.as_ref().is_none_or(|found| found.ended == Ended::Interrupted)) {
+    let all = sections.run(context);
+    if all.iter().any(|one| one.as_ref().is_none_or(|found| found.ended == CrossingOutcome::Interrupted)) {
         // Room for points that never came is not even filled.
         table.count = all.iter().flatten().map(|found| found.t.len()).max().unwrap_or(0);
     }
@@ -165,7 +165,7 @@ fn sections<'py>(
         jobs::agree(rows.len(), starts.len())?;
         let dimension = starts[0].len();
         let table = Table::new(rows.len().max(starts.len()), count, dimension)?;
-        let sections = Sections {
+        let sections = SectionRun {
             family,
             values: &rows,
             starts: &starts,
@@ -176,7 +176,7 @@ fn sections<'py>(
             bounded: std::array::from_fn(|n| angles.get(n) == Some(&false)),
             tolerance: Tolerance { rtol, atol },
         };
-        let (table, signal) = watched.watch(py, |crew| collect(&sections, table, crew))?;
+        let (table, signal) = watched.watch(py, |context| collect(&sections, table, context))?;
         (table, dimension, signal)
     });
     jobs::lost(py, signal, &table.outcome)?;

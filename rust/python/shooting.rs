@@ -9,9 +9,11 @@ use super::errors::ModelError;
 use super::interrupt;
 use super::jobs;
 use super::model::{AnyModel, state, with_model, with_wide_model};
+use crate::analysis::{
+    CancelFlag, MOST_PARAMETERS, Multiplier, Segment, SegmentEnd, higher, linear, multipliers, pieces,
+};
 use crate::integrate::{Failure, Tolerance};
 use crate::model::Family;
-use crate::run::{Flown, MOST_PARAMETERS, Multiplier, Piece, Stop, higher, linear, multipliers, pieces};
 
 /// Pieces of orbits: their ends, with derivatives by their starts and by up to two parameters.
 ///
@@ -46,7 +48,7 @@ fn shoot<'py>(
         }
         let mut list = Vec::with_capacity(starts.len());
         for (i, values) in rows.into_iter().enumerate() {
-            list.push(Piece { values, t: t[i], x: starts[i], span: spans[i] });
+            list.push(Segment { values, t: t[i], x: starts[i], span: spans[i] });
         }
         (run(py, family, &list, &wanted, &tolerance)?, starts[0].len())
     });
@@ -77,15 +79,15 @@ struct Flat {
 fn run<F: Family<D>, const D: usize>(
     py: Python<'_>,
     family: &F,
-    list: &[Piece<D>],
+    list: &[Segment<D>],
     wanted: &[usize],
     tolerance: &Tolerance,
 ) -> PyResult<Flat> {
-    let flown = interrupt::run(py, |stop: &Stop| -> Result<_, Failure> {
+    let flown = interrupt::run(py, |stop: &CancelFlag| -> Result<_, Failure> {
         pieces(family, list, wanted, tolerance, stop)
     })?;
     let mut flat = Flat::default();
-    for Flown { x, by_state, by_parameter, rate } in &flown {
+    for SegmentEnd { x, by_state, by_parameter, rate } in &flown {
         flat.x.extend_from_slice(x);
         flat.by_state.extend_from_slice(by_state.as_flattened());
         flat.by_parameter.extend_from_slice(by_parameter.as_flattened());

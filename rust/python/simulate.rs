@@ -10,10 +10,10 @@ use pyo3::types::PyDict;
 use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
 use super::model::{AnyModel, state, with_model};
+use crate::analysis::{CancelFlag, MethodChoice, Output, Run, Stiffness, rows, trajectory};
 use crate::integrate::{Dop853, Dopri5, Failure, Rodas, Taylor, Tolerance, order};
 use crate::model::{self, Family, System};
 use crate::observe::Record;
-use crate::run::{Output, Run, Stepper, Stiffness, Stop, rows, trajectory};
 use crate::scalar::{Isa, constants};
 
 /// A finished run, its dimension forgotten: states are flat.
@@ -46,12 +46,12 @@ impl<const D: usize> Piecewise for Record<D> {
 }
 
 /// How steps are taken, as it is called in Python.
-pub fn stepper(method: &str) -> PyResult<Stepper> {
+pub fn stepper(method: &str) -> PyResult<MethodChoice> {
     match method {
-        "dopri5" => Ok(Stepper::Dopri5),
-        "dop853" => Ok(Stepper::Dop853),
-        "taylor" => Ok(Stepper::Taylor),
-        "auto" => Ok(Stepper::Auto),
+        "dopri5" => Ok(MethodChoice::Dopri5),
+        "dop853" => Ok(MethodChoice::Dop853),
+        "taylor" => Ok(MethodChoice::Taylor),
+        "auto" => Ok(MethodChoice::Auto),
         _ => Err(ModelError::new_err(format!("no method is called {method:?}"))),
     }
 }
@@ -59,7 +59,7 @@ pub fn stepper(method: &str) -> PyResult<Stepper> {
 /// How a single run may be taken beside.
 #[derive(Clone, Copy)]
 enum By {
-    Stepper(Stepper),
+    MethodChoice(MethodChoice),
     /// For stiff laws.
     Rodas,
 }
@@ -70,7 +70,7 @@ fn run<F: Family<D>, const D: usize>(
     by: By,
     (output, x0): (Output<'_>, [f64; D]),
     (tolerance, keep): (&Tolerance, bool),
-    (stop, stiffness): (&Stop, Option<&Stiffness>),
+    (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
 ) -> Result<Flat, PyErr> {
     let system = || family.build(values);
     let (stiff, stop) = ((stop, None), (stop, stiffness));
@@ -88,7 +88,7 @@ fn run<F: Family<D>, const D: usize>(
         }
     };
     let tape = match by {
-        By::Stepper(Stepper::Taylor | Stepper::Auto) => rows::tape(family, &[values.to_vec()]),
+        By::MethodChoice(MethodChoice::Taylor | MethodChoice::Auto) => rows::tape(family, &[values.to_vec()]),
         _ => None,
     };
     let series = || {
@@ -98,15 +98,15 @@ fn run<F: Family<D>, const D: usize>(
     };
     let run = match by {
         By::Rodas => rodas(),
-        By::Stepper(Stepper::Dopri5) => {
+        By::MethodChoice(MethodChoice::Dopri5) => {
             trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop)
         }
-        By::Stepper(Stepper::Dop853) => stages(),
-        By::Stepper(Stepper::Taylor) => {
+        By::MethodChoice(MethodChoice::Dop853) => stages(),
+        By::MethodChoice(MethodChoice::Taylor) => {
             let message = "the model's law depends on comparisons, which no power series follows; use method=\"dop853\"";
             series().ok_or_else(|| ModelError::new_err(message))?
         }
-        By::Stepper(Stepper::Auto) => match series() {
+        By::MethodChoice(MethodChoice::Auto) => match series() {
             None => stages(),
             Some(Err(failure)) if tape.as_ref().is_some_and(|tape| tape.hands_over(&failure)) => stages(),
             Some(run) => run,
@@ -183,7 +183,7 @@ fn simulate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
     let tolerance = Tolerance { rtol, atol };
-    let by = if method == "rodas" { By::Rodas } else { By::Stepper(stepper(method)?) };
+    let by = if method == "rodas" { By::Rodas } else { By::MethodChoice(stepper(method)?) };
     // The models that are built in are not stiff; where they come to rest steps are held down, too.
     let watched = model.is_own();
     let stiffness = Stiffness::new(method == "auto");
@@ -200,7 +200,7 @@ fn simulate<'py>(
             let message = "the initial state lies outside the disk: Y^2 + Z^2 must be below R^2 (or use edge=\"ignore\")";
             return Err(ModelError::new_err(message));
         }
-        let work = |stop: &Stop| {
+        let work = |stop: &CancelFlag| {
             run(family, values, by, (output, x0), (&tolerance, dense), (stop, watched.then_some(&stiffness)))
         };
         let (flat, signal) = interrupt::watch(py, &tell, work)?;

@@ -2,14 +2,14 @@
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-use super::{Instructions, Packet, Real, Scalar};
+use super::{InstructionSet, Packet, Real, Scalar};
 
 /// A number with up to three derivatives, by the vector instructions of a set; no bit changes.
 ///
 /// A product takes two instructions: the first factor by the second one's number, and the second one's derivatives by
 /// the first one's number.
 #[derive(Clone, Copy, Debug)]
-pub struct Fan<V> {
+pub struct DerivativeLanes<V> {
     /// The number and then its derivatives.
     all: Packet<4, V>,
     /// The number, in every lane.
@@ -18,7 +18,7 @@ pub struct Fan<V> {
     derivatives: Packet<4, V>,
 }
 
-impl<V: Instructions> Fan<V> {
+impl<V: InstructionSet> DerivativeLanes<V> {
     #[inline(always)]
     pub fn new(number: f64, [a, b, c]: [f64; 3]) -> Self {
         Self::of(Packet::new([number, a, b, c]))
@@ -63,7 +63,7 @@ impl<V: Instructions> Fan<V> {
     }
 }
 
-impl<V: Instructions> Add for Fan<V> {
+impl<V: InstructionSet> Add for DerivativeLanes<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -71,7 +71,7 @@ impl<V: Instructions> Add for Fan<V> {
     }
 }
 
-impl<V: Instructions> Sub for Fan<V> {
+impl<V: InstructionSet> Sub for DerivativeLanes<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -79,7 +79,7 @@ impl<V: Instructions> Sub for Fan<V> {
     }
 }
 
-impl<V: Instructions> Mul for Fan<V> {
+impl<V: InstructionSet> Mul for DerivativeLanes<V> {
     type Output = Self;
     #[inline(always)]
     #[allow(clippy::suspicious_arithmetic_impl, reason = "the product rule is a sum")]
@@ -88,7 +88,7 @@ impl<V: Instructions> Mul for Fan<V> {
     }
 }
 
-impl<V: Instructions> Neg for Fan<V> {
+impl<V: InstructionSet> Neg for DerivativeLanes<V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -96,7 +96,7 @@ impl<V: Instructions> Neg for Fan<V> {
     }
 }
 
-impl<V: Instructions> AddAssign for Fan<V> {
+impl<V: InstructionSet> AddAssign for DerivativeLanes<V> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;

@@ -20,7 +20,7 @@ pub enum Isa {
 ///
 /// Those beyond the [`Plain`] ones cannot be named outside of this crate: they are given to [`Work`] where
 /// the machine has them. The type is empty, and aligned as a register of the set is.
-pub trait Instructions: Copy + Debug + PartialEq + Send + Sync + 'static {
+pub trait InstructionSet: Copy + Debug + PartialEq + Send + Sync + 'static {
     const ISA: Isa;
 }
 
@@ -35,13 +35,13 @@ pub struct Avx2;
 #[repr(align(64))]
 pub struct Avx512;
 
-impl Instructions for Plain {
+impl InstructionSet for Plain {
     const ISA: Isa = Isa::Baseline;
 }
-impl Instructions for Avx2 {
+impl InstructionSet for Avx2 {
     const ISA: Isa = Isa::Avx2;
 }
-impl Instructions for Avx512 {
+impl InstructionSet for Avx512 {
     const ISA: Isa = Isa::Avx512;
 }
 
@@ -53,7 +53,7 @@ pub trait Work {
     type Output;
     /// Whether it gains from AVX-512 over single numbers, too: from its wider registers, or from their number.
     const WIDE: bool = false;
-    fn run<V: Instructions>(self) -> Self::Output;
+    fn run<V: InstructionSet>(self) -> Self::Output;
 }
 
 impl Isa {
@@ -123,7 +123,7 @@ impl Isa {
 
 /// Does work with the instructions `V`, as a function of its own.
 #[inline(always)]
-pub(crate) fn run_with<V: Instructions, W: Work>(work: W) -> W::Output {
+pub(crate) fn run_with<V: InstructionSet, W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if const { matches!(V::ISA, Isa::Avx512) } {

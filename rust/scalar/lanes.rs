@@ -4,14 +4,14 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
-use super::isa::{Instructions, Isa};
+use super::isa::{InstructionSet, Isa};
 
 /// Functions of arrays, lane by lane: what they do to one lane, to four with AVX2 and to eight with AVX-512.
 macro_rules! lanewise {
     ($($(#[$doc:meta])* $name:ident($($a:ident),+) = $lane:expr, $four:expr, $eight:expr;)+) => {$(
         $(#[$doc])*
         #[inline(always)]
-        pub fn $name<const L: usize, V: Instructions>($($a: &[f64; L]),+) -> [f64; L] {
+        pub fn $name<const L: usize, V: InstructionSet>($($a: &[f64; L]),+) -> [f64; L] {
             let mut result = [0.0; L];
             #[cfg(target_arch = "x86_64")]
             if const { matches!(V::ISA, Isa::Avx512) && L.is_multiple_of(8) } {
@@ -81,7 +81,7 @@ lanewise! {
 
 /// A bit for every lane, the lowest for the first: whether its bits are set.
 #[inline(always)]
-pub fn bits<const L: usize, V: Instructions>(mask: &[f64; L]) -> u64 {
+pub fn bits<const L: usize, V: InstructionSet>(mask: &[f64; L]) -> u64 {
     #[cfg(target_arch = "x86_64")]
     if const { matches!(V::ISA, Isa::Avx512) && L.is_multiple_of(8) } {
         let mut bits = 0;

@@ -14,16 +14,16 @@ mod packet;
 mod real;
 
 pub use dual::Dual;
-pub use fan::Fan;
+pub use fan::DerivativeLanes;
 pub(crate) use isa::run_with;
-pub use isa::{Instructions, Isa, LANES, Plain, Work};
+pub use isa::{InstructionSet, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// One number with four derivatives, each in a lane beside a copy of the number: the operations that the derivatives
-/// have in common are vector instructions, and no bit changes. For fewer of them see [`Fan`].
+/// have in common are vector instructions, and no bit changes. For fewer of them see [`DerivativeLanes`].
 pub type Spread<V> = Dual<Packet<4, V>, 1>;
 
 /// A number that a model can be evaluated over.
@@ -63,7 +63,7 @@ pub trait Scalar:
     /// The same for a factor without derivatives.
     fn fused_times(self, a: Self, b: Self::Real) -> Self;
 
-    /// The derivatives of a number that has a few of them: up to three make a [`Fan`], four a [`Spread`] number, which
+    /// The derivatives of a number that has a few of them: up to three make a [`DerivativeLanes`], four a [`Spread`] number, which
     /// are faster.
     const DERIVATIVES: usize = 0;
     /// The derivative `i`.

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::isa::{self, Instructions, Isa, LANES, Plain, Work};
+use super::isa::{self, InstructionSet, Isa, LANES, Plain, Work};
 use super::{Mask, Real, Scalar, elementary, lanes};
 
 /// `L` numbers that go through the same operations, one trajectory each, by the instructions `V`.
@@ -26,7 +26,7 @@ pub struct Packet<const L: usize, V = Plain>([f64; L], [V; 0]);
 #[repr(C)]
 pub struct LaneMask<const L: usize, V = Plain>([f64; L], [V; 0]);
 
-impl<const L: usize, V: Instructions> Packet<L, V> {
+impl<const L: usize, V: InstructionSet> Packet<L, V> {
     /// The packet with these lanes.
     #[inline(always)]
     pub fn new(lanes: [f64; L]) -> Self {
@@ -34,13 +34,13 @@ impl<const L: usize, V: Instructions> Packet<L, V> {
     }
 }
 
-impl<const L: usize, V: Instructions> PartialEq for LaneMask<L, V> {
+impl<const L: usize, V: InstructionSet> PartialEq for LaneMask<L, V> {
     fn eq(&self, other: &Self) -> bool {
         (0..L).all(|i| self.lane(i) == other.lane(i))
     }
 }
 
-impl<const L: usize, V: Instructions> LaneMask<L, V> {
+impl<const L: usize, V: InstructionSet> LaneMask<L, V> {
     #[inline(always)]
     fn new(lanes: [f64; L]) -> Self {
         Self(lanes, [])
@@ -62,7 +62,7 @@ fn truth(value: bool) -> f64 {
     f64::from_bits(if value { !0 } else { 0 })
 }
 
-impl<const L: usize, V: Instructions> Mask for LaneMask<L, V> {
+impl<const L: usize, V: InstructionSet> Mask for LaneMask<L, V> {
     #[inline(always)]
     fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> Self {
         Self::new(each(|i| truth(lane(i))))
@@ -91,7 +91,7 @@ impl<const L: usize, V: Instructions> Mask for LaneMask<L, V> {
 
 macro_rules! operators {
     ($($Op:ident :: $op:ident),+) => {$(
-        impl<const L: usize, V: Instructions> $Op for Packet<L, V> {
+        impl<const L: usize, V: InstructionSet> $Op for Packet<L, V> {
             type Output = Self;
             #[inline(always)]
             fn $op(self, other: Self) -> Self {
@@ -102,7 +102,7 @@ macro_rules! operators {
 }
 operators! { Add::add, Sub::sub, Mul::mul, Div::div }
 
-impl<const L: usize, V: Instructions> Neg for Packet<L, V> {
+impl<const L: usize, V: InstructionSet> Neg for Packet<L, V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -110,21 +110,21 @@ impl<const L: usize, V: Instructions> Neg for Packet<L, V> {
     }
 }
 
-impl<const L: usize, V: Instructions> AddAssign for Packet<L, V> {
+impl<const L: usize, V: InstructionSet> AddAssign for Packet<L, V> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<const L: usize, V: Instructions> SubAssign for Packet<L, V> {
+impl<const L: usize, V: InstructionSet> SubAssign for Packet<L, V> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl<const L: usize, V: Instructions> Real for Packet<L, V> {
+impl<const L: usize, V: InstructionSet> Real for Packet<L, V> {
     const LANES: usize = L;
 
     #[inline(always)]
@@ -169,7 +169,7 @@ impl<const L: usize, V: Instructions> Real for Packet<L, V> {
     }
 }
 
-impl<const L: usize, V: Instructions> Scalar for Packet<L, V> {
+impl<const L: usize, V: InstructionSet> Scalar for Packet<L, V> {
     type Real = Self;
     type Mask = LaneMask<L, V>;
     type Register = Packet<LANES, V>;
@@ -268,7 +268,7 @@ macro_rules! functions {
             type Output = $Output;
 
             #[inline(always)]
-            fn run<V: Instructions>(self) -> $Output {
+            fn run<V: InstructionSet>(self) -> $Output {
                 elementary::$function(self.0)
             }
         }

@@ -7,7 +7,7 @@
 use super::node::{INVERSE, Node, Step};
 use super::series::{inner_at, inner_square_at};
 use crate::model::Sides;
-use crate::scalar::{Instructions, Scalar};
+use crate::scalar::{InstructionSet, Scalar};
 
 /// A linear operation on the coefficient `c` just found; `a` is a series, `h` a held value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -250,7 +250,7 @@ impl Program {
 
     /// The coefficients of order `k >= 1`, and those of the components of order `k + 1`.
     #[inline(always)]
-    pub(super) fn next<V: Instructions, S: Scalar, const N: usize>(
+    pub(super) fn next<V: InstructionSet, S: Scalar, const N: usize>(
         &self,
         work: &mut [[S; N]],
         held: &[S],
@@ -285,7 +285,7 @@ impl Chain {
     }
 
     #[inline(always)]
-    fn next<V: Instructions, S: Scalar, const N: usize>(&self, work: &mut [[S; N]], held: &[S], k: usize) {
+    fn next<V: InstructionSet, S: Scalar, const N: usize>(&self, work: &mut [[S; N]], held: &[S], k: usize) {
         let a = &work[usize::from(self.a)];
         let c = match self.first {
             First::Series => a[k],

@@ -1,11 +1,11 @@
 //! The Taylor coefficients of a solution.
 
 use super::fuse::Program;
-use super::known::Known;
 use super::node::{INVERSE, hold};
-use super::{Node, Tape, disk, dle};
+use super::specialised::Specialised;
+use super::{Node, Tape, disk_series, dle_series};
 use crate::model::Sides;
-use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work};
+use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
 /// The orders whose programs are unrolled, which takes long to compile.
@@ -91,17 +91,17 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
 
     /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
-    pub fn expand_here<V: Instructions>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
+    pub fn expand_here<V: InstructionSet>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
         let Self { isa, work, held, order, .. } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
         if const { D == 3 }
-            && let Known::Dle { damped } = tape.known
+            && let Specialised::Dle { damped } = tape.known
         {
-            return dle::expand::<V, S, D, N>(work, order, held, x, damped);
+            return dle_series::expand::<V, S, D, N>(work, order, held, x, damped);
         }
-        if const { D == 4 } && tape.known == Known::Disk {
-            return disk::expand::<V, S, D, N>(work, order, held, x, sides);
+        if const { D == 4 } && tape.known == Specialised::Disk {
+            return disk_series::expand::<V, S, D, N>(work, order, held, x, sides);
         }
         unroll!(n in 0..D => { work[n][0] = x[n]; });
         let work = &mut work[..tape.slots];
@@ -147,7 +147,7 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Expansion<'_, S, D, N> 
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Instructions>(self) {
+    fn run<V: InstructionSet>(self) {
         self.jets.expand_here::<V>(self.tape, self.t, self.x, self.sides);
     }
 }
@@ -167,7 +167,7 @@ impl<R: Real, const D: usize> Work for Rates<'_, R, D> {
     type Output = [R; D];
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> [R; D] {
+    fn run<V: InstructionSet>(self) -> [R; D] {
         let Self { program, values, held, t, x, sides } = self;
         unroll!(n in 0..D => { values[n][0] = x[n]; });
         if const { R::LANES > 1 } {
@@ -196,7 +196,7 @@ impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
     const WIDE: bool = size_of::<S>() > 8 * size_of::<f64>();
 
     #[inline(always)]
-    fn run<V: Instructions>(self) {
+    fn run<V: InstructionSet>(self) {
         let Self { program, work, order, held, t, sides } = self;
         if const { S::Real::LANES > 1 } {
             // Packets are only fast with their own instructions.

@@ -4,21 +4,21 @@
 //! what repeated evaluation of the rates cannot: the Taylor coefficients of the solution, order by
 //! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
 
-mod disk;
-mod dle;
+mod disk_series;
+mod dle_series;
 mod fuse;
 mod jet;
-mod known;
 mod node;
-mod reach;
 mod record;
 mod series;
+mod specialised;
+mod step_radius;
 mod symbol;
 
 pub use jet::{HIGH, Jets, LOW};
-pub use node::{Held, Node, Step};
+pub use node::{Invariant, Node, Step};
 pub use record::Unrecordable;
-pub use symbol::{Function, SideOf, Symbol};
+pub use symbol::{Function, SurfaceSideRef, Symbol};
 
 use crate::integrate::Failure;
 use crate::model::Sides;
@@ -37,7 +37,7 @@ use crate::scalar::Scalar;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tape<const D: usize> {
     /// Values that do not change along a solution, each made of earlier ones.
-    pub(crate) held: Vec<Held>,
+    pub(crate) held: Vec<Invariant>,
     /// What changes along a solution; a step uses the results of earlier ones.
     pub(crate) steps: Vec<Step>,
     /// Where the rates are found.
@@ -46,7 +46,7 @@ pub struct Tape<const D: usize> {
     pub(crate) slots: usize,
     /// The steps as they are interpreted.
     program: fuse::Program,
-    known: known::Known,
+    known: specialised::Specialised,
     levels_off: bool,
     switches_held: bool,
 }
@@ -77,7 +77,7 @@ impl<const D: usize> Tape<D> {
 
     /// Whether its series are computed by a program of their own.
     pub fn is_unrolled(&self) -> bool {
-        self.known != known::Known::Not
+        self.known != specialised::Specialised::Not
     }
 
     /// Whether a method that needs no power series may do better where one along this tape failed.
@@ -89,7 +89,7 @@ impl<const D: usize> Tape<D> {
     }
 
     /// What does not change along a solution, in the order of evaluation.
-    pub fn held(&self) -> &[Held] {
+    pub fn held(&self) -> &[Invariant] {
         &self.held
     }
 

@@ -6,11 +6,11 @@
 use super::series::{inner_at, inner_square_at};
 use super::symbol::Function;
 use crate::model::Sides;
-use crate::scalar::{Instructions, Scalar};
+use crate::scalar::{InstructionSet, Scalar};
 
 /// A value that does not change along a solution; operands are earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Held {
+pub enum Invariant {
     Constant(f64),
     Parameter(u16),
     Neg(u16),
@@ -24,7 +24,7 @@ pub enum Held {
     Select(u16, u16, u16),
 }
 
-/// An operation on series, with the numbers of their slots; `h` is the number of a [`Held`] value.
+/// An operation on series, with the numbers of their slots; `h` is the number of a [`Invariant`] value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Node {
     /// `t`
@@ -97,7 +97,7 @@ pub struct Step {
 
 /// Evaluates the held values one after the other: not worth a copy for each instruction set.
 #[inline(never)]
-pub(super) fn hold<S: Scalar>(list: &[Held], parameters: &[S], sides: &Sides<S>, values: &mut [S]) {
+pub(super) fn hold<S: Scalar>(list: &[Invariant], parameters: &[S], sides: &Sides<S>, values: &mut [S]) {
     macro_rules! of {
         ($i:expr) => {
             values[usize::from($i)]
@@ -105,15 +105,15 @@ pub(super) fn hold<S: Scalar>(list: &[Held], parameters: &[S], sides: &Sides<S>,
     }
     for (i, &held) in list.iter().enumerate() {
         values[i] = match held {
-            Held::Constant(value) => S::constant(value),
-            Held::Parameter(i) => parameters[usize::from(i)],
-            Held::Neg(a) => -of!(a),
-            Held::Add(a, b) => of!(a) + of!(b),
-            Held::Sub(a, b) => of!(a) - of!(b),
-            Held::Mul(a, b) => of!(a) * of!(b),
-            Held::Div(a, b) => of!(a) / of!(b),
-            Held::Apply(function, a) => function.of(of!(a)),
-            Held::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
+            Invariant::Constant(value) => S::constant(value),
+            Invariant::Parameter(i) => parameters[usize::from(i)],
+            Invariant::Neg(a) => -of!(a),
+            Invariant::Add(a, b) => of!(a) + of!(b),
+            Invariant::Sub(a, b) => of!(a) - of!(b),
+            Invariant::Mul(a, b) => of!(a) * of!(b),
+            Invariant::Div(a, b) => of!(a) / of!(b),
+            Invariant::Apply(function, a) => function.of(of!(a)),
+            Invariant::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
         };
     }
 }
@@ -220,7 +220,7 @@ impl Step {
     /// Coefficient `k >= 1` of a step that is in no [chain](super::fuse), from those of lower order and the operands'
     /// coefficients up to `k`.
     #[inline(always)]
-    pub(super) fn next<V: Instructions, S: Scalar, const N: usize>(
+    pub(super) fn next<V: InstructionSet, S: Scalar, const N: usize>(
         self,
         work: &mut [[S; N]],
         sides: &Sides<S>,

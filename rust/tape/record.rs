@@ -6,9 +6,9 @@ use std::collections::HashMap;
 use thiserror::Error;
 
 use super::fuse::Program;
-use super::known::Known;
-use super::symbol::{self, Function, Made, Recording, SideOf, Symbol};
-use super::{Held, Node, Step, Tape};
+use super::specialised::Specialised;
+use super::symbol::{self, Function, Made, Recording, SurfaceSideRef, Symbol};
+use super::{Invariant, Node, Step, Tape};
 use crate::model::{Family, MAX_SURFACES, Sides, System};
 use crate::scalar::Scalar;
 
@@ -32,8 +32,8 @@ impl<const D: usize> Tape<D> {
         }
         let mut tape = Self::recorded(family, fixed)?;
         match (open.known, tape.known) {
-            (Known::Not, _) => tape.known = Known::Not,
-            (_, Known::Not) => return Ok(open),
+            (Specialised::Not, _) => tape.known = Specialised::Not,
+            (_, Specialised::Not) => return Ok(open),
             _ => {}
         }
         Ok(tape)
@@ -49,8 +49,8 @@ impl<const D: usize> Tape<D> {
         let system = family.build(&parameters);
         let x = from_fn(|n| symbol::make(Made::State(n)));
         let sides: Sides<Symbol> = from_fn(|j| match j < System::<Symbol, D>::surfaces(&system) {
-            true => SideOf::Surface(j),
-            false => SideOf::Known(true),
+            true => SurfaceSideRef::Surface(j),
+            false => SurfaceSideRef::Specialised(true),
         });
         let rates = system.rates(symbol::make(Made::Time), &x, &sides);
         let recording = symbol::end();
@@ -61,7 +61,7 @@ impl<const D: usize> Tape<D> {
 /// Turns symbols into nodes, only those that the rates need.
 struct Lowering<'a> {
     recording: &'a Recording,
-    held: Vec<Held>,
+    held: Vec<Invariant>,
     steps: Vec<Step>,
     slots: usize,
     /// Where each symbol's value is held, or its series stored.
@@ -90,7 +90,7 @@ impl<'a> Lowering<'a> {
     fn tape<const D: usize>(mut self, rates: [Symbol; D]) -> Tape<D> {
         let rates = rates.map(|s| self.slot(s));
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
-        let switches_held = self.held.iter().any(|held| matches!(held, Held::Select(..)));
+        let switches_held = self.held.iter().any(|held| matches!(held, Invariant::Select(..)));
         let levels_off = self.steps.iter().any(|step| step.node.levels_off());
         let program = Program::of(&self.steps, &rates, self.slots, true);
         let mut tape = Tape {
@@ -99,11 +99,11 @@ impl<'a> Lowering<'a> {
             steps: self.steps,
             rates,
             slots: self.slots,
-            known: Known::Not,
+            known: Specialised::Not,
             levels_off,
             switches_held,
         };
-        tape.known = Known::of(&tape);
+        tape.known = Specialised::of(&tape);
         tape
     }
 
@@ -121,15 +121,15 @@ impl<'a> Lowering<'a> {
             return at;
         }
         let held = match self.made(s) {
-            Made::Constant(bits) => Held::Constant(f64::from_bits(bits)),
-            Made::Parameter(i) => Held::Parameter(index(i)),
-            Made::Neg(a) => Held::Neg(self.held(a)),
-            Made::Add(a, b) => Held::Add(self.held(a), self.held(b)),
-            Made::Sub(a, b) => Held::Sub(self.held(a), self.held(b)),
-            Made::Mul(a, b) => Held::Mul(self.held(a), self.held(b)),
-            Made::Div(a, b) => Held::Div(self.held(a), self.held(b)),
-            Made::Apply(f, a) => Held::Apply(f, self.held(a)),
-            Made::Select(j, a, b) => Held::Select(index(j), self.held(a), self.held(b)),
+            Made::Constant(bits) => Invariant::Constant(f64::from_bits(bits)),
+            Made::Parameter(i) => Invariant::Parameter(index(i)),
+            Made::Neg(a) => Invariant::Neg(self.held(a)),
+            Made::Add(a, b) => Invariant::Add(self.held(a), self.held(b)),
+            Made::Sub(a, b) => Invariant::Sub(self.held(a), self.held(b)),
+            Made::Mul(a, b) => Invariant::Mul(self.held(a), self.held(b)),
+            Made::Div(a, b) => Invariant::Div(self.held(a), self.held(b)),
+            Made::Apply(f, a) => Invariant::Apply(f, self.held(a)),
+            Made::Select(j, a, b) => Invariant::Select(index(j), self.held(a), self.held(b)),
             Made::Time | Made::State(_) => unreachable!("time and state vary"),
         };
         self.held.push(held);

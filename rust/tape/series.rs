@@ -7,7 +7,7 @@
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-use crate::scalar::{Fan, Instructions, Isa, Scalar};
+use crate::scalar::{DerivativeLanes, InstructionSet, Isa, Scalar};
 
 /// The body for every order `k` below `to`, at most 24, with its number known when the program is compiled.
 macro_rules! orders {
@@ -54,10 +54,10 @@ impl<S: Scalar> Number for S {
     }
 }
 
-impl<V: Instructions> Number for Fan<V> {
+impl<V: InstructionSet> Number for DerivativeLanes<V> {
     #[inline(always)]
     fn zero() -> Self {
-        Fan::zero()
+        DerivativeLanes::zero()
     }
     #[inline(always)]
     fn scaled(self, factor: f64) -> Self {
@@ -136,20 +136,20 @@ macro_rules! at_order {
 
 /// Not where derivatives make every term long, nor on a PC without AVX2: it is rare, and every copy takes its time to
 /// compile.
-const fn unrolled<V: Instructions, S: Scalar>() -> bool {
+const fn unrolled<V: InstructionSet, S: Scalar>() -> bool {
     let baseline = cfg!(target_arch = "x86_64") && matches!(V::ISA, Isa::Baseline);
     size_of::<S>() == size_of::<S::Real>() && !baseline
 }
 
 /// [`inner`] where the order is only known when the program runs.
 #[inline(always)]
-pub fn inner_at<V: Instructions, S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
+pub fn inner_at<V: InstructionSet, S: Scalar, const N: usize>(a: &[S; N], b: &[S; N], k: usize) -> S {
     at_order!(V, S, k => inner(a, b, k))
 }
 
 /// [`inner_square`] where the order is only known when the program runs.
 #[inline(always)]
-pub fn inner_square_at<V: Instructions, S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
+pub fn inner_square_at<V: InstructionSet, S: Scalar, const N: usize>(a: &[S; N], k: usize) -> S {
     at_order!(V, S, k => inner_square(a, k))
 }
 

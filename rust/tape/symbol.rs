@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::{Instructions, Isa, Mask, Plain, Real, Scalar, Work, elementary};
+use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, elementary};
 
 /// What is known of a number while its model is recorded: how it was made, not its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -12,11 +12,11 @@ pub struct Symbol(pub(super) u32);
 
 /// On which side of a switching surface the law is taken, while the model is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SideOf {
-    Known(bool),
+pub enum SurfaceSideRef {
+    Specialised(bool),
     Surface(usize),
     /// The other side.
-    Beyond(usize),
+    ExtraColumns(usize),
 }
 
 /// How a symbol was made. Constants are kept as bits, so that equal symbols can be found.
@@ -74,7 +74,7 @@ impl<R: Real> Work for Apply<R> {
     type Output = R;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> R {
+    fn run<V: InstructionSet>(self) -> R {
         let Self(function, x) = self;
         match function {
             Function::Sqrt => x.sqrt(),
@@ -327,7 +327,7 @@ fn apply(function: Function, a: Symbol) -> Symbol {
 
 impl Scalar for Symbol {
     type Real = Symbol;
-    type Mask = SideOf;
+    type Mask = SurfaceSideRef;
     type Register = Self;
 
     fn register(self, _i: usize) -> Self {
@@ -358,26 +358,26 @@ impl Scalar for Symbol {
     fn fused_times(self, a: Symbol, b: Symbol) -> Symbol {
         self + a * b
     }
-    fn less(self, other: Symbol) -> SideOf {
+    fn less(self, other: Symbol) -> SurfaceSideRef {
         match RECORDING.with_borrow(|r| r.value(self).zip(r.value(other))) {
-            Some((a, b)) => SideOf::Known(a < b),
+            Some((a, b)) => SurfaceSideRef::Specialised(a < b),
             None => {
                 looked();
-                SideOf::Known(false)
+                SurfaceSideRef::Specialised(false)
             }
         }
     }
-    fn select(mask: SideOf, yes: Symbol, no: Symbol) -> Symbol {
+    fn select(mask: SurfaceSideRef, yes: Symbol, no: Symbol) -> Symbol {
         match mask {
             _ if yes == no => yes,
-            SideOf::Known(true) => yes,
-            SideOf::Known(false) => no,
-            SideOf::Surface(j) => make(Made::Select(j, yes, no)),
-            SideOf::Beyond(j) => make(Made::Select(j, no, yes)),
+            SurfaceSideRef::Specialised(true) => yes,
+            SurfaceSideRef::Specialised(false) => no,
+            SurfaceSideRef::Surface(j) => make(Made::Select(j, yes, no)),
+            SurfaceSideRef::ExtraColumns(j) => make(Made::Select(j, no, yes)),
         }
     }
-    fn mask(value: bool) -> SideOf {
-        SideOf::Known(value)
+    fn mask(value: bool) -> SurfaceSideRef {
+        SurfaceSideRef::Specialised(value)
     }
     fn sqrt(self) -> Symbol {
         apply(Function::Sqrt, self)
@@ -431,39 +431,41 @@ impl Real for Symbol {
     }
 }
 
-impl Mask for SideOf {
-    fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> SideOf {
-        SideOf::Known(lane(0))
+impl Mask for SurfaceSideRef {
+    fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> SurfaceSideRef {
+        SurfaceSideRef::Specialised(lane(0))
     }
     fn lane(self, _i: usize) -> bool {
         match self {
-            SideOf::Known(value) => value,
+            SurfaceSideRef::Specialised(value) => value,
             _ => {
                 looked();
                 false
             }
         }
     }
-    fn and(self, other: SideOf) -> SideOf {
+    fn and(self, other: SurfaceSideRef) -> SurfaceSideRef {
         match (self, other) {
-            (SideOf::Known(true), side) | (side, SideOf::Known(true)) => side,
+            (SurfaceSideRef::Specialised(true), side) | (side, SurfaceSideRef::Specialised(true)) => side,
             _ if self == other => self,
-            _ if self == other.not() => SideOf::Known(false),
-            (SideOf::Known(false), _) | (_, SideOf::Known(false)) => SideOf::Known(false),
+            _ if self == other.not() => SurfaceSideRef::Specialised(false),
+            (SurfaceSideRef::Specialised(false), _) | (_, SurfaceSideRef::Specialised(false)) => {
+                SurfaceSideRef::Specialised(false)
+            }
             _ => {
                 looked();
                 self
             }
         }
     }
-    fn or(self, other: SideOf) -> SideOf {
+    fn or(self, other: SurfaceSideRef) -> SurfaceSideRef {
         self.not().and(other.not()).not()
     }
-    fn not(self) -> SideOf {
+    fn not(self) -> SurfaceSideRef {
         match self {
-            SideOf::Known(value) => SideOf::Known(!value),
-            SideOf::Surface(j) => SideOf::Beyond(j),
-            SideOf::Beyond(j) => SideOf::Surface(j),
+            SurfaceSideRef::Specialised(value) => SurfaceSideRef::Specialised(!value),
+            SurfaceSideRef::Surface(j) => SurfaceSideRef::ExtraColumns(j),
+            SurfaceSideRef::ExtraColumns(j) => SurfaceSideRef::Surface(j),
         }
     }
     fn bits(self) -> u64 {

@@ -11,10 +11,9 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from conftest import Opened, until
 from udd.app.spec import start_of
-from udd.trajectory import integrated
-
-from .conftest import Opened, until
+from udd.simulation.trajectory import integrated
 
 ROWS = """(count) => {
   const record = udd.player.records[0], states = udd.about(udd.home.model.kind).states.length;
@@ -253,7 +252,7 @@ def test_others_are_kept_out(opened: Opened, link: str) -> None:
 
 def test_two_pages_of_json(opened: Opened) -> None:
     """The catalogue the page was given is the server's."""
-    from udd.app.catalogue import catalogue
+    from udd.app.presets import catalogue
 
     page = opened.go()
     assert page.evaluate("udd.catalogue") == json.loads(json.dumps(catalogue()))

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 import udd
+from conftest import Opened, until
 
-from .conftest import Opened, until
-
-SAMPLE = Path(udd.__file__).parent / "data" / "sample.mp4"
+SAMPLE = Path(udd.__file__).parent / "demo" / "sample.mp4"
 
 
 @pytest.mark.slow

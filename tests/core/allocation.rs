@@ -1,8 +1,8 @@
-//! Nothing is allocated inside the step loop. For whole runs see `fleet.rs`.
+//! Nothing is allocated inside the step loop. For whole runs see `batch.rs`.
 
 use crate::counting::allocations;
-use udd::integrate::{Dopri5, Driver, Ending, Method, Taylor, Tolerance};
-use udd::model::effects::{Effect, Kind, Treatment};
+use udd::integrate::{Dopri5, Ending, Integrator, Method, Taylor, Tolerance};
+use udd::model::effects::{Effect, FrictionModel, Kind};
 use udd::model::{DiskFamily, DleFamily, Family, System};
 use udd::scalar::Isa;
 use udd::tape::Tape;
@@ -12,7 +12,7 @@ const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-11 };
 
 /// Steps to `end` without asking the heap for anything; returns their number.
 fn nothing_in_steps<M: System<f64, D>, const D: usize, K: Method<f64, D>>(
-    mut driver: Driver<M, f64, D, Tolerance, K>,
+    mut driver: Integrator<M, f64, D, Tolerance, K>,
     end: f64,
 ) -> usize {
     Isa::best();
@@ -30,11 +30,13 @@ fn nothing_in_steps<M: System<f64, D>, const D: usize, K: Method<f64, D>>(
 fn steps_by_either_method() {
     let values = [1.0, 0.0];
     let dle = DleFamily.build(&values);
-    assert!(nothing_in_steps(Driver::by(Dopri5::default(), dle, 0.0, START, None, &TOLERANCE), 100.0) > 100);
+    assert!(
+        nothing_in_steps(Integrator::by(Dopri5::default(), dle, 0.0, START, None, &TOLERANCE), 100.0) > 100
+    );
     let tape = Tape::record(&DleFamily, &[None, Some(0.0)]).unwrap();
     for isa in Isa::available() {
         let taylor = Taylor::new(&tape, values.to_vec(), 18, isa);
-        assert!(nothing_in_steps(Driver::by(taylor, dle, 0.0, START, None, &TOLERANCE), 100.0) > 50);
+        assert!(nothing_in_steps(Integrator::by(taylor, dle, 0.0, START, None, &TOLERANCE), 100.0) > 50);
     }
 }
 
@@ -43,11 +45,11 @@ fn steps_by_either_method() {
 fn steps_over_surfaces() {
     let effects = vec![
         Effect::new(Kind::QuadraticDrag),
-        Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued),
+        Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued),
         Effect::new(Kind::Relaxation),
     ];
     let values = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055, 1e-4, 5e-3, 0.05, 1.0];
     let disk = DiskFamily { effects, edge: true }.build(&values);
-    let driver = Driver::by(Dopri5::default(), &disk, 0.0, [3.0, 0.005, 0.0, 0.0], None, &TOLERANCE);
+    let driver = Integrator::by(Dopri5::default(), &disk, 0.0, [3.0, 0.005, 0.0, 0.0], None, &TOLERANCE);
     assert!(nothing_in_steps(driver.with_wall(), 3.0) > 100);
 }

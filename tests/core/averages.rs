@@ -5,7 +5,7 @@
 
 use std::array::from_fn;
 
-use udd::integrate::{Driver, Tolerance, propagate};
+use udd::integrate::{Integrator, Tolerance, propagate};
 use udd::model::{Disk, DiskFamily, Dle, Family, Sides, System};
 use udd::scalar::Dual;
 
@@ -133,7 +133,7 @@ fn without_gravity_the_disk_at_rest_is_lifted() {
 #[test]
 fn without_drive_the_centre_stays_on_a_circle() {
     let disk = disk(0.0, 9.81);
-    let mut driver: Driver<_, f64, _> = Driver::new(&disk, 0.0, [0.0, 0.03, 0.04, 0.0], None, &TIGHT);
+    let mut driver: Integrator<_, f64, _> = Integrator::new(&disk, 0.0, [0.0, 0.03, 0.04, 0.0], None, &TIGHT);
     while driver.t() < 10.0 {
         driver.advance(10.0).unwrap();
         let [_, y, z, _] = *driver.x();

@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use proptest::prelude::*;
 use udd::integrate::{Tolerance, propagate};
-use udd::model::effects::{At, Contact, Kind, Role, Slot, Slots, Term, Treatment};
+use udd::model::effects::{Contact, Contributions, EffectInputs, FrictionModel, Kind, Role, Slot, Term};
 use udd::model::{Disk, DiskFamily, Effect, Family, Momentum, PendulumFamily, System, sides_of};
 use udd::scalar::{Dual, Scalar};
 
@@ -13,7 +13,7 @@ const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// Every effect, in each way it can enter.
 fn all() -> Vec<Effect> {
     let ways = |kind: Kind| match kind.spec().momenta {
-        [] if kind.dry() => [Treatment::Smoothed, Treatment::SetValued, Treatment::Karnopp]
+        [] if kind.dry() => [FrictionModel::Smoothed, FrictionModel::SetValued, FrictionModel::Karnopp]
             .map(|treatment| Effect::new(kind).with_treatment(treatment))
             .to_vec(),
         [] => vec![Effect::new(kind)],
@@ -161,13 +161,13 @@ proptest! {
             let slow = k1 - k2 * x[0].abs() > k0;
             let k = if slow { N::fixed(k1) - speed.scale(k2) } else { N::fixed(k0) };
             let inertia = N::fixed(radius * radius / 2.0) + y.square() + z.square();
-            let at = At {
+            let at = EffectInputs {
                 t: time, omega, speed, y, z, beta, k, inertia,
                 w: N::fixed(w), g: N::fixed(g), radius: N::fixed(radius),
                 contact: Contact { sign: N::fixed(x[0].signum()), bristle: N::fixed(0.0) },
             };
             let term = &Term::list(std::slice::from_ref(&effect), &own)[0];
-            let mut slots = Slots::default();
+            let mut slots = Contributions::default();
             term.enter(&N::fixed, &at, &mut slots);
 
             let moment = (at.g * y - (k + slots.friction) * omega + slots.torque).re;

@@ -1,19 +1,19 @@
 //! Two models behind one type are what they are by themselves.
 
-use udd::integrate::{Counts, Driver, Ending, Tolerance};
-use udd::model::effects::{Effect, Kind, Treatment};
-use udd::model::{AnySystem, DiskFamily, Either, Family, OwnFamily, System, sides_of};
+use udd::integrate::{Counts, Ending, Integrator, Tolerance};
+use udd::model::effects::{Effect, FrictionModel, Kind};
+use udd::model::{AnySystem, DiskFamily, Either, Family, FormulaFamily, System, sides_of};
 use udd::scalar::{Dual, Scalar, constants};
 
-type Four = Either<DiskFamily, OwnFamily<4>>;
+type Four = Either<DiskFamily, FormulaFamily<4>>;
 
 const VALUES: [f64; 8] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055, 0.003, 0.05];
 
-fn own() -> OwnFamily<4> {
+fn own() -> FormulaFamily<4> {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let equations = ["b-a*d", "c*t", "d-k1*a", "k2*k3*a"];
     let parameters = names(&["k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8"]);
-    OwnFamily::parse(&names(&["a", "b", "c", "d"]), &equations, &parameters).unwrap()
+    FormulaFamily::parse(&names(&["a", "b", "c", "d"]), &equations, &parameters).unwrap()
 }
 
 /// Compares all that a system says at a state, on both sides of every surface.
@@ -41,7 +41,7 @@ fn same<S: Scalar<Real = f64, Mask = bool> + PartialEq>(one: &impl System<S, 4>,
 /// A run of a disk that sticks and slips: where it got to and what it took.
 fn run(system: impl System<f64, 4>) -> ([f64; 4], Counts) {
     let x0 = [1.0, 0.01, -0.02, 0.3];
-    let mut driver: Driver<_, f64, 4> = Driver::new(system, 0.0, x0, None, &Tolerance::default());
+    let mut driver: Integrator<_, f64, 4> = Integrator::new(system, 0.0, x0, None, &Tolerance::default());
     let mut landed = 0;
     while driver.t() < 20.0 {
         landed += usize::from(driver.advance(20.0).unwrap() != Ending::Free);
@@ -52,7 +52,7 @@ fn run(system: impl System<f64, 4>) -> ([f64; 4], Counts) {
 
 #[test]
 fn a_forgotten_type_is_the_one_that_it_was() {
-    let friction = Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued);
+    let friction = Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued);
     let disk = DiskFamily { effects: vec![friction], edge: true }.build(&VALUES);
     let forgotten: &dyn AnySystem<f64, 4> = &disk;
     same::<f64>(&disk, &forgotten);
@@ -61,7 +61,7 @@ fn a_forgotten_type_is_the_one_that_it_was() {
 
 #[test]
 fn either_is_the_one_that_it_holds() {
-    let friction = Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued);
+    let friction = Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued);
     let disk = DiskFamily { effects: vec![friction], edge: true };
     let (first, second) = (Four::First(disk.clone()), Four::Second(own()));
     assert_eq!(first.parameters(), disk.parameters());

@@ -11,7 +11,7 @@ use std::marker::PhantomData;
 use udd::scalar::elementary::{
     exp, exp2_rough, inverse_rough, ln, log2_rough, pow, power_rough, sin_cos, tanh,
 };
-use udd::scalar::{Dual, Instructions, Isa, Packet, Plain, Real, Scalar, Work};
+use udd::scalar::{Dual, InstructionSet, Isa, Packet, Plain, Real, Scalar, Work};
 
 const INF: f64 = f64::INFINITY;
 const LEAST: f64 = 5e-324;
@@ -294,7 +294,7 @@ fn bits(x: f64) -> u64 {
 }
 
 #[inline(always)]
-fn in_packets<F: Function, const L: usize, V: Instructions>(x: &[f64]) -> Vec<u64> {
+fn in_packets<F: Function, const L: usize, V: InstructionSet>(x: &[f64]) -> Vec<u64> {
     let packets = x.chunks(L).map(|part| Packet::<L, V>::from_lanes(|i| part.get(i).copied().unwrap_or(1.0)));
     let mut all = Vec::new();
     for value in packets.map(F::of) {
@@ -310,7 +310,7 @@ impl<F: Function> Work for Everywhere<'_, F> {
     type Output = Vec<(usize, Vec<u64>)>;
 
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Self::Output {
+    fn run<V: InstructionSet>(self) -> Self::Output {
         vec![
             (0, self.0.iter().map(|&x| bits(F::of(x))).collect()),
             (1, in_packets::<F, 1, V>(self.0)),

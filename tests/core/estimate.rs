@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
+use udd::analysis::CancelFlag;
 use udd::estimate::{
-    Bordered, Candidate, DiskCamera, Estimator, Free, Known, Options, Point, Record, Role, Rows, Sensor, Set,
+    Bordered, CachedLinearisation, Candidate, DiskCamera, Estimator, FilmParameters, FreeParameter, Options,
+    Record, Role, RowMatrix, Sensor, Unknowns,
 };
 use udd::integrate::{Tolerance, propagate};
 use udd::model::effects::{Effect, Kind, Momentum};
 use udd::model::{DiskFamily, Family, System, sides_of};
-use udd::run::Stop;
 
 const PAPER: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 
@@ -66,23 +67,26 @@ fn film(family: &DiskFamily, values: &[f64], n: usize, seed: u64) -> (Record<3>,
     (record, states)
 }
 
-fn problem(family: DiskFamily, record: Record<3>, free: Vec<Free>) -> Problem {
+fn problem(family: DiskFamily, record: Record<3>, free: Vec<FreeParameter>) -> Problem {
     let diffusion = [3e-3, 1e-5, 1e-5, 1e-4].map(|q: f64| q / 0.04f64.sqrt());
     let tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
     Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance, known: None }
 }
 
-fn free(role: Role, mean: f64, sd: f64) -> Free {
-    Free { role, film: None, mean, sd }
+fn free(role: Role, mean: f64, sd: f64) -> FreeParameter {
+    FreeParameter { role, film: None, mean, sd }
 }
 
 /// One film's point.
-fn point(states: Vec<[f64; 4]>, model: Vec<f64>) -> Point<4> {
-    Point { states, sets: vec![Set { model, camera: vec![0.0; DiskCamera::PARAMETERS.len()], clock: 0.0 }] }
+fn point(states: Vec<[f64; 4]>, model: Vec<f64>) -> Unknowns<4> {
+    Unknowns {
+        states,
+        sets: vec![FilmParameters { model, camera: vec![0.0; DiskCamera::PARAMETERS.len()], clock: 0.0 }],
+    }
 }
 
 /// What is off at a point: of the frames, and of the links.
-fn residuals(estimator: &Problem, point: &Point<4>) -> (Vec<SVector<f64, 3>>, Vec<SVector<f64, 4>>) {
+fn residuals(estimator: &Problem, point: &Unknowns<4>) -> (Vec<SVector<f64, 3>>, Vec<SVector<f64, 4>>) {
     let linear = estimator.linearise(point).unwrap();
     (linear.misfits(), linear.defects())
 }
@@ -103,8 +107,8 @@ fn elimination_equals_a_dense_solve() {
     }
     rhs.iter_mut().for_each(|b| *b = noise.normal());
     let full = j.transpose() * &j;
-    let mut border = Rows::zeros(2 * n, p + 1);
-    let mut corner = Rows::zeros(p + 1, p + 1);
+    let mut border = RowMatrix::zeros(2 * n, p + 1);
+    let mut corner = RowMatrix::zeros(p + 1, p + 1);
     for i in 0..2 * n {
         (0..p).for_each(|j| border.row_mut(i)[j] = full[(i, 2 * n + j)]);
         border.row_mut(i)[p] = rhs[i];
@@ -161,7 +165,7 @@ proptest! {
         estimator.tolerance = Tolerance { rtol: 1e-13, atol: 1e-14 };
         let states = vec![[omega, y, z, beta], [omega, y, z, beta]];
         let camera = vec![y0, 1e-3, tilt, 5e-3, 1e-3, -5e-4, lag, row, 1e-5, 0.01, 0.02, -0.01];
-        let point = Point { states, sets: vec![Set { model: values, camera, clock: 1e-3 }] };
+        let point = Unknowns { states, sets: vec![FilmParameters { model: values, camera, clock: 1e-3 }] };
         estimator.free = roles.iter().map(|&role| free(role, 0.0, f64::INFINITY)).collect();
         let linear = estimator.linearise(&point).unwrap();
 
@@ -256,7 +260,7 @@ fn a_chaotic_record_gives_its_parameters_back() {
     let mut last = None;
     for level in [[0.1, 1e-4, 1e-4, 1e-3], [0.02, 3e-5, 3e-5, 3e-4], [3e-3, 1e-5, 1e-5, 1e-4]] {
         estimator.diffusion = level.map(|q: f64| q / 0.04f64.sqrt());
-        let solution = estimator.solve(point, &Options::default(), &Stop::new()).unwrap();
+        let solution = estimator.solve(point, &Options::default(), &CancelFlag::new()).unwrap();
         assert!(solution.converged, "{level:?} took {} steps", solution.iterations);
         point = solution.point.clone();
         last = Some(solution);
@@ -280,8 +284,9 @@ fn the_score_foretells_the_fit() {
     let with = family(&[(Kind::Relaxation, Some(Momentum::Constraint))]);
     let weak = [PAPER.as_slice(), &[0.3]].concat();
     let (record, states) = film(&with, &weak, 250, 5);
-    let free: Vec<Free> = [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
-    let stop = Stop::new();
+    let free: Vec<FreeParameter> =
+        [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
+    let stop = CancelFlag::new();
     let plain = problem(family(&[]), record.clone(), free.clone());
     let start = point(states, PAPER.to_vec());
     let fitted = plain.solve(start, &Options::default(), &stop).unwrap();
@@ -308,13 +313,15 @@ fn the_score_foretells_the_fit() {
 #[test]
 fn a_known_linearisation_is_not_made_again() {
     let (record, states) = film(&family(&[]), &PAPER, 100, 6);
-    let free: Vec<Free> = [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
+    let free: Vec<FreeParameter> =
+        [0, 3].iter().map(|&j| free(Role::Model(j), PAPER[j], f64::INFINITY)).collect();
     let mut estimator = problem(family(&[]), record, free);
-    let solve = |estimator: &Estimator<_, _, 4, 3>, from: &Point<4>| {
-        estimator.solve(from.clone(), &Options::default(), &Stop::new()).unwrap()
+    let solve = |estimator: &Estimator<_, _, 4, 3>, from: &Unknowns<4>| {
+        estimator.solve(from.clone(), &Options::default(), &CancelFlag::new()).unwrap()
     };
     let end = solve(&estimator, &point(states, PAPER.to_vec()));
-    estimator.known = Some(Known { point: Arc::new(end.point.clone()), linear: end.linear.clone() });
+    estimator.known =
+        Some(CachedLinearisation { point: Arc::new(end.point.clone()), linear: end.linear.clone() });
     let again = solve(&estimator, &end.point);
     assert!(Arc::ptr_eq(&again.linear, &end.linear));
     assert_eq!(again.covariance, end.covariance);

@@ -2,15 +2,15 @@
 
 mod allocation;
 mod averages;
+mod batch;
 mod counting;
 mod duals;
 mod effects;
 mod either;
 mod elementary;
 mod estimate;
-mod fleet;
+mod event_location;
 mod formulas;
-mod landing;
 mod order;
 mod own_packets;
 mod saltation;

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use udd::integrate::tableau::DormandPrince;
-use udd::integrate::{Dop853, Dopri5, Method, Point, Tolerance, step};
+use udd::integrate::{Dop853, Dopri5, Method, StepStart, Tolerance, step};
 use udd::model::{DiskFamily, Dle, Family, System, sides_of};
 use udd::scalar::{Dual, Scalar};
 
@@ -88,7 +88,7 @@ fn tangents_of_the_disk_are_of_order_5_on_a_smooth_piece() {
 fn inside_a_step<K: Method<f64, 3> + Default>(theta: f64, sizes: [f64; 5]) -> [(f64, f64); 5] {
     let dle = Dle { w: 1.0, b: 0.2 };
     let x0 = [1.0, 1.0, 0.01];
-    let start = Point { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
+    let start = StepStart { t: 0.0, x: x0, sides: sides_of(&dle, 0.0, &x0) };
     sizes.map(|h| {
         let mut method = K::default();
         method.begin(&dle, &start, true);
@@ -110,7 +110,7 @@ fn dense_output_is_of_order_4() {
 /// `n` equal steps of any method over `[0, end]`.
 fn stepped<K: Method<f64, 3> + Default>(dle: &Dle<f64>, x0: [f64; 3], end: f64, n: usize) -> [f64; 3] {
     let (mut method, h) = (K::default(), end / n as f64);
-    let mut at = Point { t: 0.0, x: x0, sides: sides_of(dle, 0.0, &x0) };
+    let mut at = StepStart { t: 0.0, x: x0, sides: sides_of(dle, 0.0, &x0) };
     for _ in 0..n {
         method.begin(dle, &at, true);
         at.x = method.attempt(dle, &at, h, &Tolerance::default()).x;

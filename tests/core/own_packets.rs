@@ -2,17 +2,17 @@
 
 use std::sync::atomic::AtomicUsize;
 
+use udd::analysis::{CancelFlag, Ensemble, EnsembleRun, ExecutionContext, MethodChoice};
 use udd::integrate::Tolerance;
-use udd::model::OwnFamily;
-use udd::run::{Crew, Ensemble, Passage, Stepper, Stop};
+use udd::model::FormulaFamily;
 use udd::scalar::Isa;
 use udd::tape::Tape;
 
 const VALUES: [f64; 2] = [1.5, 0.3];
 
-fn model<const D: usize>(states: [&str; D], equations: [&str; D]) -> OwnFamily<D> {
+fn model<const D: usize>(states: [&str; D], equations: [&str; D]) -> FormulaFamily<D> {
     let names = ["k", "c"].map(str::to_owned);
-    OwnFamily::parse(&states.map(str::to_owned), &equations, &names).unwrap()
+    FormulaFamily::parse(&states.map(str::to_owned), &equations, &names).unwrap()
 }
 
 /// Spread over a cube of side 4 around `centre`.
@@ -23,18 +23,19 @@ fn starts<const D: usize>(n: usize, centre: [f64; D]) -> Vec<[f64; D]> {
 }
 
 /// How many runs fail, after comparing all of them with runs one by one.
-fn failures<const D: usize>(family: &OwnFamily<D>, centre: [f64; D], times: &[f64], rtol: f64) -> usize {
+fn failures<const D: usize>(family: &FormulaFamily<D>, centre: [f64; D], times: &[f64], rtol: f64) -> usize {
     let tape = Tape::record(family, &[None, None]).unwrap();
     assert!(!tape.is_unrolled());
-    let (starts, values, stop) = (starts(21, centre), [VALUES.to_vec()], Stop::new());
+    let (starts, values, stop) = (starts(21, centre), [VALUES.to_vec()], CancelFlag::new());
     let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
-    let run = |starts: &[[f64; D]], isa, threads| -> Vec<Passage<D>> {
+    let run = |starts: &[[f64; D]], isa, threads| -> Vec<EnsembleRun<D>> {
         let done = AtomicUsize::new(0);
-        let all = Ensemble { family, values: &values, starts, times, tolerance, stepper: Stepper::Taylor };
-        let all = all.run(Crew { threads, isa, done: &done, stop: &stop });
+        let all =
+            Ensemble { family, values: &values, starts, times, tolerance, stepper: MethodChoice::Taylor };
+        let all = all.run(ExecutionContext { threads, isa, done: &done, stop: &stop });
         all.into_iter().map(Option::unwrap).collect()
     };
-    let told = |passage: &Passage<D>| {
+    let told = |passage: &EnsembleRun<D>| {
         let bits = |x: &[f64; D]| x.map(f64::to_bits);
         let states: Vec<_> = passage.states.iter().map(bits).collect();
         (states, passage.t.to_bits(), bits(&passage.x), format!("{:?}", passage.outcome))

@@ -4,8 +4,8 @@ use std::array::from_fn;
 use std::f64::consts::PI;
 
 use approx::assert_relative_eq;
-use udd::integrate::{Driver, Ending, Failure, Tolerance, pass, propagate};
-use udd::model::effects::{Effect, Kind, Treatment};
+use udd::integrate::{Ending, Failure, Integrator, Tolerance, pass, propagate};
+use udd::model::effects::{Effect, FrictionModel, Kind};
 use udd::model::{Disk, DiskFamily, Family, PendulumFamily, Sides, System, choose, sides_of};
 use udd::scalar::{Dual, Mask, Scalar};
 
@@ -54,7 +54,7 @@ fn arctan<const N: usize>(x: Dual<f64, N>) -> Dual<f64, N> {
 #[test]
 fn stick_slip_on_a_belt_has_its_period() {
     let belt = Belt { v: 0.3, s: 1.0, k: 0.4 };
-    let mut driver: Driver<_, f64, 2> = Driver::new(&belt, 0.0, [0.0, 0.0], None, &TIGHT);
+    let mut driver: Integrator<_, f64, 2> = Integrator::new(&belt, 0.0, [0.0, 0.0], None, &TIGHT);
     let mut times = Vec::new();
     while times.len() < 12 {
         if driver.advance(200.0).unwrap() != Ending::Free {
@@ -80,7 +80,7 @@ fn sticking_leaves_one_direction() {
     let dual = Belt { v: N::fixed(belt.v), s: N::fixed(belt.s), k: N::fixed(belt.k) };
     let x0 = [0.1, -0.4];
     let start = from_fn(|n| N::variable(x0[n], n));
-    let mut driver: Driver<_, f64, 2> = Driver::new(&belt, 0.0, x0, None, &TIGHT);
+    let mut driver: Integrator<_, f64, 2> = Integrator::new(&belt, 0.0, x0, None, &TIGHT);
     while driver.advance(10.0).unwrap() == Ending::Free {}
     let sticks = driver.t();
     let cut = |t: f64| propagate(&dual, 0.0, t, start, &TIGHT).unwrap();
@@ -187,7 +187,7 @@ fn tangents_of_runs_agree_with_differences() {
     let end = 1.6;
     let run = |x0| propagate(&Kinked, 0.0, end, x0, &TIGHT).unwrap();
     let exact = propagate(&Kinked, 0.0, end, from_fn(|n| N::variable(x0[n], n)), &TIGHT).unwrap();
-    let mut driver: Driver<_, f64, 2> = Driver::new(&Kinked, 0.0, x0, None, &TIGHT);
+    let mut driver: Integrator<_, f64, 2> = Integrator::new(&Kinked, 0.0, x0, None, &TIGHT);
     let mut passed = 0;
     while driver.t() < end {
         passed += usize::from(driver.advance(end).unwrap() != Ending::Free);
@@ -196,8 +196,10 @@ fn tangents_of_runs_agree_with_differences() {
     differ(run, x0, exact);
 
     // Dry friction: four reversals, on to a point between them.
-    let effects =
-        vec![Effect::new(Kind::CableTorque), Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued)];
+    let effects = vec![
+        Effect::new(Kind::CableTorque),
+        Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued),
+    ];
     let family = PendulumFamily { effects };
     let values = [1.0, 1.0, 0.0, 0.02, 1.0, 0.0, 0.1, 0.05];
     let plain = family.build(&values);
@@ -249,7 +251,7 @@ fn grazing_is_flagged() {
     type N = Dual<f64, 1>;
     for (speed, flagged) in [(0.3, 0), (1e-2, 0), (1e-4, 0), (1e-7, 1), (0.0, 1)] {
         let x0 = [N::variable(1.0 / 3.0 + speed, 0), N::fixed(0.0)];
-        let mut driver: Driver<_, N, 2> = Driver::new(Slowing(speed), 0.0, x0, Some(0.3), &TIGHT);
+        let mut driver: Integrator<_, N, 2> = Integrator::new(Slowing(speed), 0.0, x0, Some(0.3), &TIGHT);
         while driver.t() < 2.0 {
             driver.advance(2.0).unwrap();
         }
@@ -272,8 +274,10 @@ struct Sticky<S> {
 
 impl<S: Scalar> Sticky<S> {
     fn new(corrected: bool) -> Self {
-        let effects =
-            vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued), Effect::new(Kind::Tilt)];
+        let effects = vec![
+            Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued),
+            Effect::new(Kind::Tilt),
+        ];
         let values = [0.03, 0.08, 9.81, 0.012, 0.103, 0.055, 0.02, 0.05, 0.3].map(S::constant);
         Self { disk: DiskFamily { effects, edge: false }.build(&values), corrected }
     }

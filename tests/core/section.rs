@@ -3,10 +3,12 @@
 use std::sync::atomic::AtomicUsize;
 
 use crate::counting::allocations;
+use udd::analysis::{
+    CancelFlag, CrossingOutcome, Crossings, ExecutionContext, Output, Section, SectionRun, trajectory,
+};
 use udd::formula::{Expression, Names, Place};
-use udd::integrate::{Dopri5, Driver, Taylor, Tolerance};
+use udd::integrate::{Dopri5, Integrator, Taylor, Tolerance};
 use udd::model::{DiskFamily, DleFamily, Family};
-use udd::run::{Crew, Crossings, Ended, Output, Section, Sections, Stop, trajectory};
 use udd::scalar::Isa;
 use udd::tape::Tape;
 
@@ -57,10 +59,11 @@ fn collect<F: Family<D>, const D: usize>(
     let How { skip, count, end, tolerance, threads, isa } = how;
     let mut bounded = [true; D];
     bounded[D - 1] = D == 3;
-    let (done, stop) = (AtomicUsize::new(0), Stop::new());
-    let all = Sections { family, values, starts, sections: &sections, skip, count, end, bounded, tolerance };
-    let crew = Crew { threads, isa, done: &done, stop: &stop };
-    all.run(crew).into_iter().map(Option::unwrap).collect()
+    let (done, stop) = (AtomicUsize::new(0), CancelFlag::new());
+    let all =
+        SectionRun { family, values, starts, sections: &sections, skip, count, end, bounded, tolerance };
+    let context = ExecutionContext { threads, isa, done: &done, stop: &stop };
+    all.run(context).into_iter().map(Option::unwrap).collect()
 }
 
 fn dle(w: f64, list: &[(&str, i32)], how: How) -> Crossings<3> {
@@ -82,7 +85,7 @@ fn elsewhere<const D: usize>(
         x0,
         &TIGHT,
         false,
-        (&Stop::new(), None),
+        (&CancelFlag::new(), None),
     );
     run.unwrap().x[1..].to_vec()
 }
@@ -103,7 +106,7 @@ fn crossings_are_those_of_an_independent_run() {
         ("z'", |x| 1.0 - x[0] * x[1]),
     ] {
         let found = dle(1.0, &[(text, 0)], how);
-        assert_eq!(found.ended, Ended::TimeRanOut);
+        assert_eq!(found.ended, CrossingOutcome::TimeRanOut);
         assert!(found.residual <= 1e-12, "{text}: {:e}", found.residual);
         let other = elsewhere(&DleFamily, &[1.0, 0.0], START, &found.t);
         for (x, other) in found.x.iter().zip(&other) {
@@ -126,7 +129,7 @@ fn periodic_orbits_return_in_their_period() {
     // w = 7.1 what is left of the transient after `skip` crossings is below 1e-10: it decays in 2250.
     for (w, period, skip) in [(7.1, 3.98808575286, 30_000), (10.0, 3.35832224912, 2_000)] {
         let found = dle(w, &[("z", 1)], How { skip, ..How::many(9) });
-        assert_eq!((found.ended, found.t.len()), (Ended::Finished, 9));
+        assert_eq!((found.ended, found.t.len()), (CrossingOutcome::Finished, 9));
         for pair in found.t.windows(3) {
             // The period is given to 11 decimals; the clock at 6e4 ticks in 7e-12.
             assert!((pair[2] - pair[0] - period).abs() < 1e-9, "{w}: {}", pair[2] - pair[0]);
@@ -200,7 +203,7 @@ fn a_zero_at_the_end_of_a_step_counts_once() {
     let tape = Tape::record(&DleFamily, &[None, Some(0.0)]).unwrap();
     let tolerance = Tolerance::default();
     let taylor = Taylor::new(&tape, values.clone(), 18, Isa::Baseline);
-    let mut driver = Driver::by(taylor, DleFamily.build(&values), 0.0, START, None, &tolerance);
+    let mut driver = Integrator::by(taylor, DleFamily.build(&values), 0.0, START, None, &tolerance);
     for _ in 0..12 {
         driver.advance(1e3).unwrap();
         let (t, z) = (driver.t(), driver.x()[2]);
@@ -249,16 +252,16 @@ fn every_end_has_its_name() {
     };
     // The z-axis is an orbit: z = z0 + w t.
     let axis = ends([2.0, 0.0], [0.0, 0.0, 0.0], 1e9);
-    assert_eq!((axis.ended, axis.t.as_slice()), (Ended::Escaped, &[3.5][..]));
+    assert_eq!((axis.ended, axis.t.as_slice()), (CrossingOutcome::Escaped, &[3.5][..]));
     let early = ends([2.0, 0.0], [0.0, 0.0, 0.0], 1e3);
-    assert_eq!((early.ended, early.end.0), (Ended::TimeRanOut, 1e3));
-    assert!(matches!(ends([f64::NAN, 0.0], START, 10.0).ended, Ended::Failed(_)));
+    assert_eq!((early.ended, early.end.0), (CrossingOutcome::TimeRanOut, 1e3));
+    assert!(matches!(ends([f64::NAN, 0.0], START, 10.0).ended, CrossingOutcome::Failed(_)));
 
     let disk = DiskFamily { effects: vec![], edge: true };
     let values = vec![DISK.to_vec(), [&[0.05], &DISK[1..]].concat()];
     let starts = [[3.0, 0.005, 0.0, 0.0], [0.0, 0.0, 0.0799, 0.0]];
     let found = collect(&disk, &values, &starts, &[("Z", 1)], How { end: 100.0, ..How::many(9) });
-    assert_eq!((found[0].ended, found[1].ended), (Ended::Finished, Ended::Ejected));
+    assert_eq!((found[0].ended, found[1].ended), (CrossingOutcome::Finished, CrossingOutcome::Ejected));
     assert!((found[1].end.1[1].hypot(found[1].end.1[2]) - 0.08).abs() < 1e-12);
 }
 
@@ -283,8 +286,8 @@ fn laws_without_a_series_have_sections_too() {
     // The same section by the other method, which the sections fall back on: its polynomial is of order 4.
     let tolerance = Tolerance { rtol: 1e-10, atol: 1e-13 };
     let found = dle(1.0, &[("z", 1)], How { tolerance, ..How::many(4) });
-    let mut driver: Driver<_, f64, 3, Tolerance, Dopri5<f64, 3>> =
-        Driver::new(DleFamily.build(&[1.0, 0.0]), 0.0, START, None, &tolerance);
+    let mut driver: Integrator<_, f64, 3, Tolerance, Dopri5<f64, 3>> =
+        Integrator::new(DleFamily.build(&[1.0, 0.0]), 0.0, START, None, &tolerance);
     for (t, x) in found.t.iter().zip(&found.x) {
         while driver.t() < *t {
             driver.advance(*t).unwrap();

@@ -5,26 +5,34 @@ use std::f64::consts::{PI, TAU};
 
 use approx::assert_relative_eq;
 use proptest::prelude::*;
-use udd::integrate::{Dopri5, Driver, Ending, Taylor, Tolerance, propagate};
-use udd::model::effects::{At, Contact, Dry, Effect, Kind, Slots, Term, Treatment};
-use udd::model::stick::{REVERSAL, Slider, Sticking};
-use udd::model::{Bristled, Disk, DiskFamily, Family, Pendulum, PendulumFamily, Sides, System, choose};
+use udd::analysis::{CancelFlag, Outcome, Output, Run, trajectory};
+use udd::integrate::{Dopri5, Ending, Integrator, Taylor, Tolerance, propagate};
+use udd::model::effects::{Contact, Contributions, Dry, Effect, EffectInputs, FrictionModel, Kind, Term};
+use udd::model::stick_slip::{REVERSAL, Slider, Sticking};
+use udd::model::{Disk, DiskFamily, Family, Pendulum, PendulumFamily, Sides, System, WithLuGre, choose};
 use udd::observe::Event;
-use udd::run::{Outcome, Output, Run, Stop, trajectory};
 use udd::scalar::{Isa, Mask, Packet, Real, Scalar};
 use udd::tape::Tape;
 
 const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
 
 /// `x'' + x = -mu sgn x'`: a pendulum without weight whose cable turns it back.
-fn oscillator(mu: f64, treatment: Treatment, eps: f64) -> Pendulum<f64> {
+fn oscillator(mu: f64, treatment: FrictionModel, eps: f64) -> Pendulum<f64> {
     let effects = vec![Effect::new(Kind::CableTorque), Effect::new(Kind::Coulomb).with_treatment(treatment)];
     PendulumFamily { effects }.build(&[1.0, 1.0, 0.0, 0.0, 1.0, 0.0, mu, eps])
 }
 
 fn run<M: System<f64, D>, const D: usize>(system: &M, end: f64, x0: [f64; D]) -> Run<D> {
-    trajectory(system, Dopri5::default(), Output::Steps(0.0, end), x0, &TIGHT, false, (&Stop::new(), None))
-        .unwrap()
+    trajectory(
+        system,
+        Dopri5::default(),
+        Output::Steps(0.0, end),
+        x0,
+        &TIGHT,
+        false,
+        (&CancelFlag::new(), None),
+    )
+    .unwrap()
 }
 
 fn named<'a, const D: usize>(
@@ -38,7 +46,7 @@ fn named<'a, const D: usize>(
 #[test]
 fn the_amplitude_falls_by_2_mu_per_half_cycle_and_then_it_sticks() {
     let mu = 0.1;
-    let system = oscillator(mu, Treatment::SetValued, 0.05);
+    let system = oscillator(mu, FrictionModel::SetValued, 0.05);
     let run = run(&system, 60.0, [0.0, 1.53]);
     let turns = named(&run.events, &system, "reversal");
     assert_eq!(turns.len(), 7);
@@ -61,7 +69,7 @@ fn the_amplitude_falls_by_2_mu_per_half_cycle_and_then_it_sticks() {
 
 #[test]
 fn a_start_within_the_dead_band_never_moves() {
-    let system = oscillator(0.1, Treatment::SetValued, 0.05);
+    let system = oscillator(0.1, FrictionModel::SetValued, 0.05);
     for x in [-0.1, -0.03, 0.0, 0.099] {
         let run = run(&system, 10.0, [0.0, x]);
         assert!(run.x.iter().all(|&state| state == [0.0, x]) && run.events.is_empty());
@@ -75,9 +83,9 @@ fn a_start_within_the_dead_band_never_moves() {
 
 /// The energy lost is friction's force times the way: exactly, half cycle by half cycle.
 #[test]
-fn the_energy_book_balances() {
+fn the_energy_balances() {
     let mu = 0.07;
-    let system = oscillator(mu, Treatment::SetValued, 0.05);
+    let system = oscillator(mu, FrictionModel::SetValued, 0.05);
     let run = run(&system, 60.0, [0.3, 1.2]);
     let energy = |x: [f64; 2]| 0.5 * (x[0] * x[0] + x[1] * x[1]);
     let mut before = run.x[0];
@@ -91,7 +99,7 @@ fn the_energy_book_balances() {
 
 #[test]
 fn a_disk_that_sticks_is_carried_to_its_edge() {
-    let effects = vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued)];
+    let effects = vec![Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued)];
     let disk = DiskFamily { effects, edge: true };
     let disk = disk.build(&[0.05, 0.08, 9.81, 0.012, 0.103, 0.055, 0.02, 0.05]);
     // g Y = 0.00981 is less than the friction: the contact moves up at W, and Y stays.
@@ -108,8 +116,10 @@ const DISK: [f64; 6] = [0.05, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// its weight together exceed the friction.
 #[test]
 fn a_rippling_drive_lets_the_disk_go_in_time() {
-    let effects =
-        vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued), Effect::new(Kind::DriveRipple)];
+    let effects = vec![
+        Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued),
+        Effect::new(Kind::DriveRipple),
+    ];
     let (c, y, ripple, f) = (0.02, 1.5e-3, 0.5, 40.0);
     let values = [&DISK[..], &[c, 0.05, -ripple, 0.0, f]].concat();
     let disk = DiskFamily { effects, edge: true }.build(&values);
@@ -162,9 +172,9 @@ impl System<f64, 5> for Booked {
 }
 
 #[test]
-fn the_disk_s_energy_book_balances() {
+fn the_disk_s_energy_balances() {
     for (c, at_rest) in [(0.005, false), (0.05, true)] {
-        let effects = vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::SetValued)];
+        let effects = vec![Effect::new(Kind::Coulomb).with_treatment(FrictionModel::SetValued)];
         let values = [&DISK[..], &[c, 0.05]].concat();
         let disk = DiskFamily { effects, edge: false }.build(&values);
         let energy = |x: [f64; 5]| 0.5 * (0.0032 + x[1] * x[1] + x[2] * x[2]) * x[0] * x[0] + 9.81 * x[2];
@@ -196,7 +206,7 @@ impl<S: Scalar> Block<S> {
 
     fn force(&self, x: &[S; 2], contact: Contact<S>) -> (S, Dry<S>) {
         let zero = S::zero();
-        let at = At {
+        let at = EffectInputs {
             t: zero,
             omega: x[0],
             speed: x[0],
@@ -210,7 +220,7 @@ impl<S: Scalar> Block<S> {
             radius: S::one(),
             contact,
         };
-        let mut slots = Slots::default();
+        let mut slots = Contributions::default();
         for term in &self.effects {
             term.enter(&|s| s, &at, &mut slots);
         }
@@ -259,7 +269,7 @@ impl<S: Scalar> System<S, 2> for Block<S> {
 fn stribeck_friction_makes_a_block_stick_and_slip() {
     let (v, c, extra) = (0.3, 0.4, 0.6);
     let effects =
-        [Kind::Coulomb, Kind::Stribeck].map(|k| Effect::new(k).with_treatment(Treatment::SetValued));
+        [Kind::Coulomb, Kind::Stribeck].map(|k| Effect::new(k).with_treatment(FrictionModel::SetValued));
     let mut errors = Vec::new();
     for fade in [0.04, 0.01, 0.0025] {
         let block = Block::<f64>::new(v, &effects, &[c, 0.05, extra, fade, 0.05]);
@@ -299,16 +309,16 @@ fn all_treatments_agree_in_the_limit() {
     let x0 = [0.5, 1.2];
     let at = |t: f64, treatment, eps| propagate(&oscillator(mu, treatment, eps), 0.0, t, x0, &TIGHT).unwrap();
     let bristled = |t: f64, eps| {
-        let system = Bristled(oscillator(mu, Treatment::Lugre, eps));
+        let system = WithLuGre(oscillator(mu, FrictionModel::Lugre, eps));
         propagate(&system, 0.0, t, [x0[0], x0[1], 0.0], &TIGHT).unwrap()
     };
     // In motion, after two reversals.
-    let sharp = at(8.0, Treatment::SetValued, 0.05);
+    let sharp = at(8.0, FrictionModel::SetValued, 0.05);
     let distance = |x: [f64; 2]| (x[0] - sharp[0]).hypot(x[1] - sharp[1]);
     let (mut smooth, mut banded, mut bristles) = (Vec::new(), Vec::new(), Vec::new());
     for eps in [4e-3, 1e-3, 2.5e-4] {
-        smooth.push(distance(at(8.0, Treatment::Smoothed, eps)));
-        banded.push(distance(at(8.0, Treatment::Karnopp, eps)));
+        smooth.push(distance(at(8.0, FrictionModel::Smoothed, eps)));
+        banded.push(distance(at(8.0, FrictionModel::Karnopp, eps)));
         let x = bristled(8.0, eps);
         bristles.push(distance([x[0], x[1]]));
     }
@@ -324,10 +334,10 @@ fn all_treatments_agree_in_the_limit() {
 
     // At rest: the set-valued law stays where the dead band holds it, Karnopp's too, up to the band's width;
     // the bristles hold it but for a slow creep, and the smoothed law creeps to the middle.
-    let rest = at(60.0, Treatment::SetValued, 0.05);
+    let rest = at(60.0, FrictionModel::SetValued, 0.05);
     assert_eq!(rest[0], 0.0);
     for eps in [1e-2, 1e-3] {
-        let karnopp = at(60.0, Treatment::Karnopp, eps);
+        let karnopp = at(60.0, FrictionModel::Karnopp, eps);
         assert_eq!(karnopp[0], 0.0);
         assert!((karnopp[1] - rest[1]).abs() < eps, "{karnopp:?} {rest:?}");
     }
@@ -335,7 +345,7 @@ fn all_treatments_agree_in_the_limit() {
     assert!((lugre[1] - rest[1]).abs() < 0.5 * 1e-3f64.sqrt() && lugre[0].abs() < 1e-9, "{lugre:?} {rest:?}");
     // In the bristles the deflection holds the load: stiffness mu/eps.
     assert_relative_eq!(lugre[2] * mu / 1e-3, -lugre[1], max_relative = 1e-6);
-    let smoothed = at(600.0, Treatment::Smoothed, 0.01);
+    let smoothed = at(600.0, FrictionModel::Smoothed, 0.01);
     assert!(smoothed[1].abs() < 1e-6, "{smoothed:?}");
 }
 
@@ -343,7 +353,8 @@ fn all_treatments_agree_in_the_limit() {
 #[test]
 fn karnopp_s_band_is_entered_and_left() {
     let (v, c, extra, band) = (0.3, 0.4, 0.6, 0.02);
-    let effects = [Kind::Coulomb, Kind::Stribeck].map(|k| Effect::new(k).with_treatment(Treatment::Karnopp));
+    let effects =
+        [Kind::Coulomb, Kind::Stribeck].map(|k| Effect::new(k).with_treatment(FrictionModel::Karnopp));
     let block = Block::<f64>::new(v, &effects, &[c, band, extra, 0.1, band]);
     let run = run(&block, 60.0, [-0.1, 0.0]);
     let mut seen = 0;
@@ -371,22 +382,22 @@ fn lanes_have_the_bits_of_single_runs() {
     let end = 80.0;
     let effects = vec![
         Effect::new(Kind::CableTorque),
-        Effect::new(Kind::Coulomb).with_treatment(Treatment::Karnopp),
-        Effect::new(Kind::Stribeck).with_treatment(Treatment::SetValued),
+        Effect::new(Kind::Coulomb).with_treatment(FrictionModel::Karnopp),
+        Effect::new(Kind::Stribeck).with_treatment(FrictionModel::SetValued),
     ];
     let family = PendulumFamily { effects };
     let values = [1.0, 1.0, 0.3, 0.01, 1.0, 0.0, 0.05, 0.01, 0.06, 0.5, 0.05];
     let wide = family.build(&values.map(<Packet<L>>::constant));
     let x0 = from_fn(|n| Packet::from_lanes(|i| starts[i][n]));
     let zero = Packet::constant(0.0);
-    let mut driver: Driver<_, Packet<L>, 2> = Driver::new(&wide, zero, x0, None, &TIGHT);
+    let mut driver: Integrator<_, Packet<L>, 2> = Integrator::new(&wide, zero, x0, None, &TIGHT);
     while (0..L).any(|i| driver.t().lane(i) < end) {
         let progress = driver.trial(Packet::constant(end));
         assert!(!progress.failed.any());
     }
     let one = family.build(&values);
     for (i, &start) in starts.iter().enumerate() {
-        let mut single: Driver<_, f64, 2> = Driver::new(&one, 0.0, start, None, &TIGHT);
+        let mut single: Integrator<_, f64, 2> = Integrator::new(&one, 0.0, start, None, &TIGHT);
         while single.t() < end {
             single.advance(end).unwrap();
         }
@@ -401,9 +412,9 @@ fn lanes_have_the_bits_of_single_runs() {
 fn methods_agree_on_when_it_sticks() {
     fn events<F: Family<D>, const D: usize>(family: &F, values: &[f64], x0: [f64; D]) -> (usize, f64) {
         let (system, tape) = (family.build(values), Tape::record(family, &[]).unwrap());
-        let mut one: Driver<_, f64, D> = Driver::new(&system, 0.0, x0, None, &TIGHT);
+        let mut one: Integrator<_, f64, D> = Integrator::new(&system, 0.0, x0, None, &TIGHT);
         let series = Taylor::new(&tape, values.to_vec(), 18, Isa::best());
-        let mut other: Driver<_, f64, D, _, _> = Driver::by(series, &system, 0.0, x0, None, &TIGHT);
+        let mut other: Integrator<_, f64, D, _, _> = Integrator::by(series, &system, 0.0, x0, None, &TIGHT);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         while one.t() < 10.0 {
             if let Ending::Surface(j) = one.advance(10.0).unwrap() {
@@ -420,7 +431,7 @@ fn methods_agree_on_when_it_sticks() {
         let ends = one.x().iter().zip(other.x()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         (a.len(), apart.max(ends))
     }
-    for treatment in [Treatment::SetValued, Treatment::Karnopp] {
+    for treatment in [FrictionModel::SetValued, FrictionModel::Karnopp] {
         let dry = [Kind::Coulomb, Kind::Stribeck].map(|kind| Effect::new(kind).with_treatment(treatment));
         let pendulum = PendulumFamily { effects: dry.to_vec() };
         let (count, apart) =
@@ -469,7 +480,7 @@ fn chattering_is_an_outcome() {
         [1.0, 0.0],
         &tolerance,
         true,
-        (&Stop::new(), None),
+        (&CancelFlag::new(), None),
     )
     .unwrap();
     assert_eq!(run.outcome, Outcome::Chattering);
@@ -487,14 +498,14 @@ fn chattering_is_an_outcome() {
 #[test]
 fn bristles_at_rest_are_no_trap() {
     let effects =
-        vec![Effect::new(Kind::Coulomb).with_treatment(Treatment::Lugre), Effect::new(Kind::CubicDrag)];
+        vec![Effect::new(Kind::Coulomb).with_treatment(FrictionModel::Lugre), Effect::new(Kind::CubicDrag)];
     let values = [0.0135, 0.08, 9.81, 0.012, 0.103, 0.055, 0.043, 0.0081, 0.0067];
-    let disk = Bristled(DiskFamily { effects, edge: false }).build(&values);
+    let disk = WithLuGre(DiskFamily { effects, edge: false }).build(&values);
     for k in 0..40 {
         let rtol = 4e-7 * 1.01f64.powi(k);
         let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
         let start = [0.0, -0.0085, 0.0085, 0.0, 0.0];
-        let mut driver: Driver<_, f64, 5> = Driver::new(&disk, 0.0, start, None, &tolerance);
+        let mut driver: Integrator<_, f64, 5> = Integrator::new(&disk, 0.0, start, None, &tolerance);
         let mut before = 0.0;
         while driver.t() < 20.0 {
             driver.advance(20.0).unwrap();
@@ -522,7 +533,7 @@ proptest! {
         karnopp in any::<bool>(),
         digits in 4.0..12.0f64,
     ) {
-        let treatment = if karnopp { Treatment::Karnopp } else { Treatment::SetValued };
+        let treatment = if karnopp { FrictionModel::Karnopp } else { FrictionModel::SetValued };
         let mut effects = vec![Effect::new(Kind::CableTorque)];
         effects.extend([Kind::Coulomb, Kind::Stribeck].map(|k| Effect::new(k).with_treatment(treatment)));
         // A cable that pulls to one side, so that it can be let go again.
@@ -530,7 +541,7 @@ proptest! {
         let system = PendulumFamily { effects }.build(&values);
         let rtol = 10f64.powf(-digits);
         let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
-        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, (&Stop::new(), None));
+        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, (&CancelFlag::new(), None));
         let run = run.unwrap();
         prop_assert_eq!(run.outcome, Outcome::Finished);
         // At 1e-12 ten seconds take up to 3000 steps.

@@ -4,12 +4,12 @@ use std::array::from_fn;
 
 use proptest::prelude::*;
 use udd::integrate::{ErrorNorm, Tolerance};
-use udd::model::effects::{Kind, Role, Treatment};
+use udd::model::effects::{FrictionModel, Kind, Role};
 use udd::model::{
-    DiskFamily, DleFamily, Effect, Family, MAX_SURFACES, OwnFamily, Parameter, PendulumFamily, Sides, System,
-    sides_of,
+    DiskFamily, DleFamily, Effect, Family, FormulaFamily, MAX_SURFACES, Parameter, PendulumFamily, Sides,
+    System, sides_of,
 };
-use udd::scalar::{Dual, Instructions, Isa, LANES, Mask, Packet, Plain, Real, Scalar, Work};
+use udd::scalar::{Dual, InstructionSet, Isa, LANES, Mask, Packet, Plain, Real, Scalar, Work};
 use udd::tape::{HIGH, Jets, Tape};
 
 const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
@@ -17,7 +17,7 @@ const PLAIN: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 /// Every effect, in each way it can enter.
 fn all() -> Vec<Effect> {
     let ways = |kind: Kind| match kind.spec().momenta {
-        [] if kind.dry() => [Treatment::Smoothed, Treatment::SetValued, Treatment::Karnopp]
+        [] if kind.dry() => [FrictionModel::Smoothed, FrictionModel::SetValued, FrictionModel::Karnopp]
             .map(|treatment| Effect::new(kind).with_treatment(treatment))
             .to_vec(),
         [] => vec![Effect::new(kind)],
@@ -39,7 +39,7 @@ fn values(effect: &Effect, amplitude: f64) -> Vec<f64> {
 fn disks() -> Vec<(DiskFamily, Vec<f64>)> {
     let mut sets: Vec<Vec<Effect>> = all().into_iter().map(|effect| vec![effect]).collect();
     sets.push(vec![]);
-    let together = |effect: &Effect| effect.momentum.is_none() && effect.treatment == Treatment::Smoothed;
+    let together = |effect: &Effect| effect.momentum.is_none() && effect.treatment == FrictionModel::Smoothed;
     sets.push(all().into_iter().filter(together).collect());
     let with = |effects: Vec<Effect>| {
         let own = effects.iter().flat_map(|effect| values(effect, 1e-3));
@@ -84,7 +84,7 @@ proptest! {
             same_rates(&family, &p, t, [omega, radius * angle.sin(), radius * angle.cos(), beta]);
         }
         same_rates(&DleFamily, &[7.1, 0.2], t, [omega, beta, 40.0 * radius]);
-        for effect in all().into_iter().filter(|e| e.momentum.is_none() && e.treatment == Treatment::Smoothed) {
+        for effect in all().into_iter().filter(|e| e.momentum.is_none() && e.treatment == FrictionModel::Smoothed) {
             let p = [&[0.05, 0.0057, 9.81, 0.012][..], &values(&effect, 0.1)].concat();
             same_rates(&PendulumFamily { effects: vec![effect] }, &p, t, [omega, beta]);
         }
@@ -98,12 +98,15 @@ fn what_a_known_parameter_removes_is_left_out() {
     // y - omega, omega z, omega y, w - omega y.
     assert_eq!((plain.steps().len(), plain.held().len()), (4, 1));
     assert_eq!(damped.steps().len(), 6);
-    assert!(plain.is_unrolled(), "rust/tape/known.rs has another tape for the DLE than is recorded");
-    assert!(damped.is_unrolled(), "rust/tape/known.rs has another tape for the damped DLE than is recorded");
+    assert!(plain.is_unrolled(), "rust/tape/specialised.rs has another tape for the DLE than is recorded");
+    assert!(
+        damped.is_unrolled(),
+        "rust/tape/specialised.rs has another tape for the damped DLE than is recorded"
+    );
     let effect = Effect::new(Kind::EccentricMass);
     let disk = |effects| DiskFamily { effects, edge: false };
     let without = Tape::record(&disk(vec![]), &[]).unwrap();
-    assert!(without.is_unrolled(), "rust/tape/known.rs has another tape for the disk than is recorded");
+    assert!(without.is_unrolled(), "rust/tape/specialised.rs has another tape for the disk than is recorded");
     let zero: Vec<Option<f64>> = [None; 6].into_iter().chain([Some(0.0); 2]).collect();
     let absent = Tape::record(&disk(vec![effect]), &zero).unwrap();
     assert_eq!(absent.steps().len(), without.steps().len());
@@ -330,7 +333,7 @@ impl<F: Family<D>, const D: usize> Bits<'_, F, D> {
         run::<f64, D, 21>(self.tape, &system, (self.p, self.lane(l), self.end), (1e-9, isa)).map(f64::to_bits)
     }
 
-    fn many<const L: usize, V: Instructions>(&self, isa: Isa) -> Vec<[u64; D]> {
+    fn many<const L: usize, V: InstructionSet>(&self, isa: Isa) -> Vec<[u64; D]> {
         let p: Vec<Packet<L, V>> = self.p.iter().map(|&v| Packet::constant(v)).collect();
         let x0 = from_fn(|n| Packet::from_lanes(|l| self.lane(l)[n]));
         let system = self.family.build(&p);
@@ -339,7 +342,7 @@ impl<F: Family<D>, const D: usize> Bits<'_, F, D> {
     }
 
     /// The second lane as one of a packet of tangents.
-    fn tangents<V: Instructions>(&self, isa: Isa) -> [u64; D] {
+    fn tangents<V: InstructionSet>(&self, isa: Isa) -> [u64; D] {
         type T<V> = Dual<Packet<LANES, V>, 1>;
         let p: Vec<T<V>> = self.p.iter().map(|&v| Dual::constant(v)).collect();
         let x0 = from_fn(|n| Dual::variable(Packet::from_lanes(|l| self.lane(l)[n]), 0));
@@ -354,7 +357,7 @@ struct On<'a, F, const D: usize>(&'a Bits<'a, F, D>, Isa);
 impl<F: Family<D>, const D: usize> Work for On<'_, F, D> {
     type Output = (Vec<[u64; D]>, [u64; D], [u64; D]);
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Self::Output {
+    fn run<V: InstructionSet>(self) -> Self::Output {
         (self.0.many::<LANES, V>(self.1), self.0.tangents::<V>(self.1), self.0.one(1, self.1))
     }
 }
@@ -517,7 +520,7 @@ struct PacketBits<'a>(&'a Tape<3>, Isa, &'a [f64; 5]);
 impl Work for PacketBits<'_> {
     type Output = Vec<u64>;
     #[inline(always)]
-    fn run<V: Instructions>(self) -> Vec<u64> {
+    fn run<V: InstructionSet>(self) -> Vec<u64> {
         let Self(tape, isa, x) = self;
         let lane = |n: usize| Packet::<LANES, V>::from_lanes(|l| x[n] * (1.0 + 0.1 * l as f64));
         coefficients(tape, isa, lane, |c| (0..LANES).map(|l| c.lane(l)).collect())
@@ -535,7 +538,7 @@ proptest! {
     ) {
         let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
         let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
-        let family = OwnFamily::<3>::parse(&names(&["x", "y", "z"]), &texts, &names(&["k", "c"])).unwrap();
+        let family = FormulaFamily::<3>::parse(&names(&["x", "y", "z"]), &texts, &names(&["k", "c"])).unwrap();
         let tape = Tape::record(&family, &[]).unwrap();
         prop_assume!(!tape.is_unrolled());
         let apart = tape.unfused();

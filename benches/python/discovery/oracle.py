@@ -13,7 +13,7 @@ from laws import LIBRARY
 from units import TRAIN
 
 import udd
-from udd.discovery.heldout import _FILTER, HORIZONS, _windows, held_out_errors
+from udd.discovery.validation.held_out_errors import _FILTER, HORIZONS, _windows, held_out_errors
 from udd.errors import ModelError
 from udd.fitting import fit_record, record_of
 

@@ -7,9 +7,9 @@ from information import DEVICE, Assumed
 from scipy.stats import chi2
 
 import udd
-from udd.discovery.bearing import ALPHA
-from udd.discovery.candidates import library, ripples
 from udd.discovery.discover import TRAIN
+from udd.discovery.scoring.candidates import library, ripples
+from udd.discovery.thresholds import ALPHA
 from udd.fitting.parameters import CAMERA, CLOCK
 from udd.fitting.parameters import DISK as SPREAD
 from udd.fitting.problem import SEARCHED, levels

@@ -35,9 +35,9 @@ def peak() -> int:
 def make(path: Path, frames: int) -> None:
     """Film 250 frames of a run, forth and back, until there are enough."""
     import udd
-    from udd.film.encoding import write_film
     from udd.tracking import Film
-    from udd.tracking.rgb import rgb
+    from udd.video.rgb_frames import rgb
+    from udd.video.writer import write_film
 
     run = udd.simulate(udd.Disk(0.039), np.arange(0, 10.1, 0.005), [0.0, 0.02, -0.03, 0.3], dense=True)
     once = udd.render(run, path.with_name("once.mp4"))

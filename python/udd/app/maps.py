@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.branching import bifurcation
+from udd.attractors import bifurcation
+from udd.chaos.largest_exponent import lyapunov
+from udd.chaos.poincare_sections import poincare
 from udd.errors import ModelError
-from udd.exponents import lyapunov
 from udd.models import DLE, Model, beyond_the_edge
-from udd.sections import poincare
 
 from . import limits
 from .spec import Start, drive_of

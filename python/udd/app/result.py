@@ -8,8 +8,8 @@ import re
 from typing import Any
 
 from udd.models import Disk
-from udd.report import tables, words
-from udd.sweeping.models_json import model_to_dict
+from udd.models.serialization import model_to_dict
+from udd.report import tables, wording
 
 _RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 
@@ -22,15 +22,20 @@ def text_of(markup: object) -> str:
 
 def of(found: Any) -> dict[str, Any]:
     """What stands at the top of the result."""
-    numbers = words.headline(found)
+    numbers = wording.headline(found)
     return {
         "verdict": found.verdict,
-        "sentence": words.verdict(found),
+        "sentence": wording.verdict(found),
         "effects": [
-            {"title": e.title, "equation": text_of(words.pretty(e.equation)), "values": _values(e), "p": e.p}
+            {
+                "title": e.title,
+                "equation": text_of(wording.pretty(e.equation)),
+                "values": _values(e),
+                "p": e.p,
+            }
             for e in found.effects
         ],
-        "limits": [text_of(text) for text in words.short_limits(found)],
+        "limits": [text_of(text) for text in wording.short_limits(found)],
         "before": numbers.before,
         "after": numbers.after if found.effects else None,
         "floor": numbers.floor,
@@ -50,10 +55,11 @@ def _values(effect: Any) -> list[str]:
     units = {p.name: p.unit for p in effect.effect.spec.parameters}
     return [
         text_of(
-            f"{words.pretty(name)} = {words.with_error(value, effect.errors.get(name))} {units.get(name, '')}"
+            f"{wording.pretty(name)} = {wording.with_error(value, effect.errors.get(name))}"
+            f" {units.get(name, '')}"
         )
         for name, value in effect.parameters.items()
-        if not words.is_spline(effect.effect)
+        if not wording.is_spline(effect.effect)
     ]
 
 

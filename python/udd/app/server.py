@@ -24,26 +24,26 @@ from starlette.websockets import WebSocket
 from udd.errors import UddError
 
 from . import limits, uploads
-from .catalogue import catalogue
+from .error_text import sentence
+from .growing_run import as_csv
 from .jobs import Jobs
-from .runs import as_csv
+from .presets import catalogue
 from .security import REPORT_POLICY, Guard
 from .spec import from_json, start_of
 from .stream import Page
-from .words import sentence
 
 STATIC = Path(__file__).parent / "static"
 
 
 def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Starlette:
     """The application; it answers to these hosts (``name:port``) and those who know the token."""
-    jobs, crew = Jobs(), ThreadPoolExecutor(1, "udd-maps")
+    jobs, workers = Jobs(), ThreadPoolExecutor(1, "udd-maps")
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         async with jobs:
             yield
-        crew.shutdown(wait=False, cancel_futures=True)
+        workers.shutdown(wait=False, cancel_futures=True)
 
     async def page(_: Request) -> Response:
         return FileResponse(STATIC / "index.html")
@@ -78,7 +78,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         return _download(response, f"udd-{file.name}") if "download" in request.query_params else response
 
     async def socket(websocket: WebSocket) -> None:
-        await Page(websocket, jobs, crew).serve()
+        await Page(websocket, jobs, workers).serve()
 
     routes = [
         Route("/", page),
@@ -111,11 +111,11 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
         file = await uploads.receive(request.stream(), folder)
         return {"kind": "loop", "file": file.name, "film": file.suffix == ".film", **known}
     if kind == "sample":
-        from udd import demo
+        from udd.demo import pipeline
 
-        with as_file(files("udd") / "data" / "sample.mp4") as sample:
+        with as_file(files("udd") / "demo" / "sample.mp4") as sample:
             shutil.copyfile(sample, folder / "sample.mp4")
-        return {"kind": "loop", "file": "sample.mp4", "film": True, "W": demo.W, "R": demo.R}
+        return {"kind": "loop", "file": "sample.mp4", "film": True, "W": pipeline.W, "R": pipeline.R}
     if kind == "render":
         start = from_json("the run", await uploads.text(request.stream()))
         seconds = _number(request, "seconds") or 0.0

@@ -8,8 +8,8 @@ from typing import Any
 
 from udd.errors import ModelError
 from udd.models import DLE, Model
-from udd.sweeping.models_json import model_from_dict
-from udd.trajectory import initial_state
+from udd.models.serialization import model_from_dict
+from udd.simulation.trajectory import initial_state
 
 
 @dataclass(frozen=True)

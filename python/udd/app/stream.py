@@ -16,14 +16,14 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from udd._validate import number
+from udd._util.validation import number
 from udd.errors import UddError
 
 from . import limits, maps, wire
+from .error_text import sentence
+from .growing_run import RATE, Runs, columns_of
 from .jobs import Jobs, Send
-from .runs import RATE, Runs, columns_of
 from .spec import message_of, start_of, whole
-from .words import sentence
 
 _WAITING = 64  # messages that a page may be behind
 
@@ -31,10 +31,10 @@ _WAITING = 64  # messages that a page may be behind
 class Page:
     """What one connected page has asked for."""
 
-    def __init__(self, socket: WebSocket, jobs: Jobs, crew: Executor) -> None:
+    def __init__(self, socket: WebSocket, jobs: Jobs, workers: Executor) -> None:
         self._socket = socket
         self._jobs = jobs
-        self._crew = crew  # draws one map at a time, whoever asks
+        self._workers = workers  # draws one map at a time, whoever asks
         self._runs = Runs()
         self._out: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(_WAITING)
         self._maps: dict[str, asyncio.Task[None]] = {}
@@ -143,7 +143,7 @@ class Page:
         self._begin("diagram", said, answers())
 
     async def _drawn(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        return await asyncio.get_running_loop().run_in_executor(self._crew, function, *arguments)
+        return await asyncio.get_running_loop().run_in_executor(self._workers, function, *arguments)
 
     def _begin(self, name: str, said: dict[str, Any], answers: AsyncIterator[dict[str, Any] | bytes]) -> None:
         """Send a map's answers one by one; a newer question of the same kind ends an older one."""

@@ -19,11 +19,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from udd.cli.answer import as_json
+from udd._util.json_output import as_json
 from udd.errors import UddError
 
 from . import limits
-from .words import sentence
+from .error_text import sentence
 
 OUT = Path("out")
 _PICTURES_EVERY = 0.2  # s between the frames that are shown
@@ -105,16 +105,16 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     tell({"say": "drawing the report"})
     found.report(OUT / "report.html", film=file if film else None, source=file)
     (OUT / "discovery.json").write_text(as_json(found.to_dict()), encoding="utf-8")
-    from . import parts, result
+    from . import report_parts, result
 
-    return {**result.of(found), "parts": parts.split(OUT / "report.html", OUT)}
+    return {**result.of(found), "parts": report_parts.split(OUT / "report.html", OUT)}
 
 
 def _tracked(file: Path, radius: float, tell: Tell) -> Any:
     """The motion in a film, shown while it is tracked."""
     import cv2
 
-    from udd.tracking import Film, Glimpse, TrackError, track_in_detail
+    from udd.tracking import Film, TrackedFrame, TrackError, track_in_detail
 
     film = Film(file)
     if math.prod(film.size) > limits.PIXELS:
@@ -127,7 +127,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
     tell({"say": "looking over the film"})
     last = 0.0
 
-    def watch(seen: Glimpse) -> None:
+    def watch(seen: TrackedFrame) -> None:
         nonlocal last
         now = time.monotonic()
         if seen.frames > limits.FRAMES:
@@ -153,9 +153,9 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """A film of a run of the page."""
     from udd.film import render
-    from udd.trajectory import integrated
+    from udd.simulation.trajectory import integrated
 
-    from .runs import RATE, times_of
+    from .growing_run import RATE, times_of
     from .spec import start_of
 
     start, seconds = start_of(asked["start"]), float(asked["seconds"])

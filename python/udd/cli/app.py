@@ -8,8 +8,8 @@ from typing import Any
 
 from udd.errors import UddError
 
-from .answer import Answer
 from .options import new
+from .output import CommandResult
 
 _PORT = 8765
 
@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--no-browser", action="store_true", help="print the link, open nothing")
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     from udd.app.serving import serve
 
@@ -48,4 +48,4 @@ def run(args: argparse.Namespace) -> Answer:
         print("Ctrl-C ends it.", file=sys.stderr, flush=True)
 
     serve(args.host, args.port, fragment=fragment, browser=not args.no_browser, ready=ready)
-    return Answer("", {})
+    return CommandResult("", {})

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning, ModelError, UddError
 
-from .answer import Answer, watched
-from .chosen import add_models, add_runs, axis_of, model_of, runs_of, starts_of
+from .export import PICTURES, add_out, checked, save
+from .model_options import add_models, add_runs, axis_of, model_of, runs_of, starts_of
 from .options import new
-from .saving import PICTURES, add_out, checked, save
+from .output import CommandResult, is_terminal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,9 +39,9 @@ def add(commands: Any) -> None:
     add_models(parser)
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is kept."""
-    from udd.branching import basins
+    from udd.attractors import basins
     from udd.plot import basins as draw
 
     checked(args.out)
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> Answer:
             model_of(args, {}),
             grid,
             state0=None if starts is None else starts[0],
-            progress=watched(),
+            progress=is_terminal(),
             **runs_of(args),
             partial=True,
         )
@@ -72,12 +72,12 @@ def run(args: argparse.Namespace) -> Answer:
     for one in data["attractors"]:
         if one["number"] in cycles:
             one["cycle"] = cycles[one["number"]]
-    return Answer(_text(data), data, 130 if stopped else 0)
+    return CommandResult(_text(data), data, 130 if stopped else 0)
 
 
 def _cycles(model: Model, found: xr.Dataset) -> dict[int, dict[str, Any]]:
     """The cycle of each attractor that is one."""
-    from udd.structure import periodic_orbit
+    from udd.bifurcations import periodic_orbit
 
     cycles = {}
     for k in found["number"].to_numpy():

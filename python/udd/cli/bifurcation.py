@@ -8,10 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning
 
-from .answer import Answer, watched
-from .chosen import add_models, add_runs, axis_of, check_component, model_of, runs_of, starts_of
+from .export import add_out, checked, save
+from .model_options import (
+    add_models,
+    add_runs,
+    axis_of,
+    check_component,
+    model_of,
+    runs_of,
+    starts_of,
+)
 from .options import new
-from .saving import add_out, checked, save
+from .output import CommandResult, is_terminal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,9 +49,9 @@ def add(commands: Any) -> None:
     add_models(parser)
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is kept."""
-    from udd.branching import bifurcation
+    from udd.attractors import bifurcation
     from udd.plot import bifurcation as draw
 
     checked(args.out)
@@ -58,7 +66,7 @@ def run(args: argparse.Namespace) -> Answer:
             values,
             starts=starts_of(args),
             path=args.path,
-            progress=watched(),
+            progress=is_terminal(),
             **runs_of(args),
             partial=True,
         )
@@ -67,7 +75,7 @@ def run(args: argparse.Namespace) -> Answer:
     save(args.out, found, lambda ax: draw(found, ax, component=args.component))
     stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
     data = {**summary_of(found), "complete": not stopped, "files": args.out}
-    return Answer(_text(found, data), data, 130 if stopped else 0)
+    return CommandResult(_text(found, data), data, 130 if stopped else 0)
 
 
 def summary_of(found: xr.Dataset) -> dict[str, Any]:

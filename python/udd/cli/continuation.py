@@ -6,18 +6,19 @@ import argparse
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from udd._util.json_output import as_json
 from udd.errors import ModelError, UddError
 
-from .answer import Answer, as_json, telling
-from .chosen import add_models, check_component, model_of
+from .export import add_out, checked, save_picture
+from .model_options import add_models, check_component, model_of
 from .options import new, numbers
-from .saving import add_out, checked, save_picture
+from .output import CommandResult, status_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from udd.bifurcations import BifurcationPoint, Branch, Equilibrium, PeriodicOrbit
     from udd.models import Model
-    from udd.structure import BifurcationPoint, Branch, Equilibrium, PeriodicOrbit
 
 
 _DATA = (".json",)
@@ -59,7 +60,7 @@ def add(commands: Any) -> None:
     add_models(parser)
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     checked(args.out, _DATA)
     if not args.first < args.last:
@@ -83,12 +84,12 @@ def run(args: argparse.Namespace) -> Answer:
         lines.append(said)
     _save(args, branches, data)
     data["files"] = args.out
-    return Answer("\n".join([*lines, *(f"written: {path}" for path in args.out)]), data)
+    return CommandResult("\n".join([*lines, *(f"written: {path}" for path in args.out)]), data)
 
 
 def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
-    from udd.structure import continuation, equilibria, periodic_orbit
-    from udd.structure.diagrams import descendants
+    from udd.bifurcations import continuation, equilibria, periodic_orbit
+    from udd.bifurcations.branch_diagram import descendants
 
     bounds = (args.first, args.last)
     starts: list[Equilibrium | PeriodicOrbit] = []
@@ -111,7 +112,7 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
     def missed(point: BifurcationPoint, error: ModelError) -> None:
         warnings.warn(f"{point.parameter} = {point.value:.10g}: {error}", stacklevel=2)
 
-    with telling() as tell:
+    with status_line() as tell:
         return descendants(
             branches,
             args.born,
@@ -131,7 +132,7 @@ def _period(text: str | None) -> float | str | None:
 
 
 def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str, Any], str]:
-    from udd.structure import cascade
+    from udd.bifurcations import cascade
 
     points = [point for branch in branches for point in branch.points]
     ways = [p for p in points if p.kind == "period doubling"] or [
@@ -168,7 +169,7 @@ def _text(branch: Branch) -> str:
 
 
 def _save(args: argparse.Namespace, branches: list[Branch], data: dict[str, Any]) -> None:
-    from udd.files import write_whole
+    from udd._util.atomic_files import write_whole
 
     def draw(ax: Axes) -> None:
         from udd.plot import branches as draw_branches

@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .answer import Answer, telling, watched
 from .discover import describe
 from .options import new
+from .output import CommandResult, is_terminal, status_line
 
 
 def add(commands: Any) -> None:
@@ -21,12 +21,12 @@ def add(commands: Any) -> None:
     parser.add_argument("--null", action="store_true", help="the film of a disk that lacks nothing")
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
-    from udd.demo import demo
+    from udd.demo.pipeline import demo
 
-    with telling() as tell:
-        made = demo(args.out, null=args.null, progress=tell, bar=watched())
+    with status_line() as tell:
+        made = demo(args.out, null=args.null, progress=tell, bar=is_terminal())
     text = f"{describe(made.discovery)}\nmeasurement: {made.measurement}\nreport: {made.report}"
     data = {"measurement": made.measurement, "report": made.report, **made.discovery.to_dict()}
-    return Answer(text, data)
+    return CommandResult(text, data)

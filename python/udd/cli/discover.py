@@ -9,13 +9,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from udd import _beside
+from udd._util import background_import
 
-from .answer import Answer, telling
+from .export import OutputFile
 from .fit import options
 from .inputs import add_input, check_early, inputs_of
 from .options import new
-from .saving import OutputFile
+from .output import CommandResult, status_line
 
 if TYPE_CHECKING:
     from udd.discovery import Discovery
@@ -41,7 +41,7 @@ def add(commands: Any) -> None:
     )
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     # Modules, fits and figures are many objects that stay: to search them for garbage takes a second.
     gc.set_threshold(100_000, 20, 100)
@@ -50,10 +50,10 @@ def run(args: argparse.Namespace) -> Answer:
     check_early(args)
     given = inputs_of(args)
     if args.report is not None:
-        _beside.importing(
+        background_import.importing(
             "matplotlib.figure", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_agg"
         )
-    with telling() as tell:
+    with status_line() as tell:
         found = discover(*given.measured, budget=args.budget, progress=tell, **options(args))
         if args.report is not None:
             tell("writing the report")
@@ -64,19 +64,19 @@ def run(args: argparse.Namespace) -> Answer:
     if args.report is not None:
         text += f"\nreport: {args.report}"
         data["report"] = args.report
-    return Answer(text, data)
+    return CommandResult(text, data)
 
 
 def describe(found: Discovery) -> str:
     """A discovery in a few lines, the verdict first."""
-    from udd.report import words
+    from udd.report import wording
 
-    numbers = words.headline(found)
-    lines = [f"{found.verdict}: {words.verdict(found)}"]
+    numbers = wording.headline(found)
+    lines = [f"{found.verdict}: {wording.verdict(found)}"]
     lines += [f"  remark: {plain(remark)}" for remark in found.remarks]
     for effect in found.effects:
         unit = {p.name: p.unit for p in effect.effect.spec.parameters}
-        is_spline = words.is_spline(effect.effect)
+        is_spline = wording.is_spline(effect.effect)
         values = ", ".join(
             " ".join(filter(None, [f"{name} = {_with_error(value, effect.errors.get(name))}", unit[name]]))
             for name, value in effect.parameters.items()
@@ -88,11 +88,11 @@ def describe(found: Discovery) -> str:
         lines.append(f"  ratio {numbers.ratio}, 95 % interval {numbers.interval}")
     else:
         lines.append(f"  held-out error {span}: {numbers.before}")
-    lines += [f"  nearest: {plain(sentence)}" for sentence in words.refused(found)]
+    lines += [f"  nearest: {plain(sentence)}" for sentence in wording.refused(found)]
     lines.append(f"  noise floor after {at}: {numbers.floor}")
-    lines.append(f"  noise: {words.noise(found)}")
+    lines.append(f"  noise: {wording.noise(found)}")
     for other in found.alternatives:
-        lines.append(f"  could equally be {other.title}: {other.effect.expression}. {words.limit(other)}")
+        lines.append(f"  could equally be {other.title}: {other.effect.expression}. {wording.limit(other)}")
     if found.hint is not None:
         lines.append(f"  to tell: {found.hint.text}")
     return "\n".join(lines)

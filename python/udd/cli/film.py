@@ -9,9 +9,9 @@ from typing import Any
 
 from udd.errors import UddError
 
-from .answer import Answer, watched
+from .export import OutputFile
 from .options import disk, new
-from .saving import OutputFile
+from .output import CommandResult, is_terminal
 from .simulate import add_run, run_model
 
 _STEP = 0.005  # s between samples of the run, short enough for the camera
@@ -43,10 +43,10 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     from udd.film import render
-    from udd.film.encoding import checked_path, require_video
+    from udd.video.writer import checked_path, require_video
 
     if args.W is None:
         raise UddError("say the drive speed with --W in m/s (--W 0 where the wheels stand still)")
@@ -70,12 +70,12 @@ def run(args: argparse.Namespace) -> Answer:
         codec=args.codec,
         defects=defects,
         seed=args.seed,
-        progress=watched(),
+        progress=is_terminal(),
     )
     left = ", until the disk leaves the wheels" if trajectory.outcome == "ejected" else ""
     text = f"{made.path}: {len(made.t)} frames, {made.t[-1]:.2f} s{left}"
     data = {"file": made.path, "frames": len(made.t), "outcome": trajectory.outcome, "model": repr(model)}
-    return Answer(text, data)
+    return CommandResult(text, data)
 
 
 def _defects(given: list[str]) -> Any:

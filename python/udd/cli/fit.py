@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from .answer import Answer, telling
 from .inputs import add_input, check_early, inputs_of, start_of
 from .options import new
+from .output import CommandResult, status_line
 
 
 def add(commands: Any) -> None:
@@ -21,20 +21,20 @@ def add(commands: Any) -> None:
     )
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     from udd.fitting import fit
 
     check_early(args)
     given = inputs_of(args)
-    with telling() as tell:
+    with status_line() as tell:
         tell("fitting")
         found = fit(*given.measured, **options(args))
     if not args.budget:
-        return Answer(str(found), {**given.told, **found.to_dict()})
+        return CommandResult(str(found), {**given.told, **found.to_dict()})
     tables = found.budget()
     text = f"{found}\n\nexpanded uncertainties, and shares of the variance:\n{tables}"
-    return Answer(text, {**given.told, **found.to_dict(), **tables.to_dict()})
+    return CommandResult(text, {**given.told, **found.to_dict(), **tables.to_dict()})
 
 
 def options(args: argparse.Namespace) -> dict[str, Any]:

@@ -7,14 +7,14 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .answer import Answer, telling
+from .export import add_out, checked, save_figure
 from .fit import options
 from .inputs import add_input, check_early, inputs_of
 from .options import new
-from .saving import add_out, checked, save_figure
+from .output import CommandResult, status_line
 
 if TYPE_CHECKING:
-    from udd.forecasting import Forecast
+    from udd.fitting.forecast import Forecast
 
 _DATA = (".csv",)
 
@@ -44,17 +44,17 @@ def add(commands: Any) -> None:
     add_out(parser, _DATA)
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     from udd.fitting import fit
-    from udd.forecasting import forecast
+    from udd.fitting.forecast import forecast
 
     check_early(args)
     checked(args.out, _DATA)
     given = inputs_of(args)
     measurement, model = given.measured
     known = measurement if args.start is None else measurement.rows(measurement.t <= args.start)
-    with telling() as tell:
+    with status_line() as tell:
         tell("fitting")
         fitted = fit(known, model, **options(args))
         tell("running the ensemble")
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> Answer:
     for path in args.out:
         _write(path, found)
     text = "\n".join([describe(found), *(f"written: {path}" for path in args.out)])
-    return Answer(text, {**given.told, **found.to_dict(), "files": args.out})
+    return CommandResult(text, {**given.told, **found.to_dict(), "files": args.out})
 
 
 def describe(found: Forecast) -> str:
@@ -102,7 +102,7 @@ def describe(found: Forecast) -> str:
 
 
 def _write(path: Path, found: Forecast) -> None:
-    from udd.files import write_whole
+    from udd._util.atomic_files import write_whole
 
     if path.suffix == ".csv":
         write_whole(path, _csv(found).encode())

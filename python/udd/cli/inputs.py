@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
-from .answer import watched
 from .options import add_disk, add_pendulum, disk, pendulum
+from .output import is_terminal
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -143,7 +143,7 @@ def tracked(args: argparse.Namespace, radius: float | None, **options: Any) -> M
     """Track a film; one that is cut off is refused, unless its user knows."""
     from udd.tracking import track
 
-    return whole(args, lambda: track(args.file, disk_radius=radius, progress=watched(), **options))
+    return whole(args, lambda: track(args.file, disk_radius=radius, progress=is_terminal(), **options))
 
 
 def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measurement:
@@ -184,7 +184,7 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
 
 def own_model(args: argparse.Namespace) -> Model:
     """The user's own model, from its file."""
-    from udd.sweeping.models_json import model_from_dict
+    from udd.models.serialization import model_from_dict
 
     if args.pendulum is not None or args.W is not None:
         raise UddError("--model says everything of the model: --pendulum and --W do not apply")

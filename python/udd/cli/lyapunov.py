@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 from udd.errors import ConvergenceWarning, IntegrationError, UddError
 
-from .answer import Answer, watched
 from .options import new
+from .output import CommandResult, is_terminal
 
 _LARGEST = ("w", "lambda_1", "standard_error")
 _SPECTRUM = (
@@ -60,7 +60,7 @@ def add(commands: Any) -> None:
     )
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is kept."""
     from tqdm import tqdm
 
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> Answer:
     stopped = False
     if not args.json:
         print(",".join(head), flush=True)
-    with tqdm(total=len(drives), unit="w", disable=not watched() or len(drives) == 1, leave=False) as bar:
+    with tqdm(total=len(drives), unit="w", disable=not is_terminal() or len(drives) == 1, leave=False) as bar:
         try:
             for found in portions(drives, args):
                 rows += found
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> Answer:
             dict(zip(head, row.cells, strict=True)) for row in rows
         ],
     }
-    return Answer("", data, 130 if stopped else 0)
+    return CommandResult("", data, 130 if stopped else 0)
 
 
 def _drives(args: argparse.Namespace) -> list[float]:
@@ -112,7 +112,7 @@ def _drives(args: argparse.Namespace) -> list[float]:
 
 
 def _check(args: argparse.Namespace, drives: list[float]) -> None:
-    from udd._validate import number
+    from udd._util.validation import number
     from udd.models import DLE
 
     for w in drives:
@@ -128,7 +128,7 @@ def _exponents(drives: list[float], args: argparse.Namespace) -> Iterator[list[_
     `udd.lyapunov` would take all at once, but gives nothing before the end, and on Ctrl-C nothing at all.
     Here a portion has a packet of orbits for each core at first, and grows while it takes less than a second.
     """
-    from udd.exponents import PORTION, lyapunov
+    from udd.chaos.largest_exponent import PORTION, lyapunov
 
     first, size = 0, 8 * (os.cpu_count() or 1)
     while first < len(drives):
@@ -148,8 +148,8 @@ def _exponents(drives: list[float], args: argparse.Namespace) -> Iterator[list[_
 
 def _spectra(drives: list[float], args: argparse.Namespace) -> Iterator[list[_Row]]:
     """All exponents, drive by drive."""
+    from udd.chaos.spectrum import lyapunov_spectrum
     from udd.models import DLE
-    from udd.spectra import lyapunov_spectrum
 
     for w in drives:
         try:

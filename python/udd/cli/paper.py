@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .answer import Answer, telling
 from .options import new
+from .output import CommandResult, status_line
 
 
 def add(commands: Any) -> None:
@@ -29,15 +29,15 @@ def add(commands: Any) -> None:
     parser.add_argument("--list", action="store_true", help="only say which figures and claims there are")
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     from udd.paper import CLAIMS, FIGURES, reproduce
 
     if args.list:
         rows = [f"{one.key:28} {one.paper}: {one.title}" for one in FIGURES.values()]
         rows += [f"{one.key:28} {one.place}: {one.says}" for one in CLAIMS.values()]
-        return Answer("\n".join(rows), {"figures": list(FIGURES), "claims": list(CLAIMS)})
-    with telling() as tell:
+        return CommandResult("\n".join(rows), {"figures": list(FIGURES), "claims": list(CLAIMS)})
+    with status_line() as tell:
         made = reproduce(args.out, only=args.only, films=not args.no_films, progress=tell)
     lines = [f"{one.verdict.verdict:20} {one.claim.says}" for one in made.claims]
     if made.left_out:
@@ -63,4 +63,4 @@ def run(args: argparse.Namespace) -> Answer:
             for one in made.claims
         ],
     }
-    return Answer(text, data)
+    return CommandResult(text, data)

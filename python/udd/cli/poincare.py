@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning, UddError
 
-from .answer import Answer
-from .chosen import add_models, check_component, check_count, model_of
+from .export import OutputFile, checked, save_figure
+from .model_options import add_models, check_component, check_count, model_of
 from .options import new, numbers
-from .saving import OutputFile, checked, save_figure
+from .output import CommandResult
 
 if TYPE_CHECKING:
-    from udd.sections import Section
+    from udd.chaos.poincare_sections import Section
 
 
 def add(commands: Any) -> None:
@@ -54,12 +54,12 @@ def add(commands: Any) -> None:
     add_models(parser)
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is kept."""
-    from udd.files import write_whole
+    from udd._util.atomic_files import write_whole
+    from udd.chaos.poincare_sections import poincare
     from udd.plot import poincare as draw
     from udd.plot import return_map
-    from udd.sections import poincare
 
     _check(args)
     model = model_of(args, {})
@@ -109,7 +109,7 @@ def run(args: argparse.Namespace) -> Answer:
     if files and not args.json:
         for path in files:
             print(f"written: {path}", file=sys.stderr)
-    return Answer(table if args.out is None else "", data, 130 if stopped else 0)
+    return CommandResult(table if args.out is None else "", data, 130 if stopped else 0)
 
 
 def _mean_gap(found: Section) -> float:

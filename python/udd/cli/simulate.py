@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
-from .answer import Answer
+from .export import OutputFile
 from .options import add_disk, add_pendulum, disk, new, numbers, pendulum
-from .saving import OutputFile
+from .output import CommandResult
 
 if TYPE_CHECKING:
     from udd.models import Model
-    from udd.trajectory import Trajectory
+    from udd.simulation.trajectory import Trajectory
 
 _START = {"disk": [0.0, 1e-3, 0.04, 0.0], "dle": [1.0, 1.0, 0.01], "pendulum": [0.0, 0.5]}
 _MOST = 10_000_000  # rows
@@ -51,7 +51,7 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     model = _model(args)
     result = run_model(model, args, args.dt, args.rtol, args.atol)
@@ -68,14 +68,16 @@ def run(args: argparse.Namespace) -> Answer:
         "stats": result.stats._asdict(),
     }
     if args.out is not None:
-        from udd.files import write_whole
+        from udd._util.atomic_files import write_whole
 
         write_whole(args.out, "".join(_csv(result)).encode())
-        return Answer(f"{text}\nwritten: {args.out}", {**data, "end": result.state[-1], "file": args.out})
+        return CommandResult(
+            f"{text}\nwritten: {args.out}", {**data, "end": result.state[-1], "file": args.out}
+        )
     if not args.json:
         sys.stdout.writelines(_csv(result))
         print(f"udd: {text}", file=sys.stderr)
-    return Answer("", {**data, "state_names": names, "t": result.t, "state": result.state})
+    return CommandResult("", {**data, "state_names": names, "t": result.t, "state": result.state})
 
 
 def run_model(
@@ -89,8 +91,8 @@ def run_model(
     """Run a model for ``args.t`` from ``args.state``, with a row every `dt`."""
     import numpy as np
 
-    from udd._validate import number
-    from udd.trajectory import integrated
+    from udd._util.validation import number
+    from udd.simulation.trajectory import integrated
 
     length, step = number("--t", args.t, above=0.0), number("--dt", dt, above=0.0)
     rows = int(length / step + 1e-9) + 1

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning, UddError
 
-from .answer import Answer, watched
 from .options import new
+from .output import CommandResult, is_terminal
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from udd.sweeping import SweepSpec
+    from udd.sweeps import SweepSpec
 
 _EXAMPLE = """\
 A spec in TOML, of the exponents at 1000 drives:
@@ -45,24 +45,24 @@ def add(commands: Any) -> None:
     )
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is in the store."""
-    from udd.sweeping import SweepSpec, sweep
+    from udd.sweeps import SweepSpec, sweep
 
     spec = SweepSpec.read(args.spec)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         if args.dask is None:
-            found = sweep(spec, store=args.store, progress=watched(), partial=True)
+            found = sweep(spec, store=args.store, progress=is_terminal(), partial=True)
         else:
             with _client(args.dask) as client:
-                found = sweep(spec, client.get_executor(), args.store, progress=watched(), partial=True)
+                found = sweep(spec, client.get_executor(), args.store, progress=is_terminal(), partial=True)
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
     unfinished = [w.message for w in said if isinstance(w.message, IncompleteWarning)]
     data = {**_counted(found), "complete": not unfinished, "store": args.store, "spec_sha256": spec.sha256}
     code = 0 if not unfinished else 130 if unfinished[0].interrupted else 1
-    return Answer(_text(spec, data), data, code)
+    return CommandResult(_text(spec, data), data, code)
 
 
 def _counted(found: xr.Dataset) -> dict[str, Any]:

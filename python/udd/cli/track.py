@@ -9,13 +9,13 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from udd._util.atomic_files import require_writable
 from udd.errors import UddError
-from udd.files import require_writable
 
-from .answer import Answer, watched
+from .export import OutputFile
 from .inputs import add_partial, is_film, whole
 from .options import new, numbers
-from .saving import OutputFile
+from .output import CommandResult, is_terminal
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -113,9 +113,9 @@ def add(commands: Any) -> None:
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
 
 
-def run(args: argparse.Namespace) -> Answer:
+def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
-    from udd._validate import number
+    from udd._util.validation import number
 
     _check_source(args)
     if args.slip is not None and not args.smooth:
@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> Answer:
     options = _options(args)
     said, before = ("", {}) if args.camera is None else _record(args)
     if args.click is not None:
-        from .clicking import clicked
+        from .track_click import clicked
 
         options, said, before = clicked(args, options)
     detail: list[Any] = []
@@ -156,21 +156,21 @@ def run(args: argparse.Namespace) -> Answer:
         data["page"] = args.page
     if args.out is not None:
         m.to_csv(args.out)
-        return Answer(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
+        return CommandResult(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
     if not args.json:
         with tempfile.TemporaryDirectory() as folder:
             table = Path(folder) / "table.csv"
             m.to_csv(table)
             sys.stdout.write(table.read_text(encoding="utf-8"))
         print(f"udd: {text}", file=sys.stderr)
-    return Answer("", data)
+    return CommandResult("", data)
 
 
 def _check_source(args: argparse.Namespace) -> None:
     if args.distance is not None and args.click is None:
         raise UddError("--distance is an option of --click")
     if args.click is not None:
-        from .clicking import check
+        from .track_click import check
 
         check(args)
     if args.camera is None:
@@ -190,7 +190,7 @@ def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
     from udd.tracking import record
 
     seconds = 20.0 if args.seconds is None else args.seconds
-    made = record(args.film, camera=args.camera, seconds=seconds, progress=watched())
+    made = record(args.film, camera=args.camera, seconds=seconds, progress=is_terminal())
     args.file = made.path
     told = {"frames": len(made.t), "lost": made.lost, "gaps_s": made.gaps, "clock": made.clock}
     return f"{made}\nwritten: {made.path}\n", {"recording": {**told, "film": made.path}}
@@ -219,9 +219,9 @@ def _tracked(
     """Track the film; what was found on the way comes into `detail`."""
 
     def measure() -> Measurement:
-        from udd.tracking.run import Tracking, track_whole
+        from udd.tracking.pipeline import Tracking, run_tracker
 
-        found = track_whole(args.file, progress=watched(), disk_radius=args.disk_radius, **options)
+        found = run_tracker(args.file, progress=is_terminal(), disk_radius=args.disk_radius, **options)
         if not isinstance(found, Tracking):
             return found
         if detail is not None:
@@ -231,7 +231,7 @@ def _tracked(
     m = whole(args, measure)
     if not args.smooth:
         return m
-    from udd.smoothing import smooth
+    from udd.measurement.smoother import smooth
 
     return smooth(m, slip=args.slip)
 
@@ -286,7 +286,7 @@ def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
     return text, data
 
 
-def _folder(args: argparse.Namespace) -> Answer:
+def _folder(args: argparse.Namespace) -> CommandResult:
     """Track all films of a folder; one that cannot be tracked does not stop the others."""
     films = sorted(path for path in args.file.iterdir() if path.is_file() and is_film(path))
     if not films:
@@ -317,4 +317,4 @@ def _folder(args: argparse.Namespace) -> Answer:
             f"{film.name}: {text}" + (f"; drive {100 * drive:.3f} cm/s" if drive is not None else "")
         )
         rows.append({"film": film.name, "file": table, **data})
-    return Answer("\n".join(lines), {"films": rows, "failed": failed}, 1 if failed else 0)
+    return CommandResult("\n".join(lines), {"films": rows, "failed": failed}, 1 if failed else 0)

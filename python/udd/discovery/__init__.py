@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from udd.discovery.scoring.score_scan import Scored
+from udd.discovery.validation.held_out_errors import Errors
+
 from .discover import discover
-from .heldout import Errors
-from .hint import Hint
-from .pruning import Pruned, prune
-from .results import Alternative, Discovery, Found, Refused
-from .scan import Scored
+from .experiment_design import NextExperiment
+from .results import AddedEffect, Alternative, Discovery, RejectedEffect
+from .term_elimination import Pruned, prune
 
 __all__ = [
+    "AddedEffect",
     "Alternative",
     "Discovery",
     "Errors",
-    "Found",
-    "Hint",
+    "NextExperiment",
     "Pruned",
-    "Refused",
+    "RejectedEffect",
     "Scored",
     "discover",
     "prune",

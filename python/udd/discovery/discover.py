@@ -7,33 +7,41 @@ from typing import Any
 
 import numpy as np
 
-from udd import _beside
-from udd._expressions import Expression
+from udd._util import background_import
+from udd._util.expressions import Expression
+from udd._util.parallel import parallel_map
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.term_library import given_terms
+from udd.discovery.thresholds import SAME
+from udd.discovery.validation.camera_faults import camera_shows
+from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
+from udd.discovery.validation.sensor_drift import FORETELLS, as_random
 from udd.effects import Effect
-from udd.effects.own import is_spline
+from udd.effects.user_defined import is_spline
 from udd.errors import FitError
-from udd.fitting import UNEXPLAINED, Fit, as_stated, checked_units, fit_record, ran_away, record_of, refit
+from udd.fitting import (
+    UNEXPLAINED,
+    Fit,
+    as_stated,
+    checked_units,
+    fit_record,
+    ran_away,
+    record_of,
+    refit,
+)
 from udd.fitting.thinning import Thinned, thinned
+from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
 from udd.measurement.table import ANGLES
 from udd.models import Model
-from udd.own_models import OwnModel
+from udd.models.formula_model import FormulaModel
 
-from .camera import camera_shows
-from .candidates import Candidate
-from .clock import Clock, TimeUpError
-from .drift import FORETELLS, as_random
-from .heldout import lacks_more, misses_the_motion, pace
-from .results import Discovery, Found, Refused
-from .search import Search, State, Step
-from .terms import given_terms
-from .together import together
+from .results import AddedEffect, Discovery, RejectedEffect
+from .search import Search, SearchState, Step
+from .time_budget import Clock, TimeUpError
 
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
-#: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
-#: one drive.
-SAME = 0.9999
 _SHORTEST = 20  # frames: of fewer the first part determines no model and the rest tests none
 
 
@@ -127,18 +135,18 @@ def discover(
     options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
 
     clock.finish("fitting the known model")
-    _beside.importing("scipy.stats", "pyoperon.sklearn")
+    background_import.importing("scipy.stats", "pyoperon.sklearn")
 
     def fits() -> tuple[Fit, ...]:
         parts = (record.part(train), record)
         return tuple(
-            together(lambda some: fit_record(measurement, some, model, **options, search=True), parts)
+            parallel_map(lambda some: fit_record(measurement, some, model, **options, search=True), parts)
         )
 
     base, baseline = checked_units(measurement, model, options, fits)
-    search = Search(record, ~train, clock, pace(base), given, base.problem.free)
+    search = Search(record, ~train, clock, motion_time_scale(base), given, base.problem.free)
     before = search.errors(base)
-    known = State(base, baseline, before)
+    known = SearchState(base, baseline, before)
     begin = _begin(search, known)
     end = search.run(begin, known)
     clock.finish("fitting the model as found")
@@ -153,7 +161,7 @@ def discover(
     random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
-    refused: list[Refused] = end.unconfirmed
+    refused: list[RejectedEffect] = end.unconfirmed
     stopped = end.stopped
     if unexplained and not refused and end.looks:
         try:
@@ -209,11 +217,11 @@ def _thinned(
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
     one = model if isinstance(model, Model) else next(iter(model))
-    angles = one.angles if isinstance(one, OwnModel) else ANGLES
+    angles = one.angles if isinstance(one, FormulaModel) else ANGLES
     return [thinned(own, angles) for own in some]
 
 
-def _begin(search: Search, known: State) -> State:
+def _begin(search: Search, known: SearchState) -> SearchState:
     """Where the search begins: the known model's fit, but for one whose drive or camera ran away.
 
     There a strong effect is missing, and what else could be free bends until it hides what that is.
@@ -221,8 +229,8 @@ def _begin(search: Search, known: State) -> State:
     if not (ran_away(known.part) or ran_away(known.whole)):
         return known
     try:
-        part, whole = together(as_stated, (known.part, known.whole))
-        return State(part, whole, search.errors(part))
+        part, whole = parallel_map(as_stated, (known.part, known.whole))
+        return SearchState(part, whole, search.errors(part))
     except FitError:
         return known
 
@@ -230,7 +238,7 @@ def _begin(search: Search, known: State) -> State:
 def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:
     """The user's own candidates."""
     listed = list(candidates)
-    if isinstance(model, OwnModel):
+    if isinstance(model, FormulaModel):
         return given_terms(model, listed)
     if listed:
         raise FitError(
@@ -252,14 +260,14 @@ def _title(candidate: Candidate, fitted: Effect) -> str:
     return title
 
 
-def _describe(step: Step, final: Fit) -> list[Found]:
+def _describe(step: Step, final: Fit) -> list[AddedEffect]:
     """The effects of a step, with the numbers of the fit to all data."""
     result = []
     for candidate in step.candidates:
         effect = next(e for e in final.model.effects if e.name == candidate.effect.name)
         names = {p: f"{effect.name}.{p}" for p in effect.parameters}
         result.append(
-            Found(
+            AddedEffect(
                 effect=effect,
                 title=_title(candidate, effect),
                 equation=effect.equation,

@@ -5,26 +5,20 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
+from udd.discovery.nonparametric.curve_scan import Curve
+from udd.discovery.scoring.score_scan import Scored
+from udd.discovery.validation.held_out_errors import Errors, Ratio, comparison_horizon, lacks_more
 from udd.effects import Effect
 from udd.fitting import Fit
-from udd.fitting.doubts import Missed, Reading, ran_off, rate_of, readings
+from udd.fitting.diagnostics import ModelError, Reading, ran_off, rate_of, readings
 from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
 
-from .curves import Curve
-from .heldout import Errors, Ratio, comparison_horizon, lacks_more
-from .hint import Hint, hints
-from .scan import Scored
-
-#: What bears an effect out, of data that were not fitted.
-Witness = Literal["held", "fitted", "halves"]
-#: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; a
-#: slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that fits
-#: better fails; or it passed all tests but free runs over the held-out data do not get better beyond doubt.
-Failing = Literal["chance", "drift", "part", "held", "form", "unconfirmed"]
+from .experiment_design import NextExperiment, hints
+from .thresholds import Confirmation, RejectionReason
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
@@ -33,7 +27,7 @@ def _named(ratio: Ratio) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Found:
+class AddedEffect:
     """An effect that was added, with its numbers and its evidence.
 
     Attributes
@@ -69,7 +63,7 @@ class Found:
     chi2: float
     p: float
     ratio: Ratio
-    witness: Witness
+    witness: Confirmation
     curve: Curve | None = None
     tried: str = ""
 
@@ -134,7 +128,7 @@ class Alternative:
 
 
 @dataclass(frozen=True)
-class Refused:
+class RejectedEffect:
     """An effect that lowers the held-out error of a model which lacks something, but does not pass the tests.
 
     Attributes
@@ -162,7 +156,7 @@ class Refused:
     p: float
     errors: Errors
     ratio: Ratio
-    why: Failing
+    why: RejectionReason
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -192,7 +186,7 @@ class Discovery:
         was found.
     baseline, fit : Fit
         The model without and with the added effects, each fitted to all data; the same where none was added.
-    effects : list of Found
+    effects : list of AddedEffect
         The effects that were added; empty when nothing is missing.
     alternatives : list of Alternative
         Candidates that the data cannot tell apart from the chosen ones.
@@ -209,7 +203,7 @@ class Discovery:
         How many candidates and curves each round looked at, every frequency counted.
     split : float
         Time from which the data were held out, s; of the first measurement.
-    refused : list of Refused
+    refused : list of RejectedEffect
         Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
         was not confirmed.
     thinned : list of Thinned
@@ -222,7 +216,7 @@ class Discovery:
     excused : list of str or None
         Where parameters of the camera were held and its faults would explain most of what the found model
         leaves, or a part of what was found: titles of the effects that they would explain as well.
-    random : list of Missed
+    random : list of ModelError
         The random forces that the model needs beside the effects, where such forces alone, like those of a
         support that moves, explain the data about as well: the effects are not identified then.
     """
@@ -230,7 +224,7 @@ class Discovery:
     verdict: str
     baseline: Fit
     fit: Fit
-    effects: list[Found]
+    effects: list[AddedEffect]
     alternatives: list[Alternative]
     error_before: Errors
     error_after: Errors
@@ -240,12 +234,37 @@ class Discovery:
     looks: list[int]
     split: float
     trained: Fit = field(repr=False)
-    refused: list[Refused] = field(default_factory=list)
+    refused: list[RejectedEffect] = field(default_factory=list)
     thinned: list[Thinned] = field(default_factory=list)
     budget: float | None = None
     stopped: str | None = None
     excused: list[str] | None = None
-    random: list[Missed] = field(default_factory=list)
+    random: list[ModelError] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """The verdict on one line."""
+        found = ", ".join(effect.title for effect in self.effects)
+        value, low, high = self.ratio
+        error = f"; held-out error x {value:.3g} ({low:.3g} to {high:.3g})" if found else ""
+        return f"<Discovery: {self.verdict}{': ' if found else ''}{found}{error}>"
+
+    def _repr_html_(self) -> str:
+        """The verdict's card, for notebooks."""
+        from html import escape
+
+        def numbers(effect: AddedEffect) -> str:
+            errors = ((name, value, effect.errors.get(name)) for name, value in effect.parameters.items())
+            return ", ".join(
+                f"{name} = {value:.5g}" + (f" ± {error:.2g}" if error else "")
+                for name, value, error in errors
+            )
+
+        items = "".join(
+            f"<li>{escape(e.title)}: <code>{escape(e.expression)}</code>, {escape(numbers(e))}</li>"
+            for e in self.effects
+        )
+        head, _, ratio = repr(self)[1:-1].partition("; ")
+        return f"<p><b>{escape(head)}</b></p><ul>{items}</ul><p>{escape(ratio)}</p>"
 
     @property
     def measurement(self) -> Measurement:
@@ -266,7 +285,7 @@ class Discovery:
     def noise(self) -> list[Reading]:
         """What the frames of each channel are good to, as the record shows it; of means where it was thinned.
 
-        See :class:`udd.fitting.doubts.Reading`.
+        See :class:`udd.fitting.diagnostics.Reading`.
         """
         steps = self.thinned[0].steps if self.thinned else {}
         return [replace(one, step=steps.get(one.name, one.step)) for one in readings(self.fit)]
@@ -311,12 +330,12 @@ class Discovery:
         return said
 
     @cached_property
-    def hints(self) -> list[Hint]:
+    def hints(self) -> list[NextExperiment]:
         """What could be filmed to part the forms in doubt, the best first; worked out when asked for."""
         return hints(self)
 
     @property
-    def hint(self) -> Hint | None:
+    def hint(self) -> NextExperiment | None:
         """The best of them; None where nothing is in doubt."""
         return self.hints[0] if self.hints else None
 

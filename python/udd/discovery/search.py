@@ -1,4 +1,4 @@
-"""The search for effects: score, fit the best in full, test, add, and begin again."""
+"""Stepwise search for effects: score tests, full fits, tests on held-out data."""
 
 from __future__ import annotations
 
@@ -13,19 +13,15 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from udd import _chi2
-from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, ran_away, released
-from udd.fitting.parameters import Free
-
-from .bearing import ALPHA, Pair, borne_out, same_level
-from .candidates import Candidate
-from .clock import Clock, TimeUpError
-from .curves import NATS, Curve
-from .drift import as_random, drift_gain
-from .foretelling import Foretelling
-from .formulas import Formula, formulas_for
-from .heldout import (
+from udd._util import chi_squared
+from udd._util.parallel import parallel_map
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.score_scan import Scan, Scored
+from udd.discovery.symbolic.formulas import Formula, formulas_for
+from udd.discovery.thresholds import ALPHA, Confirmation, RejectionReason
+from udd.discovery.validation.acceptance_tests import Pair, confirmed_by, same_level
+from udd.discovery.validation.held_out_errors import (
     Errors,
     Ratio,
     comparison_horizon,
@@ -34,11 +30,25 @@ from .heldout import (
     improvement,
     whole_improvement,
 )
-from .looks import Look, look_around, states_first, wider
-from .results import Alternative, Failing, Refused, Witness
-from .scan import Scan, Scored
-from .together import together
-from .trials import Trial, fitted_ones, needed_in, of_curve, of_formula, of_library, one_of_each, same_law
+from udd.discovery.validation.predictive_comparison import Foretelling
+from udd.discovery.validation.sensor_drift import as_random, drift_gain
+from udd.errors import FitError
+from udd.fitting import Fit, Record, at_level, ran_away, released
+from udd.fitting.parameters import Free
+
+from .results import Alternative, RejectedEffect
+from .score_rounds import ScoreRound, score_round, states_first, with_surfaces
+from .time_budget import Clock, TimeUpError
+from .trial_fits import (
+    TrialFit,
+    fitted_ones,
+    needed_in,
+    of_curve,
+    of_formula,
+    of_library,
+    one_of_each,
+    same_law,
+)
 
 From = TypeVar("From")
 To = TypeVar("To")
@@ -53,7 +63,9 @@ _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
-_TIED = 4 * NATS  # in chi2: forms that differ by less are compared by all data and by what they foretell
+_TIED = (
+    4 * EVIDENCE_MARGIN
+)  # in chi2: forms that differ by less are compared by all data and by what they foretell
 _FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
 _EQUALS = 10  # forms between which all data decide
 
@@ -72,7 +84,7 @@ class Step:
     ratio : tuple of float
         Cost of the held-out frames after over before, with its 95 % interval.
     witness : {"held", "fitted", "halves"}
-        What bears it out, see :func:`udd.discovery.bearing.borne_out`.
+        What bears it out, see :func:`udd.discovery.validation.acceptance_tests.confirmed_by`.
     alternatives : list of Alternative
     price : float
         What its freedom costs, in chi2; more for a formula, and for a curve, than for what physics knows.
@@ -83,13 +95,13 @@ class Step:
     chi2: float
     p: float
     ratio: Ratio
-    witness: Witness
+    witness: Confirmation
     alternatives: list[Alternative]
     price: float
 
 
 @dataclass(frozen=True)
-class State:
+class SearchState:
     """Where the search stands: fits of the first part and of all data, and held-out errors."""
 
     part: Fit
@@ -97,7 +109,9 @@ class State:
     errors: Errors
 
 
-def _cheaper(found: tuple[Step, State], steps: Sequence[Step], start: State, end: State) -> bool:
+def _cheaper(
+    found: tuple[Step, SearchState], steps: Sequence[Step], start: SearchState, end: SearchState
+) -> bool:
     """Whether one step explains the data as well as several from the same start, their freedom paid for."""
     step, state = found
     several, one = same_level(end.part, state.part)
@@ -117,7 +131,7 @@ def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tupl
     return list(zip(left, right, strict=False))
 
 
-def _chance(pair: Pair, trial: Trial, look: Look) -> tuple[float, float]:
+def _chance(pair: Pair, trial: TrialFit, look: ScoreRound) -> tuple[float, float]:
     """By how much chi2 fell from one fit of all data to another, and the probability of that by chance."""
     from scipy.stats import ncx2  # takes half a second to import
 
@@ -129,7 +143,7 @@ def _chance(pair: Pair, trial: Trial, look: Look) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Judged:
+class TestResult:
     """What the tests say of a trial.
 
     Attributes
@@ -146,7 +160,7 @@ class Judged:
     chi2: float
     p: float
     ratio: Ratio
-    witness: Witness | None
+    witness: Confirmation | None
     drifts: bool = False
 
 
@@ -161,8 +175,8 @@ class Outcome:
     whole: Fit
     errors: Errors
     accepted: list[Step]
-    looks: list[Look]
-    unconfirmed: list[Refused]
+    looks: list[ScoreRound]
+    unconfirmed: list[RejectedEffect]
     stopped: str | None = None
 
 
@@ -183,7 +197,7 @@ class Search:
 
     def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
         """Independent pieces of work side by side, as long as there is time."""
-        return together(self.clock.watched(work), pieces)
+        return parallel_map(self.clock.watched(work), pieces)
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
@@ -198,10 +212,10 @@ class Search:
             return whole_improvement(before, after)
         return improvement(before, after, comparison_horizon(before))
 
-    def run(self, begin: State, known: State | None = None) -> Outcome:
+    def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
         """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
         accepted: list[Step] = []
-        looks: list[Look] = []
+        looks: list[ScoreRound] = []
         states = [begin]
         stopped = None
         try:
@@ -213,11 +227,12 @@ class Search:
         end = states[number] if number else known or states[0]
         return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed, stopped)
 
-    def _grow(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+    def _grow(self, accepted: list[Step], states: list[SearchState], looks: list[ScoreRound]) -> None:
         """Add effects to the lists as they pass."""
+        known: set[tuple[str, ...]] = set()
         while sum(len(step.candidates) for step in accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = look_around(states[-1].part, self.given, self.clock.watched)
+            look = score_round(states[-1].part, self.given, self.clock.watched)
             looks.append(look)
             # What the library has been asked for already, and what a curve still says far more of than
             # anything in it, is no bent view of something known.
@@ -226,7 +241,7 @@ class Search:
             found = found or self._known(states[-1], look)
             if found is None:
                 self.tell("scoring surfaces over two coordinates")
-                looks[-1] = look = wider(look)
+                looks[-1] = look = with_surfaces(look)
                 found = self._located(states[-1], look, tried)
             if found is None:
                 break
@@ -234,12 +249,17 @@ class Search:
             states.append(found[1])
             self._prune(accepted, states, looks)
             states[-1] = self._released(states[-1])
+            # What takes another's place may give way to it again: then the search goes in circles.
+            titles = tuple(c.title for step in accepted for c in step.candidates)
+            if titles in known:
+                break
+            known.add(titles)
             # What no library has, and free runs contradict, is no ground to search on from.
             contradicted = self.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
             if accepted[-1].curve is not None and contradicted:
                 break
 
-    def _confirmed(self, known: State, states: list[State]) -> int:
+    def _confirmed(self, known: SearchState, states: list[SearchState]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
@@ -252,11 +272,11 @@ class Search:
                 return number
         return 0
 
-    def _unconfirmed(self, known: State, steps: list[Step], end: State) -> list[Refused]:
+    def _unconfirmed(self, known: SearchState, steps: list[Step], end: SearchState) -> list[RejectedEffect]:
         """What passed all other tests."""
         ratio = self.improvement(known.errors, end.errors)
         return [
-            Refused(
+            RejectedEffect(
                 effect=next(e for e in end.whole.model.effects if e.name == c.effect.name),
                 title=c.title,
                 chi2=step.chi2,
@@ -269,7 +289,7 @@ class Search:
             for c in step.candidates
         ]
 
-    def _released(self, state: State) -> State:
+    def _released(self, state: SearchState) -> SearchState:
         """With everything free that the user leaves free, unless that goes astray.
 
         A camera may well be farther off than is usual: held-out data that are foretold better beyond doubt
@@ -279,7 +299,7 @@ class Search:
         if all(f.name in names for f in self.free):
             return state
         try:
-            part, whole = together(partial(released, free=self.free), (state.part, state.whole))
+            part, whole = parallel_map(partial(released, free=self.free), (state.part, state.whole))
             if not (part.converged and whole.converged):
                 return state
             errors = self.errors(part)
@@ -288,9 +308,9 @@ class Search:
                 return state
         except FitError:
             return state
-        return state if self._worse(state.errors, errors) else State(part, whole, errors)
+        return state if self._worse(state.errors, errors) else SearchState(part, whole, errors)
 
-    def refused(self, base: State, look: Look) -> list[Refused]:
+    def refused(self, base: SearchState, look: ScoreRound) -> list[RejectedEffect]:
         """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
         strongest: dict[object, Scored] = {}
         for one in look.usable():
@@ -303,7 +323,7 @@ class Search:
             judged, errors = self._judged(base, trial, look), self._errors_or_none(trial.fit)
             if judged is None or errors is None:
                 continue
-            why: Failing = "form"
+            why: RejectionReason = "form"
             if judged.p >= ALPHA:
                 why = "chance"
             elif judged.drifts:
@@ -314,10 +334,10 @@ class Search:
                 why = "held"
             effect, ratio = judged.whole.model.effects[-1], self.improvement(base.errors, errors)
             title = trial.candidates[0].title
-            refused.append(Refused(effect, title, judged.chi2, judged.p, errors, ratio, why))
+            refused.append(RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why))
         return sorted((r for r in refused if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
 
-    def _known(self, current: State, look: Look) -> tuple[Step, State] | None:
+    def _known(self, current: SearchState, look: ScoreRound) -> tuple[Step, SearchState] | None:
         """The best addition of the library that passes: an effect, or some of them together.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
@@ -331,7 +351,7 @@ class Search:
         if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             # Formulas that may explain the data as well as what the library has.
             known = max(look.nats(s) for s in passing)
-            rivals = [f for f in sought.result() if curve.evidence + f.nats > known - NATS]
+            rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.kind != "disk" or any(t.formula for t in singles)):
             singles += self._pairs(current, look)
@@ -341,7 +361,9 @@ class Search:
             or self._group(current, look, 3)
         )
 
-    def _located(self, current: State, look: Look, tried: Sequence[Curve] = ()) -> tuple[Step, State] | None:
+    def _located(
+        self, current: SearchState, look: ScoreRound, tried: Sequence[Curve] = ()
+    ) -> tuple[Step, SearchState] | None:
         """The best curve or surface that passes; of some those that would have been chosen were tried."""
         faults = look.fit.faults
 
@@ -353,7 +375,7 @@ class Search:
         likely = [c for c in best(look.curves) if c.name not in known]
         return self._accept(current, self._curves(current, likely), look)
 
-    def _written(self, current: State, curve: Curve, formulas: list[Formula]) -> list[Trial]:
+    def _written(self, current: SearchState, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
         """Formulas for a curve, fitted."""
         self._trying([f.text for f in formulas])
         return fitted_ones(self._each(lambda written: of_formula(current.part, curve, written), formulas))
@@ -362,21 +384,21 @@ class Search:
         if titles:
             self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
-    def _formulas(self, current: State, curve: Curve) -> list[Formula]:
+    def _formulas(self, current: SearchState, curve: Curve) -> list[Formula]:
         part = current.part
         return formulas_for(curve, part.observations, taken=part.model.state_names).formulas[:_FORMULAS]
 
-    def _singles(self, current: State, passing: list[Scored]) -> list[Trial]:
+    def _singles(self, current: SearchState, passing: list[Scored]) -> list[TrialFit]:
         best = passing[:_TRIED]
         self._trying([s.candidate.title for s in best])
         return self._tried(current, best)
 
-    def _tried(self, current: State, some: list[Scored]) -> list[Trial]:
+    def _tried(self, current: SearchState, some: list[Scored]) -> list[TrialFit]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
         found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
-    def _pairs(self, current: State, look: Look) -> list[Trial]:
+    def _pairs(self, current: SearchState, look: ScoreRound) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
 
         One that drives where it should brake may do so because another one brakes too much.
@@ -393,12 +415,12 @@ class Search:
         pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
         self._trying([" with ".join(c.title for c in pair) for pair in pairs])
 
-        def tried(pair: list[Candidate]) -> Trial | None:
+        def tried(pair: list[Candidate]) -> TrialFit | None:
             return of_library(current.part, pair, [0.0] * sum(len(c.amplitude_names) for c in pair))
 
         return fitted_ones(self._each(tried, pairs))
 
-    def _group(self, current: State, look: Look, size: int) -> tuple[Step, State] | None:
+    def _group(self, current: SearchState, look: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
         """Several effects at once that pass only together."""
         best = look.library.groups(size)
         likely = [
@@ -406,18 +428,18 @@ class Search:
             for group, fall in best[:_TRIED]
             if len({s.candidate.effect.name for s in group}) == size
             and fall > look.fit.faults
-            and _chi2.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
+            and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
         self._trying([" with ".join(c.title for c in group) for group in likely])
 
-        def tried(group: list[Candidate]) -> Trial | None:
+        def tried(group: list[Candidate]) -> TrialFit | None:
             return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
 
         return self._accept(current, fitted_ones(self._each(tried, likely)), replace(look, looks=len(best)))
 
-    def _curves(self, current: State, likely: list[Curve]) -> list[Trial]:
+    def _curves(self, current: SearchState, likely: list[Curve]) -> list[TrialFit]:
         """The likeliest curves, as splines and by short formulas."""
-        trials: list[Trial] = []
+        trials: list[TrialFit] = []
         self._trying([curve.title for curve in likely])
         for located in fitted_ones(self._each(lambda curve: of_curve(current.part, curve), likely)):
             trials.append(located)
@@ -425,7 +447,7 @@ class Search:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))
         return trials
 
-    def _prune(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+    def _prune(self, accepted: list[Step], states: list[SearchState], looks: list[ScoreRound]) -> None:
         """Leave out effects that a later one makes needless.
 
         A wrong form of the library takes up a part of what an effect outside of it does, or of what another
@@ -446,7 +468,7 @@ class Search:
                 accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
                 return
 
-    def _leave_out(self, accepted: list[Step], states: list[State], looks: list[Look]) -> None:
+    def _leave_out(self, accepted: list[Step], states: list[SearchState], looks: list[ScoreRound]) -> None:
         """Leave out effects of the library that chance explains beside those found after them."""
         whole = states[-1].whole
         for k, step in enumerate(accepted[:-1]):
@@ -467,7 +489,9 @@ class Search:
                 states[k + 1 :], looks[k + 1 :] = [found[1]], []
                 return
 
-    def _accept(self, current: State, trials: list[Trial], look: Look) -> tuple[Step, State] | None:
+    def _accept(
+        self, current: SearchState, trials: list[TrialFit], look: ScoreRound
+    ) -> tuple[Step, SearchState] | None:
         """The best trial that passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         if not trials:
@@ -487,7 +511,7 @@ class Search:
         foretelling = Foretelling(self.record, wholes, self.unit)
         near = self._foretelling(near, costs, foretelling)
         # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * NATS):
+        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
             judged = self._judged(current, trial, look)
             if judged is None or judged.witness is None:
                 continue
@@ -504,10 +528,10 @@ class Search:
                     alternatives=others,
                     price=trial.price + trial.handicap,
                 )
-                return step, State(trial.fit, judged.whole, errors)
+                return step, SearchState(trial.fit, judged.whole, errors)
         return None
 
-    def _once(self, near: list[Trial]) -> list[Trial]:
+    def _once(self, near: list[TrialFit]) -> list[TrialFit]:
         """Without formulas that are one of the library's laws in other words."""
         known = [t for t in near if t.curve is None]
         return [
@@ -517,8 +541,8 @@ class Search:
         ]
 
     def _foretelling(
-        self, near: list[Trial], costs: dict[int, float], foretelling: Foretelling
-    ) -> list[Trial]:
+        self, near: list[TrialFit], costs: dict[int, float], foretelling: Foretelling
+    ) -> list[TrialFit]:
         """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
         best = near[0] if near else None
         for other in near[1:]:
@@ -528,8 +552,8 @@ class Search:
         return [best, *(t for t in near if t is not best)] if best else near
 
     def _costs(
-        self, current: State, near: list[Trial], unit: float, most: float
-    ) -> tuple[dict[int, float], dict[int, Trial]]:
+        self, current: SearchState, near: list[TrialFit], unit: float, most: float
+    ) -> tuple[dict[int, float], dict[int, TrialFit]]:
         """What each of several forms costs that explain the first part about as well: by all data; the fits.
 
         Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
@@ -538,7 +562,7 @@ class Search:
         if len(near) < 2:
             return {id(t): t.criterion(unit) + t.handicap for t in near if t.needed}, {}
 
-        def again(trial: Trial) -> Trial | None:
+        def again(trial: TrialFit) -> TrialFit | None:
             try:
                 return self._again(current.whole, trial)
             except FitError:
@@ -557,7 +581,7 @@ class Search:
                 continue
         return result, {id(t): w for t, w in wholes}
 
-    def _judged(self, current: State, trial: Trial, look: Look) -> Judged | None:
+    def _judged(self, current: SearchState, trial: TrialFit, look: ScoreRound) -> TestResult | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
         try:
             whole = self._again(current.whole, trial)
@@ -566,15 +590,15 @@ class Search:
             pair = same_level(current.whole, whole.fit)
             fall, p = _chance(pair, trial, look)
             ratio: Ratio = (math.nan, math.nan, math.nan)
-            witness: Witness | None = None
+            witness: Confirmation | None = None
             before, after = pair
             drifts = _DRIFT * (before.chi2 - after.chi2) / max(before.scatter, 1.0) < drift_gain(before)
             if p < ALPHA and not drifts:
                 part, rest = (current.part, trial.fit), self.record.part(self.held)
-                ratio, witness = borne_out(part, pair, rest, trial.names, self.unit)
+                ratio, witness = confirmed_by(part, pair, rest, trial.names, self.unit)
         except FitError:
             return None
-        return Judged(whole.fit, fall, p, ratio, witness, drifts)
+        return TestResult(whole.fit, fall, p, ratio, witness, drifts)
 
     def _errors_or_none(self, fitted: Fit) -> Errors | None:
         """None where the model cannot be run over the held-out frames."""
@@ -583,7 +607,7 @@ class Search:
         except FitError:
             return None
 
-    def _again(self, whole: Fit, trial: Trial) -> Trial | None:
+    def _again(self, whole: Fit, trial: TrialFit) -> TrialFit | None:
         """The same proposal fitted to all data."""
         if trial.curve is None:
             return of_library(whole, trial.candidates, trial.amplitudes)
@@ -597,7 +621,7 @@ class Search:
             improvement(before, after, h)[1] > _WORSE for h in before.horizons
         )
 
-    def _says_less(self, formula: Trial, chosen: Trial, nats: float) -> bool:
+    def _says_less(self, formula: TrialFit, chosen: TrialFit, nats: float) -> bool:
         """Whether a formula is the chosen law in other words, or has more constants for nothing."""
         return same_law(formula.compared, chosen.compared) or (
             nats > 0 and len(formula.names) > len(chosen.names)
@@ -605,8 +629,8 @@ class Search:
 
     def _alternatives(
         self,
-        chosen: Trial,
-        trials: list[Trial],
+        chosen: TrialFit,
+        trials: list[TrialFit],
         scanned: Scan,
         costs: dict[int, float],
         foretelling: Foretelling,
@@ -614,7 +638,7 @@ class Search:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
 
-        def cost(trial: Trial) -> float:  # a formula may be it as well as what was chosen
+        def cost(trial: TrialFit) -> float:  # a formula may be it as well as what was chosen
             return costs[id(trial)] - trial.handicap
 
         best = cost(chosen)
@@ -622,7 +646,7 @@ class Search:
             nats = (cost(trial) - best) / 2
             if (
                 trial is chosen
-                or nats > NATS
+                or nats > EVIDENCE_MARGIN
                 or len(trial.candidates) != len(chosen.candidates)
                 or trial.is_curve
                 or (trial.formula is not None and self._says_less(trial, chosen, nats))

@@ -25,8 +25,8 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 
-from .own import curve, formula, surface
-from .specs import Effect, Parameter, Spec, _specs, library
+from .spec import Effect, Parameter, Spec, _specs, library
+from .user_defined import curve, formula, surface
 
 __all__ = ["Effect", "Parameter", "Spec", "curve", "formula", "library", "surface"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from udd.film.defects import Defects
-from udd.film.rendering import Film, render
+from .defects import Defects
+from .rendering import Film, render
 
 __all__ = ["Defects", "Film", "render"]

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import UddError
-from udd.film.camera import Camera
-from udd.film.light import Picture
+
+from .camera import Camera
+from .light import Picture
 
 WOBBLE_PERIOD = 1.3  # s
 FLICKER_PERIOD = 0.37  # s: the beat of lamps on alternating current against the frames
@@ -161,8 +162,8 @@ def lit(light: Picture, time: float, defects: Defects) -> Picture:
 
 def hung(picture: Picture, camera: Camera, count: int, unit: float) -> Picture:
     """Hang patches in the marks' colours on the wall, of about the marks' size, never under the table."""
-    from udd.film.scene import box, over, paint
-    from udd.film.sprite import MARKS
+    from .scene import box, over, paint
+    from .sprite import MARKS
 
     random = np.random.Generator(np.random.PCG64(7))
     half = 0.5 * np.array(camera.size) / camera.scale / unit

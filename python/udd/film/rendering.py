@@ -13,23 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd.errors import UddError
-from udd.film.camera import Camera, make_camera
-from udd.film.defects import Defects, hung
-from udd.film.encoding import CODECS, checked_path, require_video, write_film
-from udd.film.exposing import Scene
-from udd.film.light import Noise, Picture, to_light
-from udd.film.motion import (
-    Array,
-    Motion,
-    TrajectoryLike,
-    checked,
-    motion_of,
-    spacing_error,
-    then_falling,
-)
-from udd.film.scene import room
-from udd.film.sprite import Patch
 from udd.measurement import Measurement
+from udd.video.writer import CODECS, checked_path, require_video, write_film
+
+from .camera import Camera, make_camera
+from .defects import Defects, hung
+from .exposure import Scene
+from .light import Noise, Picture, to_light
+from .motion import Array, Motion, TrajectoryLike, checked, motion_of, spacing_error, then_falling
+from .scene import room
+from .sprite import Patch
 
 # Farther off than this between the samples, a mark would be seen in the wrong place.
 _COARSE = 0.25  # pixels
@@ -241,8 +234,8 @@ def _patches(layout: Sequence[Mapping[str, Any]] | None, radius: float) -> list[
     """The marks of a layout as patches in units of the disk's radius."""
     if layout is None:
         return None
-    from udd.tracking.layout import read_layout
-    from udd.tracking.tags import cells_of, is_tags, read_tags
+    from udd.markers.layout import read_layout
+    from udd.markers.tags import cells_of, is_tags, read_tags
 
     side = radius / 5
     if is_tags(layout):

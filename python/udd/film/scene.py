@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.film.camera import Camera
-from udd.film.light import Picture, to_light
+from .camera import Camera
+from .light import Picture, to_light
 
 Colour = tuple[int, int, int]
 Shape = tuple[NDArray[np.float64], Colour]  # corners (n, 2) as (y, z) in m, and an sRGB colour

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.film.light import Picture, to_light
+from .light import Picture, to_light
 
 FINE = 2  # sprite pixels per picture pixel
 DISK = (232, 230, 222)
@@ -35,7 +35,7 @@ def disk_sprite(
     n is odd, so the disk's centre lies on the middle pixel. Edges are drawn from the exact distance to them,
     then blurred by `focus` (picture pixels), so that no place and no angle is favoured.
     """
-    from udd.film.scene import blurred
+    from .scene import blurred
 
     r = radius * FINE
     reach = math.ceil(r + 4 * max(focus, 0.5) * FINE) + 2

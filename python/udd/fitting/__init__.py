@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from .annealing import at_level, eased, held, loosened
 from .fit import (
     UNEXPLAINED,
     as_stated,
@@ -15,6 +14,7 @@ from .fit import (
     released,
     widened,
 )
+from .model_error_schedule import at_level, eased, held, with_larger_model_error
 from .problem import Fit, data_of
 from .record import Record, record_of
 from .solve import filtered, frame_costs, predicted, within
@@ -34,12 +34,12 @@ __all__ = [
     "fit_record",
     "frame_costs",
     "held",
-    "loosened",
     "predicted",
     "ran_away",
     "record_of",
     "refit",
     "released",
     "widened",
+    "with_larger_model_error",
     "within",
 ]

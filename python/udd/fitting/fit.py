@@ -12,11 +12,11 @@ from udd.effects import Effect
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Disk, Model, Pendulum
-from udd.own_models import OwnModel
+from udd.models.formula_model import FormulaModel
 
-from .annealing import ROUGH, rough, tighten
+from .formula_models import levels_of
+from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
 from .noise import estimated, stated
-from .own import levels_of
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
 from .record import Record, record_of
@@ -141,7 +141,7 @@ def fit_record(
     if camera is True and kind == "pendulum" and all(is_encoder(own) for own in measurements):
         camera = _PIVOT[kind][:1]  # its zero, and no perspective
     parameters = free_parameters(models, free, camera, priors, each)
-    if isinstance(models[0], OwnModel):
+    if isinstance(models[0], FormulaModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
     else:
         schedule = levels(kind)[: SEARCHED.get(kind) if search else None]
@@ -256,7 +256,7 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
     if len(models) != len(measurements):
         raise FitError(f"there are {len(measurements)} measurements but {len(models)} models")
     for own, measurement in zip(models, measurements, strict=True):
-        if not isinstance(own, OwnModel) and measurement.kind != getattr(own, "kind", None):
+        if not isinstance(own, FormulaModel) and measurement.kind != getattr(own, "kind", None):
             raise FitError(
                 f"the measurement has columns {', '.join(measurement.names)}, "
                 f"which {type(own).__name__} does not explain"
@@ -307,12 +307,12 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     shapes = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "shape"]
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
     problem = replace(problem, free=problem.free + more)
-    found = tighten(fitted.measurements, problem, point, problem.schedule[1:])
+    found = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:])
     if not shapes:
         return found
     more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
     problem = replace(problem, free=problem.free + more)
-    return tighten(fitted.measurements, problem, found.point, problem.schedule[found.level :])
+    return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[found.level :])
 
 
 def as_stated(fitted: Fit) -> Fit:
@@ -332,7 +332,7 @@ def released(fitted: Fit, free: Sequence[Free]) -> Fit:
     known = {f.name for f in free}
     added = tuple(f for f in fitted.problem.free if f.name not in known)
     problem = replace(fitted.problem, free=(*free, *added))
-    return tighten(fitted.measurements, problem, fitted.point, problem.schedule[fitted.level :])
+    return reduce_model_error(fitted.measurements, problem, fitted.point, problem.schedule[fitted.level :])
 
 
 def refit(fitted: Fit) -> Fit:
@@ -340,7 +340,7 @@ def refit(fitted: Fit) -> Fit:
 
     In a search the noise stays as the first model showed it, so that chi2 compares.
     """
-    own = isinstance(fitted.model, OwnModel)
+    own = isinstance(fitted.model, FormulaModel)
     schedule = fitted.problem.schedule if own else levels(fitted.model.kind)
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     shown, point = not _least(fitted.measurements) > 0, fitted.point
@@ -348,7 +348,7 @@ def refit(fitted: Fit) -> Fit:
         shown, problem, point = _estimate_noise(fitted.measurements, problem, point)
     if not shown:
         problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
-    result = tighten(fitted.measurements, problem, point, problem.schedule[fitted.level :])
+    result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
     return result if result.converged else fitted
 
 
@@ -364,11 +364,13 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
         problem = replace(problem, diffusion=diffusion, noise=as_stated)
         shown, problem, point = _estimate_noise(measurements, problem, point)
         if shown:
-            loose = rough(measurements, problem, point)
-            return tighten(measurements, loose.problem, _afresh(loose), problem.schedule[number + 1 :], loose)
+            loose = provisional_fit(measurements, problem, point)
+            return reduce_model_error(
+                measurements, loose.problem, _afresh(loose), problem.schedule[number + 1 :], loose
+            )
     # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
     believed = as_stated.everywhere(len(problem.record.t))
-    return tighten(measurements, replace(problem, noise=believed), first, problem.schedule)
+    return reduce_model_error(measurements, replace(problem, noise=believed), first, problem.schedule)
 
 
 def _afresh(fitted: Fit) -> Point:

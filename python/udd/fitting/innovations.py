@@ -1,4 +1,4 @@
-"""What each frame brings that the frames before it did not foretell: white noise, if the model is right."""
+"""Innovations: what each frame adds to its prediction from the frames before; white if the model is right."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from udd import _chi2, _core
+from udd import _core
+from udd._util import chi_squared
 
 from .problem import Fit
 
@@ -51,7 +52,7 @@ class Innovations:
         """Ljung and Box's statistic of every channel, and its probability for white noise."""
         rho, sd = self.autocorrelation(lags)
         q = ((rho / sd) ** 2).sum(axis=0)  # the pairs' number stands for n (n + 2)/(n - k), for gaps' sake
-        return q, _chi2.sf(q, lags)
+        return q, chi_squared.sf(q, lags)
 
 
 def innovations(fit: Fit) -> Innovations:

@@ -1,4 +1,4 @@
-"""The noise of a record, estimated from the record."""
+"""Noise of a record: scale, growth with speed, outlier weights (Huber), autocorrelation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
-from udd import _chi2
+from udd._util import chi_squared
 
 from .record import Record
 
@@ -105,12 +105,12 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     channels = seen.sum(axis=1).clip(1)
     # What is far out is judged by the typical frame: the noise may be stated wrongly.
     numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
-    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(_chi2.ppf(0.5, numbers))
-    limit = (np.sqrt(_chi2.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
+    typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi_squared.ppf(0.5, numbers))
+    limit = (np.sqrt(chi_squared.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
     # The variance comes from the frames within the limit, where honest noise would show this share of its
     # own.
-    shown = (_chi2.cdf(_chi2.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]
+    shown = (chi_squared.cdf(chi_squared.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
         use = seen[:, m] & (weight == 1.0)

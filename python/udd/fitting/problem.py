@@ -1,4 +1,4 @@
-"""What a fit solves, and what it finds."""
+"""The weighted least-squares problem of a fit, and its result."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from .record import Record
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from .budget import Budget
-    from .doubts import Doubts
+    from .diagnostics import Diagnostics
+    from .uncertainty_budget import Budget
 
 Array = NDArray[np.float64]
 
@@ -283,14 +283,14 @@ class Fit:
         return colour(self.misfit / sd, (before.misfit - self.misfit) / sd)
 
     @cached_property
-    def doubts(self) -> Doubts:
+    def doubts(self) -> Diagnostics:
         """What the fit shows of its own faults: whether something is missing, and what ran off."""
-        from .doubts import doubts
+        from .diagnostics import doubts
 
         return doubts(self)
 
     def doubted(self) -> Fit:
-        """The same with standard errors that contain what the model may miss, see :class:`Doubts`."""
+        """The same with standard errors that contain what the model may miss, see :class:`Diagnostics`."""
         factor = self.doubts.factor
         if factor == 1.0:
             return self
@@ -300,15 +300,15 @@ class Fit:
         return result
 
     def budget(self, held: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
-        """Uncertainty budget (GUM) of the fitted numbers, see :func:`udd.fitting.budget.budget`."""
-        from .budget import budget
+        """Uncertainty budget (GUM) of the fitted numbers, see :mod:`udd.fitting.uncertainty_budget`."""
+        from .uncertainty_budget import budget
 
         return budget(self, held, k)
 
     def summary(self) -> str:
         """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""
-        from .doubts import units
-        from .meanings import meaning
+        from .diagnostics import units
+        from .parameter_meanings import meaning
 
         known = units(self)
         doubts = self.doubts
@@ -320,6 +320,15 @@ class Fit:
             for name, value in self.parameters.items()
         ]
         return "\n".join([head, *doubts.sentences, *lines])
+
+    def __repr__(self) -> str:
+        """One line; :meth:`summary` says more."""
+        state = "converged" if self.converged else "NOT converged"
+        numbers = ", ".join(f"{name} = {value:.5g}" for name, value in list(self.parameters.items())[:4])
+        more = ", ..." if len(self.parameters) > 4 else ""
+        kinds = ", ".join(dict.fromkeys(type(model).__name__ for model in self.models))
+        quality = f"{state}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
+        return f"<Fit of {kinds}: {quality}; {numbers}{more}>"
 
     def _repr_html_(self) -> str:
         """As :meth:`summary`, for notebooks."""

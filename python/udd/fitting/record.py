@@ -15,9 +15,9 @@ from scipy.ndimage import maximum_filter1d
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model
-from udd.own_models import OwnModel
+from udd.models.formula_model import FormulaModel
 
-from .own import checked_start, guessed, slope, typical_noise
+from .formula_models import checked_start, guessed, slope, typical_noise
 from .sensor import frame_noise, is_encoder, lattice, moving
 
 Array = NDArray[np.float64]
@@ -148,7 +148,7 @@ def record_of(
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     if isinstance(model, Sequence):
         (model,) = model
-    own = model if isinstance(model, OwnModel) else None
+    own = model if isinstance(model, FormulaModel) else None
     start = None if state0 is None else checked_start(own, state0)
     if own and not set(measurement.names) <= set(own.state_names):
         given, wanted = ", ".join(measurement.names), ", ".join(own.state_names)

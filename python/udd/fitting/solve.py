@@ -1,4 +1,4 @@
-"""One minimum."""
+"""One Gauss-Newton minimisation for an assumed model error."""
 
 from __future__ import annotations
 

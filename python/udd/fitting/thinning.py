@@ -1,4 +1,4 @@
-"""Block averages of a record that was sampled more often than its motion and its noise need."""
+"""Block averages (decimation) of a record sampled more often than motion and noise need."""
 
 from __future__ import annotations
 

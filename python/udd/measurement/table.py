@@ -6,12 +6,16 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.labelled import dataset
 from udd.errors import UddError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 DISK = ("Y", "Z", "beta")
 PENDULUM = ("theta",)
@@ -192,6 +196,37 @@ class Measurement:
             self.names,
             {name: column[pick] for name, column in self.quality.items()},
         )
+
+    def to_xarray(self) -> xr.Dataset:
+        """The measurement as labelled arrays: each column and its ``sigma_...`` over ``t``, and ``flag``.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``to_dataframe()`` of it is a table for pandas.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.Measurement([0.0, 0.1], {"theta": [0.2, 0.1]}).to_xarray().theta.attrs
+        {'units': 'rad'}
+        """
+        units = (
+            {"Y": "m", "Z": "m", "beta": "rad", "theta": "rad", "t": "s"}
+            if self.kind != "own"
+            else {"t": "s"}
+        )
+        columns: dict[str, Any] = {name: self.values[:, k] for k, name in enumerate(self.names)}
+        if self.sigma is not None:
+            columns |= {f"sigma_{name}": self.sigma[:, k] for k, name in enumerate(self.names)}
+            units |= {f"sigma_{name}": units[name] for name in self.names if name in units}
+        if len(self.flag):
+            columns["flag"] = self.flag
+        return dataset(columns, ["t"], units, {"t": self.t})
+
+    def __repr__(self) -> str:
+        span = f", t = {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""
+        return f"<Measurement of {', '.join(self.names)}: {len(self)} rows{span}>"
 
     def with_meta(self, **changes: Any) -> Measurement:
         """The same rows with entries of `meta` replaced or added."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.files import write_whole
+from udd._util.atomic_files import write_whole
 
 from .table import Measurement, MeasurementError
 

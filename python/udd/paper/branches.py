@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 
 from udd import effects
+from udd.bifurcations import BifurcationPoint, Branch, continuation, equilibria
 from udd.models import DLE, Disk
-from udd.structure import BifurcationPoint, Branch, continuation, equilibria
 
 from . import device
 

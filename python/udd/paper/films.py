@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from udd.files import write_whole
+from udd._util.atomic_files import write_whole
 from udd.measurement import Measurement, read_measurement
 
 from . import device
@@ -77,8 +77,8 @@ def measured(name: str, folder: Path, tell: Callable[[str], None]) -> Measuremen
 
 def _make(recipe: Recipe, name: str, film: Path, table: Path, tell: Callable[[str], None]) -> None:
     from udd.film import render
+    from udd.simulation.trajectory import integrated
     from udd.tracking import track
-    from udd.trajectory import integrated
 
     t = np.arange(0.0, recipe.duration, _STEP)
     run = integrated(device.disk(recipe.W), t, recipe.start, dense=True)

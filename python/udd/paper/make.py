@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from udd._util.atomic_files import made_folder, write_whole
 from udd.errors import UddError
-from udd.files import made_folder, write_whole
 
 from . import page
-from .lab import Lab
 from .registry import CLAIMS, FIGURES, Claim, Figure, Verdict
+from .shared_films import Lab
 
 _DPI = 150
 

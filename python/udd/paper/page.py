@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from udd.pages import templates
+from udd._util.html_templates import templates
 
 from .registry import FAILS, HOLDS, REMARK
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import matplotlib.figure
 
-    from udd.paper.lab import Lab
+    from .shared_films import Lab
 
 HOLDS = "holds"
 REMARK = "holds with a remark"

@@ -6,19 +6,19 @@ results do not already hold, and no global matplotlib setting is changed.
 
 from __future__ import annotations
 
+from .attractors import basins, bifurcation
 from .branches import branches, diagram
 from .crossings import poincare, return_map
 from .curves import curve
 from .evidence import errors, evidence
-from .fan import forecast
 from .fits import misfit, residuals
+from .forecast_fan import forecast
+from .frame_overlay import overlay
 from .friction import friction
 from .geometry import geometry
-from .grid import residual_map
-from .maps import basins, bifurcation
 from .motion import orbit, phase_space, time_series
-from .picture import overlay
-from .whiten import whiteness
+from .residual_map import residual_map
+from .whiteness import whiteness
 
 __all__ = [
     "basins",

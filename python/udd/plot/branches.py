@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from udd.structure import Branch
-    from udd.structure.diagrams import Diagram
+    from udd.bifurcations import Branch
+    from udd.bifurcations.branch_diagram import Diagram
 
 Rows = list[list["NDArray[Any]"]]
 
@@ -74,7 +74,7 @@ def branches(
     >>> udd.plot.branches(branch, view="extremes").get_xlabel()
     'w'
     """
-    from udd.structure import Branch
+    from udd.bifurcations import Branch
 
     given = [result] if isinstance(result, Branch) else list(result)
     if not given or not all(isinstance(branch, Branch) for branch in given):
@@ -133,9 +133,9 @@ def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = 
     >>> udd.plot.diagram(found).get_ylabel()
     'ω [1]'
     """
-    from udd.structure.diagrams import Diagram
+    from udd.bifurcations.branch_diagram import Diagram
 
-    from .maps import bifurcation, shown_component
+    from .attractors import bifurcation, shown_component
 
     if not isinstance(result, Diagram):
         raise UddError(f"this is no diagram, which udd.diagram makes, but {type(result).__name__}")

@@ -14,7 +14,7 @@ from .style import AFTER, FAINT, MANY, SHADES, axis_of, label, new_axes, tidy
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from udd.sections import Section
+    from udd.chaos.poincare_sections import Section
 
 _TURNING = ("beta", "theta")
 _SAME = 1e-9  # a component that varies by less of its size is the same everywhere
@@ -113,7 +113,7 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
 
 
 def _checked(result: Any) -> None:
-    from udd.sections import Section
+    from udd.chaos.poincare_sections import Section
 
     if not isinstance(result, Section):
         raise UddError(f"this is no section, which udd.poincare makes, but {type(result).__name__}")

@@ -78,10 +78,10 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
 
 def threshold(discovery: Any, stage: int) -> float:
     """The chi2 that a candidate with one amplitude must reach, all candidates counted."""
-    from udd import _chi2
-    from udd.discovery.bearing import ALPHA
+    from udd._util import chi_squared
+    from udd.discovery.thresholds import ALPHA
 
-    return float(_chi2.isf(ALPHA / discovery.looks[stage], 1))
+    return float(chi_squared.isf(ALPHA / discovery.looks[stage], 1))
 
 
 def errors(discovery: Any, ax: Axes | None = None) -> Axes:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from udd._validate import number
+from udd._util.validation import number
 from udd.errors import UddError
 
 from .style import AFTER, BEFORE, FAINT, MEASURED, new_axes

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from udd.energy import angular_momentum
 from udd.errors import UddError
+from udd.simulation.energy import angular_momentum
 
 from .inputs import STATES, Motion, motions, only
 from .style import AFTER, AXES, BEFORE, FAINT, MEASURED, label, new_axes, scale, tidy

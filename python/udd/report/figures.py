@@ -14,9 +14,9 @@ from udd.plot import fits
 from udd.plot.inputs import first_film
 from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
-from . import movie, runs
+from . import animation, runs
 from .images import Image, blank, embedded, png, svg
-from .loose import loosest
+from .loose_fit import loosest
 
 if TYPE_CHECKING:
     pass
@@ -32,7 +32,7 @@ def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[
     if discovery.effects:
         loose.append(loosest(discovery.fit))
     result: dict[str, Any] = {
-        "movie": movie.side_by_side(one, film),
+        "movie": animation.side_by_side(one, film),
         "film": frames(one, film) if film is not None else None,
         "orbit": orbits(one),
         "forecast": forecast(one),

@@ -9,12 +9,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from udd._util.atomic_files import write_whole
+from udd._util.html_templates import templates
 from udd.errors import UddError
-from udd.files import write_whole
 from udd.fitting.innovations import innovations
-from udd.pages import templates
 
-from . import figures, own, tables, words
+from . import figures, formula_model, tables, wording
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -59,16 +59,18 @@ def write(
     surprises = [innovations(fit) for fit in fits]
     with ThreadPoolExecutor(1) as beside:  # what to film next is for the core, pictures are Python's
         beside.submit(lambda: discovery.hints)
-        pictures = own.draw(discovery, surprises) if of_own else figures.draw(discovery, film, surprises)
+        pictures = (
+            formula_model.draw(discovery, surprises) if of_own else figures.draw(discovery, film, surprises)
+        )
     page = template("own.html" if of_own else "page.html").render(
         d=discovery,
-        words=words,
+        words=wording,
         tables=tables,
-        own=own,
+        own=formula_model,
         pictures=pictures,
         innovations=surprises,
-        numbers=words.headline(discovery),
-        command=command or words.command(discovery, None if origin is None else Path(origin).name),
+        numbers=wording.headline(discovery),
+        command=command or wording.command(discovery, None if origin is None else Path(origin).name),
         version=version_of("udd"),
         versions=versions()[1],
         source=identity(origin),
@@ -79,7 +81,7 @@ def write(
 def template(name: str) -> Template:
     """One of the report's templates, which share their pieces and the words of these."""
     environment = templates("udd.report")
-    environment.filters["pretty"] = words.pretty
+    environment.filters["pretty"] = wording.pretty
     return environment.get_template(name)
 
 

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from udd.errors import IntegrationError
 from udd.fitting import predicted
-from udd.trajectory import Trajectory, integrated
+from udd.simulation.trajectory import Trajectory, integrated
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 from markupsafe import Markup
 
 from udd import _core
-from udd.plot.whiten import shown_lags
+from udd.plot.whiteness import shown_lags
 
-from . import words
+from . import wording
 
 
 def parameters(discovery: Any) -> list[dict[str, str]]:
@@ -38,7 +38,7 @@ def _of_film(name: str) -> str:
 
 def _knots(discovery: Any) -> set[str]:
     """The parameters of curves, which a picture shows better."""
-    curves = [e for e in discovery.fit.model.effects if words.is_spline(e)]
+    curves = [e for e in discovery.fit.model.effects if wording.is_spline(e)]
     return {f"{e.name}.{p}" for e in curves for p in e.parameters}
 
 
@@ -49,11 +49,11 @@ def _rows(discovery: Any, wanted: Any, share: tuple[str, float] = ("", 1.0)) -> 
         unit, factor = _shown(known[name]) if known[name] else share
         rows.append(
             {
-                "name": words.pretty(_base(name).split(".")[-1]),
+                "name": wording.pretty(_base(name).split(".")[-1]),
                 "meaning": _meaning(_base(name), discovery) + _of_film(name),
                 "before": _value(discovery.baseline, name, factor),
                 "after": _value(discovery.fit, name, factor),
-                "unit": words.pretty(unit),
+                "unit": wording.pretty(unit),
             }
         )
     return rows
@@ -68,10 +68,10 @@ def fixed(discovery: Any) -> list[dict[str, str]]:
             unit, factor = model.units[name], 1.0
             rows.append(
                 {
-                    "name": words.pretty(name.split(".")[-1]),
+                    "name": wording.pretty(name.split(".")[-1]),
                     "meaning": _meaning(name, discovery),
                     "value": f"{factor * value:.5g}",
-                    "unit": words.pretty(unit),
+                    "unit": wording.pretty(unit),
                 }
             )
     return rows
@@ -80,7 +80,7 @@ def fixed(discovery: Any) -> list[dict[str, str]]:
 def _value(fit: Any, name: str, factor: float) -> str:
     if name not in fit.parameters:
         return "–"
-    return words.with_error(factor * fit.parameters[name], factor * fit.errors[name])
+    return wording.with_error(factor * fit.parameters[name], factor * fit.errors[name])
 
 
 def _shown(unit: str) -> tuple[str, float]:
@@ -98,9 +98,9 @@ def _meaning(name: str, discovery: Any) -> str:
     if not dot:
         if name == "k0" and discovery.measurement.kind == "pendulum":
             return "viscous friction"
-        return words.MEANINGS.get(name, name)
+        return wording.MEANINGS.get(name, name)
     found = next((f for f in discovery.effects if f.effect.name == effect), None)
-    return f"{found.title if found else effect}: {words.pretty(parameter)}"
+    return f"{found.title if found else effect}: {wording.pretty(parameter)}"
 
 
 def units(fit: Any) -> dict[str, str]:
@@ -118,8 +118,8 @@ def measured(discovery: Any) -> Markup:
     frames = f"{len(m)} frames" + ("" if usable == len(m) else f", {usable} of them usable,")
     sd = discovery.fit.noise.sd(discovery.fit.record, discovery.fit.states[:, 0])
     each = [
-        f"{words.rough(float(np.median(own[np.isfinite(own)])), 'm' if name in ('Y', 'Z') else 'rad')} "
-        f"in {words.pretty(name)}"
+        f"{wording.rough(float(np.median(own[np.isfinite(own)])), 'm' if name in ('Y', 'Z') else 'rad')} "
+        f"in {wording.pretty(name)}"
         for name, own in zip(m.names, sd.T, strict=True)
     ]
     noise = ", ".join(each[:-1]) + (" and " if len(each) > 1 else "") + each[-1]
@@ -147,11 +147,11 @@ def whiteness(innovations: list[Any]) -> list[dict[str, str]]:
             rho, _ = found.autocorrelation(lags)
             rows.append(
                 {
-                    "name": words.pretty(name) if model == "known model" else "",
+                    "name": wording.pretty(name) if model == "known model" else "",
                     "model": model,
                     "square": f"{found.chi2[k]:.3g}",
                     "largest": f"{rho[int(np.abs(rho[:, k]).argmax()), k]:+.2f}".replace("-", "−"),
-                    "p": words.probability(float(found.ljung_box(lags)[1][k])),
+                    "p": wording.probability(float(found.ljung_box(lags)[1][k])),
                 }
             )
     return rows
@@ -166,10 +166,10 @@ def noise(fit: Any) -> list[dict[str, str]]:
         unit = "m" if name in ("Y", "Z") else "rad"
         rows.append(
             {
-                "name": words.pretty(name),
-                "found": words.length(stated * float(fit.noise.factor[k]), unit),
-                "growth": words.length(float(fit.noise.blur[k]), unit) + " per rad/s",
-                "stated": words.length(stated, unit),
+                "name": wording.pretty(name),
+                "found": wording.length(stated * float(fit.noise.factor[k]), unit),
+                "growth": wording.length(float(fit.noise.blur[k]), unit) + " per rad/s",
+                "stated": wording.length(stated, unit),
             }
         )
     return rows
@@ -186,25 +186,25 @@ def errors(discovery: Any) -> list[dict[str, str]]:
                 "horizon": f"{h:.3g} s",
                 "before": _interval(b, before.unit),
                 "after": _interval(a, after.unit),
-                "floor": words.length(a[3], after.unit),
+                "floor": wording.length(a[3], after.unit),
             }
         )
     if discovery.horizon is None:
-        whole = {key: words.length(e.whole, e.unit) for key, e in (("before", before), ("after", after))}
+        whole = {key: wording.length(e.whole, e.unit) for key, e in (("before", before), ("after", after))}
         rows.append({"horizon": "all of it (r.m.s.)", **whole, "floor": "–"})
     return rows
 
 
 def _interval(e: tuple[float, float, float, float], unit: str) -> str:
-    low, high = words.length(e[1], unit).split()[0], words.length(e[2], unit).split()[0]
-    return f"{words.length(e[0], unit)} ({low} to {high})"
+    low, high = wording.length(e[1], unit).split()[0], wording.length(e[2], unit).split()[0]
+    return f"{wording.length(e[0], unit)} ({low} to {high})"
 
 
 def curves(discovery: Any, stage: int, most: int = 6) -> list[dict[str, str]]:
     """The best of the curves that were tried."""
     scans = getattr(discovery, "curves", [])
     return [
-        {"title": c.title, "evidence": f"{c.evidence:.1f}".replace("-", "−"), "p": words.probability(c.p)}
+        {"title": c.title, "evidence": f"{c.evidence:.1f}".replace("-", "−"), "p": wording.probability(c.p)}
         for c in (scans[stage][:most] if stage < len(scans) else [])
     ]
 
@@ -224,7 +224,7 @@ def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str
                 "estimate": "–"
                 if s.absorbed
                 else Markup(", ").join(
-                    Markup("{} = {}").format(words.pretty(p), words.with_error(v, e))
+                    Markup("{} = {}").format(wording.pretty(p), wording.with_error(v, e))
                     for p, v, e in zip(s.candidate.effect.amplitudes, s.amplitudes, s.errors, strict=True)
                 ),
                 "said": "found"

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from .camera import Recording, record
-from .click import click
-from .decode import Film, TrackError
-from .glimpse import Glimpse
+from udd.tracking.calibration.config_writer import write_config
+from udd.tracking.manual.click import click
+from udd.tracking.metric.pixels_to_metres import Pixels, pixels
+from udd.video.reader import Film, TrackError
+from udd.video.webcam import Recording, record
+
 from .overlay import overlay
 from .page import page
-from .result import Pixels, pixels
-from .run import Tracking, pictures_at, pictures_between, track, track_in_detail
-from .toml import write_config
+from .pipeline import Tracking, pictures_at, pictures_between, track, track_in_detail
+from .tracked_frame import TrackedFrame
 
 __all__ = [
     "Film",
-    "Glimpse",
     "Pixels",
     "Recording",
     "TrackError",
+    "TrackedFrame",
     "Tracking",
     "click",
     "overlay",

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
-
-from .decode import Film
-from .result import Pixels, pixels
-from .rgb import rgb
+from udd.tracking.metric.pixels_to_metres import Pixels, pixels
+from udd.video.reader import Film
+from udd.video.rgb_frames import rgb
 
 FOUND, CONTACT, SAID = (0, 220, 220), (255, 0, 200), (255, 230, 0)
 FINE = 4  # bits of sub-pixel coordinates
@@ -43,7 +42,7 @@ def overlay(video: str | os.PathLike[str], measurement: Measurement, path: str |
     >>> m = udd.track("run.mp4")  # doctest: +SKIP
     >>> udd.tracking.overlay("run.mp4", m, "seen.mp4")  # doctest: +SKIP
     """
-    from udd.film.encoding import checked_path, require_video, write_film
+    from udd.video.writer import checked_path, require_video, write_film
 
     require_video()
     if "px_per_m" not in measurement.meta:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from udd.measurement import Measurement
 
-    from .run import Tracking
+    from .pipeline import Tracking
 
 
 def page(
@@ -42,6 +42,6 @@ def page(
     >>> m = udd.track("run.mp4")  # doctest: +SKIP
     >>> udd.tracking.page("run.mp4", m, "run.html")  # doctest: +SKIP
     """
-    from udd.report.tracked import write_tracked
+    from udd.report.tracking import write_tracked
 
     write_tracked(video, found, path, command=command)

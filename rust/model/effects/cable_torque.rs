@@ -1,11 +1,11 @@
 //! A cable or thread that winds up with the disk's orientation.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// A cable or thread that winds up with the disk's orientation.
 pub struct CableTorque;
 
-impl Law for CableTorque {
+impl EffectLaw for CableTorque {
     const SPEC: Spec = Spec {
         name: "cable_torque",
         title: "cable torque",
@@ -21,7 +21,7 @@ impl Law for CableTorque {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.torque += p[1] - p[0] * at.beta;
     }
 }

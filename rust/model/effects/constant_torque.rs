@@ -1,11 +1,11 @@
 //! A torque that never changes.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// A torque that never changes.
 pub struct ConstantTorque;
 
-impl Law for ConstantTorque {
+impl EffectLaw for ConstantTorque {
     const SPEC: Spec = Spec {
         name: "constant_torque",
         title: "constant torque",
@@ -18,7 +18,7 @@ impl Law for ConstantTorque {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], _at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], _at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.torque += p[0];
     }
 }

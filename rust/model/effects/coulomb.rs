@@ -1,11 +1,11 @@
 //! Dry friction of constant size. The width `eps` smooths it, so that it can be fitted.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Dry friction of constant size. The width `eps` smooths it, so that it can be fitted.
 pub struct Coulomb;
 
-impl Law for Coulomb {
+impl EffectLaw for Coulomb {
     const SPEC: Spec = Spec {
         name: "coulomb",
         title: "Coulomb friction",
@@ -23,7 +23,7 @@ impl Law for Coulomb {
     const DRY: bool = true;
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.rub(p[0], p[0], p[1], at);
     }
 }

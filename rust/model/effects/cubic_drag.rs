@@ -1,11 +1,11 @@
 //! Drag that grows with the cube of the speed.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Drag that grows with the cube of the speed.
 pub struct CubicDrag;
 
-impl Law for CubicDrag {
+impl EffectLaw for CubicDrag {
     const SPEC: Spec = Spec {
         name: "cubic_drag",
         title: "cubic drag",
@@ -18,7 +18,7 @@ impl Law for CubicDrag {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.torque -= p[0] * at.omega.square() * at.omega;
     }
 }

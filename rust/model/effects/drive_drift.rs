@@ -1,11 +1,11 @@
 //! A drive speed that drifts steadily, as on an emptying battery.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// A drive speed that drifts steadily, as on an emptying battery.
 pub struct DriveDrift;
 
-impl Law for DriveDrift {
+impl EffectLaw for DriveDrift {
     const SPEC: Spec = Spec {
         name: "drive_drift",
         title: "drive drift",
@@ -18,7 +18,7 @@ impl Law for DriveDrift {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.vertical += p[0] * at.w * at.t;
     }
 }

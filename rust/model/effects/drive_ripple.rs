@@ -1,11 +1,11 @@
 //! A drive speed that varies periodically at a frequency of its own.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// A drive speed that varies periodically at a frequency of its own.
 pub struct DriveRipple;
 
-impl Law for DriveRipple {
+impl EffectLaw for DriveRipple {
     const SPEC: Spec = Spec {
         name: "drive_ripple",
         title: "drive ripple",
@@ -22,7 +22,7 @@ impl Law for DriveRipple {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         let (sin, cos) = (p[2] * at.t).scale(std::f64::consts::TAU).sin_cos();
         slots.vertical += at.w * (p[0] * cos + p[1] * sin);
     }

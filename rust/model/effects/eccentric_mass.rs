@@ -1,11 +1,11 @@
 //! A disk whose mass is not centred: gravity's torque follows its orientation.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// A disk whose mass is not centred: gravity's torque follows its orientation.
 pub struct EccentricMass;
 
-impl Law for EccentricMass {
+impl EffectLaw for EccentricMass {
     const SPEC: Spec = Spec {
         name: "eccentric_mass",
         title: "eccentric mass",
@@ -21,7 +21,7 @@ impl Law for EccentricMass {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         let (sin, cos) = at.beta.sin_cos();
         slots.torque += p[0] * sin + p[1] * cos;
     }

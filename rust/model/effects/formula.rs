@@ -1,10 +1,10 @@
 //! An effect that a user writes as text.
 
-use super::{At, Body, Slot, Slots};
+use super::{Body, Contributions, EffectInputs, Slot};
 use crate::formula::{Binary, Expression, Leaf, Mistake, Names, Op, Unary, is_reserved};
 use crate::scalar::Scalar;
 
-/// What a formula may look at beside the time: the [`At`] by its names. The last two are a pendulum's names
+/// What a formula may look at beside the time: the [`EffectInputs`] by its names. The last two are a pendulum's names
 /// of `beta` and `R`.
 const QUANTITIES: [&str; 12] =
     ["Omega", "speed", "Y", "Z", "beta", "k", "inertia", "W", "g", "R", "theta", "length"];
@@ -126,8 +126,8 @@ impl Formula {
         &self,
         values: &[S],
         lift: &dyn Fn(S) -> A,
-        at: &At<A>,
-        slots: &mut Slots<A>,
+        at: &EffectInputs<A>,
+        slots: &mut Contributions<A>,
     ) {
         let leaf = |leaf| match leaf {
             Leaf::Number(value) => A::constant(value),
@@ -149,7 +149,7 @@ impl Formula {
     }
 }
 
-impl<S: Scalar> At<S> {
+impl<S: Scalar> EffectInputs<S> {
     /// By its place among the [`QUANTITIES`].
     #[inline(always)]
     fn quantity(&self, n: usize) -> S {

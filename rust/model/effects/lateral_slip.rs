@@ -1,11 +1,11 @@
 //! Sideways slip of the disk in proportion to the lateral offset of its centre.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// Sideways slip of the disk in proportion to the lateral offset of its centre.
 pub struct LateralSlip;
 
-impl Law for LateralSlip {
+impl EffectLaw for LateralSlip {
     const SPEC: Spec = Spec {
         name: "lateral_slip",
         title: "lateral slip",
@@ -18,7 +18,7 @@ impl Law for LateralSlip {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.lateral -= p[0] * at.y;
     }
 }

@@ -1,11 +1,11 @@
 //! A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
 pub struct LoadDrive;
 
-impl Law for LoadDrive {
+impl EffectLaw for LoadDrive {
     const SPEC: Spec = Spec {
         name: "load_drive",
         title: "load-dependent drive",
@@ -18,7 +18,7 @@ impl Law for LoadDrive {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.vertical -= p[0] * at.w * at.excess_load();
     }
 }

@@ -1,6 +1,6 @@
 //! Friction that grows with the load on the wheels: the load is the contact's force along the drive, `F = g + d^2Z/dT^2`.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Friction that grows with the load on the wheels, the hypothesis with which the paper ends.
 ///
@@ -17,11 +17,11 @@ use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
 /// the load is the weight, and nothing changes there.
 pub struct LoadFriction;
 
-impl Law for LoadFriction {
+impl EffectLaw for LoadFriction {
     const SPEC: Spec = Spec {
         name: "load_friction",
         title: "load-dependent friction",
-        equation: "k (1 + a (F/g - 1)), F = g - Z Omega^2 - Y dOmega/dT",
+        equation: "k = k_plain (1 + a (F/g - 1)), F = g - Z Omega^2 - Y dOmega/dT",
         meaning: "the friction grows with the force between the wheels and the disk",
         bodies: &[Body::Disk],
         slots: &[Slot::Friction],
@@ -30,7 +30,7 @@ impl Law for LoadFriction {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.friction += p[0] * at.k * at.excess_load();
     }
 }

@@ -5,11 +5,11 @@
 //! this file. The constructor, the fit, the list of candidates, its documentation and the generic
 //! tests follow from that. One that is known only when the program runs is a [`Formula`].
 
-mod dry;
+mod dry_friction;
 mod formula;
 mod term;
 
-pub use dry::{Contact, Dry, Treatment};
+pub use dry_friction::{Contact, Dry, FrictionModel};
 pub use formula::Formula;
 pub use term::{Effect, Source, Term};
 
@@ -17,7 +17,7 @@ use crate::scalar::Scalar;
 
 /// What an effect may look at: the state and the plain model's quantities.
 #[derive(Clone, Copy, Debug)]
-pub struct At<S> {
+pub struct EffectInputs<S> {
     /// Time, s.
     pub t: S,
     /// Angular velocity, rad/s.
@@ -44,7 +44,7 @@ pub struct At<S> {
     pub contact: Contact<S>,
 }
 
-impl<S: Scalar> At<S> {
+impl<S: Scalar> EffectInputs<S> {
     /// `F/g - 1` of the contact's force along the drive, `F = g + d^2Z/dT^2`, in the plain model.
     #[inline(always)]
     fn excess_load(&self) -> S {
@@ -56,7 +56,7 @@ impl<S: Scalar> At<S> {
 
 /// Where effects enter the equations, summed over the effects.
 #[derive(Clone, Copy, Debug)]
-pub struct Slots<S> {
+pub struct Contributions<S> {
     /// Torque per unit mass, m^2/s^2.
     pub torque: S,
     /// Adds to the friction coefficient `k`, m^2/s.
@@ -66,16 +66,16 @@ pub struct Slots<S> {
     /// Adds to the contact's vertical velocity `W_c`, m/s.
     pub vertical: S,
     /// How the effect that enters treats dry friction.
-    pub treatment: Treatment,
+    pub treatment: FrictionModel,
     /// What dry friction does beside its torque.
     pub dry: Dry<S>,
 }
 
-impl<S: Scalar> Default for Slots<S> {
+impl<S: Scalar> Default for Contributions<S> {
     #[inline]
     fn default() -> Self {
         let zero = S::zero();
-        let treatment = Treatment::Smoothed;
+        let treatment = FrictionModel::Smoothed;
         Self { torque: zero, friction: zero, lateral: zero, vertical: zero, treatment, dry: Dry::default() }
     }
 }
@@ -212,18 +212,18 @@ pub struct Spec {
 }
 
 /// A physical effect: its description and its law.
-pub trait Law {
+pub trait EffectLaw {
     const SPEC: Spec;
-    /// Whether it is dry friction, which can be [treated](Treatment) in several ways.
+    /// Whether it is dry friction, which can be [treated](FrictionModel) in several ways.
     const DRY: bool = false;
 
     /// Adds the effect, with parameters `p` in the order of the spec, to its slots.
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>);
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>);
 }
 
 /// An effect over one kind of number: a function of its own, not a part of each that has effects.
 #[inline(never)]
-fn enter<L: Law, S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+fn enter<L: EffectLaw, S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
     L::enter(p, at, slots);
 }
 
@@ -250,17 +250,17 @@ macro_rules! library {
                 match self { $(Kind::$Name => &$Name::SPEC),+ }
             }
 
-            /// Whether it is dry friction, which can be [treated](Treatment) in several ways.
+            /// Whether it is dry friction, which can be [treated](FrictionModel) in several ways.
             pub fn dry(self) -> bool {
                 match self { $(Kind::$Name => $Name::DRY),+ }
             }
 
-            fn enter<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+            fn enter<S: Scalar>(self, p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
                 match self { $(Kind::$Name => enter::<$Name, S>(p, at, slots)),+ }
             }
 
             /// The same for what moves the contact alone; the others are not compiled.
-            fn slip<S: Scalar>(self, p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+            fn slip<S: Scalar>(self, p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
                 match self {
                     $(Kind::$Name => {
                         if const { !$Name::SPEC.momenta.is_empty() } {

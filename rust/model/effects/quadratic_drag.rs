@@ -1,11 +1,11 @@
 //! Air drag that grows with the square of the speed.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Air drag that grows with the square of the speed.
 pub struct QuadraticDrag;
 
-impl Law for QuadraticDrag {
+impl EffectLaw for QuadraticDrag {
     const SPEC: Spec = Spec {
         name: "quadratic_drag",
         title: "quadratic drag",
@@ -18,7 +18,7 @@ impl Law for QuadraticDrag {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.torque -= p[0] * at.speed * at.omega;
     }
 }

@@ -1,11 +1,11 @@
 //! Friction that grows with the distance of the disk's centre from the contact.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Friction that grows with the distance of the disk's centre from the contact.
 pub struct RadialFriction;
 
-impl Law for RadialFriction {
+impl EffectLaw for RadialFriction {
     const SPEC: Spec = Spec {
         name: "radial_friction",
         title: "friction growing with the distance",
@@ -18,7 +18,7 @@ impl Law for RadialFriction {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.friction += p[0] * (at.y.square() + at.z.square());
     }
 }

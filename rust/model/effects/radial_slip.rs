@@ -1,11 +1,11 @@
 //! Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
 pub struct RadialSlip;
 
-impl Law for RadialSlip {
+impl EffectLaw for RadialSlip {
     const SPEC: Spec = Spec {
         name: "radial_slip",
         title: "slip along gravity's radial component",
@@ -18,7 +18,7 @@ impl Law for RadialSlip {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         let pull = p[0] * at.z / (at.y.square() + at.z.square() + S::constant(1e-6));
         slots.lateral -= pull * at.y;
         slots.vertical -= pull * at.z;

@@ -1,11 +1,11 @@
 //! Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
 pub struct Relaxation;
 
-impl Law for Relaxation {
+impl EffectLaw for Relaxation {
     const SPEC: Spec = Spec {
         name: "relaxation",
         title: "relaxation of the rolling constraint",
@@ -18,7 +18,7 @@ impl Law for Relaxation {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.vertical -= p[0] * at.w * at.z;
     }
 }

@@ -1,11 +1,11 @@
 //! Slip of the disk between the wheels in proportion to the height of its centre.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// Slip of the disk between the wheels in proportion to the height of its centre.
 pub struct Slip;
 
-impl Law for Slip {
+impl EffectLaw for Slip {
     const SPEC: Spec = Spec {
         name: "slip",
         title: "slip c Z",
@@ -18,7 +18,7 @@ impl Law for Slip {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.vertical -= p[0] * at.z;
     }
 }

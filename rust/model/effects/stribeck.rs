@@ -1,11 +1,11 @@
 //! Dry friction that fades with the speed over the width `fade`. The width `eps` smooths it.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Dry friction that fades with the speed over the width `fade`. The width `eps` smooths it.
 pub struct Stribeck;
 
-impl Law for Stribeck {
+impl EffectLaw for Stribeck {
     const SPEC: Spec = Spec {
         name: "stribeck",
         title: "Stribeck friction",
@@ -24,7 +24,7 @@ impl Law for Stribeck {
     const DRY: bool = true;
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         let fading = (-(at.omega / p[1]).square()).exp();
         slots.rub(p[0] * fading, p[0], p[2], at);
     }

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{At, Body, Formula, Kind, MAX_PARAMETERS, Momentum, Slot, Slots, Treatment};
+use super::{
+    Body, Contributions, EffectInputs, Formula, FrictionModel, Kind, MAX_PARAMETERS, Momentum, Slot,
+};
 use crate::model::{Parameter, parameter};
 use crate::scalar::Scalar;
 use crate::unroll::vector;
@@ -21,22 +23,22 @@ pub struct Effect {
     pub source: Source,
     /// `None` for an effect that enters through torque or friction.
     pub momentum: Option<Momentum>,
-    /// [`Treatment::Smoothed`] for all but dry friction, which has the choice.
-    pub treatment: Treatment,
+    /// [`FrictionModel::Smoothed`] for all but dry friction, which has the choice.
+    pub treatment: FrictionModel,
 }
 
 impl Effect {
     /// The effect, entering as is usual for it.
     pub fn new(kind: Kind) -> Self {
         let momentum = kind.spec().momenta.first().copied();
-        Self { source: Source::Library(kind), momentum, treatment: Treatment::Smoothed }
+        Self { source: Source::Library(kind), momentum, treatment: FrictionModel::Smoothed }
     }
 
     /// A user's own, entering with the exact equation where it moves the contact.
     pub fn formula(formula: Arc<Formula>) -> Self {
         let velocity = matches!(formula.slot(), Slot::Lateral | Slot::Vertical);
         let momentum = velocity.then_some(Momentum::Consistent);
-        Self { source: Source::Formula(formula), momentum, treatment: Treatment::Smoothed }
+        Self { source: Source::Formula(formula), momentum, treatment: FrictionModel::Smoothed }
     }
 
     /// Entering the angular momentum this way.
@@ -45,7 +47,7 @@ impl Effect {
     }
 
     /// Treating dry friction this way.
-    pub fn with_treatment(self, treatment: Treatment) -> Self {
+    pub fn with_treatment(self, treatment: FrictionModel) -> Self {
         Self { treatment, ..self }
     }
 
@@ -85,7 +87,7 @@ impl Effect {
 
 /// A law with its numbers.
 #[derive(Clone, Debug)]
-enum Law<S> {
+enum EffectLaw<S> {
     Library(Kind, [S; MAX_PARAMETERS]),
     Formula(Arc<Formula>, Vec<S>),
 }
@@ -93,9 +95,9 @@ enum Law<S> {
 /// An effect with its numbers.
 #[derive(Clone, Debug)]
 pub struct Term<S> {
-    law: Law<S>,
+    law: EffectLaw<S>,
     pub momentum: Option<Momentum>,
-    pub treatment: Treatment,
+    pub treatment: FrictionModel,
 }
 
 impl<S: Scalar> Term<S> {
@@ -108,11 +110,11 @@ impl<S: Scalar> Term<S> {
                     let count = kind.spec().parameters.len();
                     let mut padded = [S::zero(); MAX_PARAMETERS];
                     padded[..count].copy_from_slice(&values[..count]);
-                    (count, Law::Library(*kind, padded))
+                    (count, EffectLaw::Library(*kind, padded))
                 }
                 Source::Formula(formula) => {
                     let count = formula.parameters().len();
-                    (count, Law::Formula(formula.clone(), values[..count].to_vec()))
+                    (count, EffectLaw::Formula(formula.clone(), values[..count].to_vec()))
                 }
             };
             terms.push(Term { law, momentum, treatment });
@@ -123,34 +125,44 @@ impl<S: Scalar> Term<S> {
 
     /// Adds the effect to its slots, over the model's scalar or over duals of it.
     #[inline]
-    pub fn enter<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
+    pub fn enter<A: Scalar>(
+        &self,
+        lift: &impl Fn(S) -> A,
+        at: &EffectInputs<A>,
+        slots: &mut Contributions<A>,
+    ) {
         slots.treatment = self.treatment;
         match &self.law {
-            Law::Library(kind, values) => {
+            EffectLaw::Library(kind, values) => {
                 kind.enter(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
             }
-            Law::Formula(formula, values) => formula.enter(values, lift, at, slots),
+            EffectLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
         }
     }
 
     /// The same of an effect that moves the contact.
     #[inline]
-    pub fn slip<A: Scalar>(&self, lift: &impl Fn(S) -> A, at: &At<A>, slots: &mut Slots<A>) {
+    pub fn slip<A: Scalar>(
+        &self,
+        lift: &impl Fn(S) -> A,
+        at: &EffectInputs<A>,
+        slots: &mut Contributions<A>,
+    ) {
         match &self.law {
-            Law::Library(kind, values) => {
+            EffectLaw::Library(kind, values) => {
                 kind.slip(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
             }
-            Law::Formula(formula, values) => formula.enter(values, lift, at, slots),
+            EffectLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
         }
     }
 
     /// Whether it holds a body at rest.
     pub fn sticks(&self) -> bool {
-        matches!(self.treatment, Treatment::SetValued | Treatment::Karnopp)
+        matches!(self.treatment, FrictionModel::SetValued | FrictionModel::Karnopp)
     }
 
     /// Whether it takes slow sliding for rest.
     pub fn has_band(&self) -> bool {
-        self.treatment == Treatment::Karnopp
+        self.treatment == FrictionModel::Karnopp
     }
 }

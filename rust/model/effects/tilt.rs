@@ -3,12 +3,12 @@
 //! A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
 //! are one and the same: the world turned by `a`.
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// Gravity and drive that are not parallel: an angle `a` between them.
 pub struct Tilt;
 
-impl Law for Tilt {
+impl EffectLaw for Tilt {
     const SPEC: Spec = Spec {
         name: "tilt",
         title: "tilt between gravity and drive",
@@ -21,7 +21,7 @@ impl Law for Tilt {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         slots.torque += p[0] * at.g * at.z;
     }
 }

@@ -3,12 +3,12 @@
 //! A warped disk, for example, is squeezed twice per turn by the wheels that hold it. The first
 //! harmonic is an [eccentric mass](super::EccentricMass).
 
-use super::{At, Body, EffectParameter, Law, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
 
 /// A disk that is not the same all round: a torque that repeats `n` times per turn.
 pub struct UnevenDisk;
 
-impl Law for UnevenDisk {
+impl EffectLaw for UnevenDisk {
     const SPEC: Spec = Spec {
         name: "uneven_disk",
         title: "uneven disk",
@@ -25,7 +25,7 @@ impl Law for UnevenDisk {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         let (sin, cos) = (p[2] * at.beta).sin_cos();
         slots.torque += p[0] * sin + p[1] * cos;
     }

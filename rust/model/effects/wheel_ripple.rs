@@ -1,11 +1,11 @@
 //! A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 
-use super::{At, Body, EffectParameter, Law, Momentum, Scalar, Slot, Slots, Spec};
+use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
 
 /// A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 pub struct WheelRipple;
 
-impl Law for WheelRipple {
+impl EffectLaw for WheelRipple {
     const SPEC: Spec = Spec {
         name: "wheel_ripple",
         title: "drive ripple at the wheel's frequency",
@@ -22,7 +22,7 @@ impl Law for WheelRipple {
     };
 
     #[inline(always)]
-    fn enter<S: Scalar>(p: &[S], at: &At<S>, slots: &mut Slots<S>) {
+    fn enter<S: Scalar>(p: &[S], at: &EffectInputs<S>, slots: &mut Contributions<S>) {
         let (sin, cos) = (at.w * at.t / p[2]).sin_cos();
         slots.vertical += at.w * (p[0] * cos + p[1] * sin);
     }

@@ -30,7 +30,7 @@ const COS: [f64; 6] = [
 ];
 
 /// Angles from here on (2^51) are taken as zero: the next number is half a radian away.
-const FAR: f64 = 2251799813685248.0;
+const ESCAPE_BOUND: f64 = 2251799813685248.0;
 
 /// Sine and cosine of an angle in rad, together.
 ///
@@ -39,7 +39,7 @@ const FAR: f64 = 2251799813685248.0;
 #[inline(always)]
 pub fn sin_cos<R: Real>(x: R) -> (R, R) {
     // The product with zero keeps the sign, and makes infinity not a number.
-    let x = R::select(x.abs().less(R::constant(FAR)), x, x.scale(0.0));
+    let x = R::select(x.abs().less(R::constant(ESCAPE_BOUND)), x, x.scale(0.0));
 
     // The quarter turns, whose last two bits are the quadrant, and what is left of the angle, r + tail.
     let turned = x.scale(std::f64::consts::FRAC_2_PI) + R::constant(WHOLE);

@@ -17,15 +17,15 @@
 //! ```
 
 mod angle;
+mod approximate;
 mod exponential;
 mod logarithm;
-mod rough;
 mod tangent;
 
 pub use angle::sin_cos;
+pub use approximate::{exp2_rough, inverse_rough, log2_rough, power_rough};
 pub use exponential::exp;
 pub use logarithm::ln;
-pub use rough::{exp2_rough, inverse_rough, log2_rough, power_rough};
 pub use tangent::tanh;
 
 use super::Real;

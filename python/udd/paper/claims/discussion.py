@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from udd import relatives
+from udd.chaos.poincare_sections import poincare
 from udd.paper import device
 from udd.paper.branches import RELAXATION, hopf, rotation_of_disk
 from udd.paper.figures.clock import EIGHT, C, after_a_push, disk_periods, periods
@@ -12,10 +13,9 @@ from udd.paper.figures.heights import limit, next_heights
 from udd.paper.figures.overturning import OFFSETS, growth, tops
 from udd.paper.figures.rotation import spun_down
 from udd.paper.figures.steady import eight, forced_swings, jitter, lengths, pumped, swing_period
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
-from udd.sections import poincare
-from udd.trajectory import integrated
+from udd.paper.shared_films import Lab
+from udd.simulation.trajectory import integrated
 
 
 @claim(
@@ -133,7 +133,7 @@ def spin_down(_lab: Lab) -> Verdict:
 )
 def aperiodic(_lab: Lab) -> Verdict:
     """The exact averages on the chaotic orbit at w = 1."""
-    from udd.spectra import lyapunov_spectrum
+    from udd.chaos.spectrum import lyapunov_spectrum
 
     found = lyapunov_spectrum(1.0, t=50_000, tol=2e-3)
     value, error = found.exponents[0], found.standard_errors[0]

@@ -7,16 +7,16 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.ensembles import ensemble
-from udd.exponents import lyapunov
+from udd.bifurcations import continuation, periodic_orbit
+from udd.chaos.largest_exponent import lyapunov
+from udd.chaos.poincare_sections import poincare
+from udd.chaos.spectrum import Spectrum, lyapunov_spectrum
 from udd.models import DLE
 from udd.paper import device
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
-from udd.sections import poincare
-from udd.spectra import Spectrum, lyapunov_spectrum
-from udd.structure import continuation, periodic_orbit
-from udd.trajectory import simulate
+from udd.paper.shared_films import Lab
+from udd.simulation.ensembles import ensemble
+from udd.simulation.trajectory import simulate
 
 
 @functools.cache

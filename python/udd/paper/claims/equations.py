@@ -6,9 +6,9 @@ import numpy as np
 
 from udd.models import Disk
 from udd.paper import device
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
-from udd.trajectory import simulate
+from udd.paper.shared_films import Lab
+from udd.simulation.trajectory import simulate
 
 
 @claim(

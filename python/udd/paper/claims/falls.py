@@ -7,8 +7,8 @@ import numpy as np
 from udd.paper import device
 from udd.paper.falls import Falls, falls
 from udd.paper.figures.falls import falls_at
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
+from udd.paper.shared_films import Lab
 
 
 def _sides(found: Falls) -> str:

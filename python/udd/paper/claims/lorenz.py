@@ -6,9 +6,9 @@ import numpy as np
 
 from udd import relatives
 from udd.models import DLE
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
-from udd.trajectory import simulate
+from udd.paper.shared_films import Lab
+from udd.simulation.trajectory import simulate
 
 _START = [1.0, 1.0, 0.01]
 

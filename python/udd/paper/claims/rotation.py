@@ -6,13 +6,13 @@ import functools
 
 import numpy as np
 
-from udd.ensembles import ensemble
+from udd.bifurcations import continuation
 from udd.models import DLE
 from udd.paper import device
 from udd.paper.branches import RELAXATION, hopf, relaxed, rotation_of_disk, rotation_of_dle
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
-from udd.structure import continuation
+from udd.paper.shared_films import Lab
+from udd.simulation.ensembles import ensemble
 
 
 def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarray:

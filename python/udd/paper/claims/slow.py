@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from udd.chaos.largest_exponent import lyapunov
 from udd.errors import UddError
-from udd.exponents import lyapunov
 from udd.paper import device
-from udd.paper.lab import Lab
 from udd.paper.registry import Verdict, claim, judged
-from udd.trajectory import Trajectory, simulate
+from udd.paper.shared_films import Lab
+from udd.simulation.trajectory import Trajectory, simulate
 
 
 @functools.cache

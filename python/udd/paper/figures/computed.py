@@ -10,9 +10,9 @@ from udd import plot
 from udd.models import DLE
 from udd.paper import device
 from udd.paper.canvas import panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
-from udd.trajectory import Trajectory, simulate
+from udd.paper.shared_films import Lab
+from udd.simulation.trajectory import Trajectory, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,10 +10,10 @@ import numpy as np
 from udd.paper import device
 from udd.paper.canvas import panels, titled
 from udd.paper.falls import Falls, falls
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 from udd.plot.style import AFTER, BEFORE, FAINT, MEASURED, label, tidy
-from udd.trajectory import Trajectory, simulate
+from udd.simulation.trajectory import Trajectory, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,10 +9,10 @@ import numpy as np
 from udd import plot
 from udd.paper import device
 from udd.paper.canvas import FILMED, panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 from udd.plot.style import BEFORE, MEASURED, label, scale, tidy
-from udd.trajectory import simulate
+from udd.simulation.trajectory import simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from udd import plot
 from udd.paper.canvas import panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

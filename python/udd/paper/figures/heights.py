@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.chaos.poincare_sections import poincare
 from udd.errors import IncompleteWarning
 from udd.models import DLE
 from udd.paper.canvas import panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 from udd.plot.style import AFTER, BEFORE, FAINT, tidy
-from udd.sections import poincare
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

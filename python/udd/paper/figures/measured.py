@@ -9,8 +9,8 @@ import numpy as np
 from udd import plot
 from udd.paper import device, films
 from udd.paper.canvas import FILMED, panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 from udd.plot.style import AFTER, BEFORE, FAINT, label, scale, tidy
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from udd import plot
 from udd.paper import device
 from udd.paper.canvas import FILMED, panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 
 from .computed import settled
 

@@ -11,10 +11,10 @@ from udd.models import DLE
 from udd.paper import device
 from udd.paper.branches import RELAXATION, hopf, relaxed, rotation_of_disk, rotation_of_dle
 from udd.paper.canvas import panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 from udd.plot.style import AFTER, BEFORE, FAINT, MEASURED, label, tidy
-from udd.trajectory import simulate
+from udd.simulation.trajectory import simulate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

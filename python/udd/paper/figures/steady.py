@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import relatives
+from udd.chaos.poincare_sections import poincare
 from udd.models import DLE, Model
 from udd.paper.canvas import panels, titled
-from udd.paper.lab import Lab
 from udd.paper.registry import figure
+from udd.paper.shared_films import Lab
 from udd.plot.style import AFTER, BEFORE, MEASURED, tidy
-from udd.sections import poincare
-from udd.trajectory import simulate
+from udd.simulation.trajectory import simulate
 
 from .clock import periods
 

@@ -1,0 +1,135 @@
+"""A run that grows while it is watched, piece by piece, with the bits of one call of `udd.simulate`."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import ModelError
+from udd.models import DLE, Disk, Model
+from udd.simulation.energy import EnergyBalance, angular_momentum, energy_balance
+from udd.simulation.trajectory import Trajectory, integrated
+
+from . import limits
+from .spec import Start, key_of
+
+Array = NDArray[np.float64]
+
+RATE = 240  # states per second that passes on the page
+_FIRST = 4.0  # s of the first call
+_SCALE = Disk(0.0)  # the constants in which the DLE is shown: the paper's
+
+
+def clock_of(model: Model) -> float:
+    """How much of the model's time passes in a second."""
+    return 2.0 * _SCALE.k0 / _SCALE.R**2 if isinstance(model, DLE) else 1.0
+
+
+def per_unit(model: Model) -> float:
+    """States shown in a unit of the model's time: 240 of a disk, 64 of the DLE."""
+    return RATE / clock_of(model)
+
+
+def times_of(model: Model, count: int) -> Array:
+    """The times at which states are shown."""
+    result: Array = np.arange(count) / per_unit(model)
+    return result
+
+
+def columns_of(model: Model) -> list[str]:
+    """What is told of every time: the state, and what is drawn or plotted beside it."""
+    drawn = ["beta"] if isinstance(model, DLE) else ["J"]
+    return [*model.state_names, *drawn, "friction", "friction_work", "effects_work"]
+
+
+class Run:
+    """States on a fixed grid of times, as one call of `udd.simulate` over a longer time gives them.
+
+    A call's last step is cut to end at the last time, which moves the last few states by rounding. So a call
+    runs twice as far as its states are told, and the next call repeats them bit by bit. (Steps are far
+    shorter than half a call: friction bounds them at about a second.)
+    """
+
+    def __init__(self, start: Start) -> None:
+        self.start = start
+        self.outcome = "running"
+        self.rows = np.empty((0, 0))
+        self.t = np.empty(0)
+        self._grow(int(_FIRST * RATE))
+
+    def _grow(self, count: int) -> None:
+        """Run over twice so many states as will be told."""
+        model = self.start.model
+        run = integrated(model, times_of(model, count), self.start.state)
+        told = count // 2
+        most = int(limits.MODEL_SECONDS * RATE)
+        self._asked = count
+        if run.outcome != "finished" and len(run.t) <= told:
+            self.outcome = run.outcome
+            told = len(run.t)
+        elif told >= most:
+            self.outcome, told = "full", most
+        books = energy_balance(run)
+        rows = _table(run, books, told)
+        self.motor = float(books.motor[0])
+        before, dim = len(self.rows), run.state.shape[1]
+        if before and not np.array_equal(rows[:before, :dim], self.rows[:, :dim]):
+            raise AssertionError("a longer run did not repeat a shorter one")
+        self.rows, self.t = rows, run.t[:told]
+
+    def piece(self, first: int, count: int) -> tuple[Array, bool]:
+        """States `first` to ``first + count`` (fewer where it ends), and whether the run ends with them."""
+        while self.outcome == "running" and len(self.rows) < first + count:
+            self._grow(2 * self._asked)
+        last = min(first + count, len(self.rows))
+        return self.rows[first:last], self.outcome != "running" and last == len(self.rows)
+
+
+def _table(run: Trajectory, books: EnergyBalance, count: int) -> Array:
+    work = [books.friction, books.work("friction"), books.work("effects")]
+    if isinstance(run.model, DLE):
+        omega, step = run.state[:, 0], np.diff(run.t)
+        turned = np.append(0.0, np.cumsum(0.5 * (omega[1:] + omega[:-1]) * step))  # to draw the mark
+        beside = [turned]
+    else:
+        beside = [angular_momentum(run.model, run.state)]  # type: ignore[arg-type]  # a Disk
+    return np.ascontiguousarray(np.column_stack([run.state, *beside, *work])[:count])
+
+
+class Runs:
+    """The last few runs of one page."""
+
+    def __init__(self, most: int = 4) -> None:
+        self._most = most
+        self._kept: OrderedDict[str, Run] = OrderedDict()
+
+    def of(self, start: Start) -> Run:
+        """The run from there."""
+        key = key_of(start)
+        if key not in self._kept:
+            self._kept[key] = Run(start)
+        self._kept.move_to_end(key)
+        while len(self._kept) > self._most:
+            self._kept.popitem(last=False)
+        return self._kept[key]
+
+
+def as_csv(start: Start, seconds: float) -> str:
+    """The states that the page shows, with enough digits to be the same bits.
+
+    Raises
+    ------
+    ModelError
+        More seconds than a run can have.
+    """
+    if not 0 < seconds <= limits.MODEL_SECONDS:
+        raise ModelError(f"seconds must be above 0 and at most {limits.MODEL_SECONDS:g}, not {seconds:g}")
+    run = Run(start)
+    rows, _ = run.piece(0, round(seconds * RATE) + 1)
+    names = start.model.state_names
+    lines = [f"# model = {start.model!r}", f"# outcome = {run.outcome}", ",".join(("t", *names))]
+    table = np.column_stack([run.t[: len(rows)], rows[:, : len(names)]])
+    lines += [",".join(map(repr, row)) for row in table.tolist()]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,83 @@
+"""Checks of what is asked of a diagram or of basins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd._util.progress import thread_count
+from udd._util.validation import array, number
+from udd.chaos.poincare_sections import CLOCKS, clock_of, surfaces_of
+from udd.errors import ModelError
+from udd.models import Model, require_model
+from udd.models.parameter_batch import default_state
+from udd.models.state_scaling import Floats
+from udd.simulation.trajectory import initial_state, tolerances
+
+from .section_runs import SectionRunner
+
+
+def runner_of(
+    model: Model,
+    rows: Floats,
+    section: str | None,
+    direction: str | None,
+    rtol: float,
+    atol: float,
+    threads: int | None,
+    t_max: float | None,
+    each: int,
+) -> SectionRunner:
+    """The checked way to run the model from section to section.
+
+    `rows` are the parameters of the jobs, `each` is the number of points of one.
+    """
+    if not isinstance(section, str | None):
+        raise ModelError(f"section must be one expression such as 'z', not {section!r}")
+    surfaces, ways = surfaces_of(model, section, direction)
+    rtol, atol = tolerances(rtol, atol)
+    mean = None if t_max is None else number("t_max", t_max, above=0.0) / each
+    t_each = CLOCKS * clock_of(model, rows) if mean is None else mean
+    return SectionRunner(model, surfaces, ways, rtol, atol, thread_count(threads), t_each)
+
+
+def start_states(model: Model, starts: ArrayLike | None) -> Floats:
+    """The initial states (n, dim)."""
+    require_model(model)
+    if starts is None:
+        return np.array([default_state(model)])
+    given = np.atleast_2d(array("starts", starts))
+    if given.ndim != 2 or not len(given):
+        raise ModelError("starts must be a list of initial states")
+    return np.stack([initial_state(model, state) for state in given])
+
+
+def parameter_values(model: Model, parameter: str, values: ArrayLike) -> Floats:
+    """The values of the parameter along a diagram."""
+    require_model(model)
+    if parameter not in model.parameters:
+        raise ModelError(
+            f"{type(model).__name__} has no parameter {parameter!r}; it has {', '.join(model.parameters)}"
+        )
+    axis = increasing(parameter, values)
+    for value in (float(axis[0]), float(axis[-1])):
+        model.replace(**{parameter: value})
+    return axis
+
+
+def increasing(name: str, values: ArrayLike) -> Floats:
+    """A list of increasing numbers."""
+    axis = array(f"the values of {name}", values)
+    if axis.ndim != 1 or not len(axis):
+        raise ModelError(f"the values of {name} must be a list of at least one number")
+    if not (np.diff(axis) > 0).all():
+        raise ModelError(f"the values of {name} must increase, without duplicates")
+    return axis
+
+
+def parameter_rows(model: Model, changes: dict[str, Floats], jobs: int) -> NDArray[np.float64]:
+    """The parameters of each job, shape (jobs, parameters)."""
+    rows = np.tile(np.array(list(model.parameters.values())), (jobs, 1))
+    for name, values in changes.items():
+        rows[:, list(model.parameters).index(name)] = values
+    return rows

@@ -1,0 +1,101 @@
+"""Attractors as point sets on a section, and when two of them are one and the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.chaos.recurrence import APERIODIC, Tightness
+from udd.models.state_scaling import Coordinates, Floats
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+KINDS = ("equilibrium", "periodic", "aperiodic")
+"""Aperiodic is chaos, a quasi-periodic motion, or a period above a third of the points."""
+
+_QUANTILE = 0.9
+_SHARE = 0.5  # of the points that must lie within a set: 0.9 are expected, of a disjoint one none
+_SPREAD = 0.25  # of the set's points that are nearest to one: about 0.55 are expected
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """Points of a section (for an equilibrium, the one state) that a motion comes back to.
+
+    Attributes
+    ----------
+    kind : str
+        Of `KINDS`.
+    states : ndarray (k, dim)
+        The distinct points of a period, or all there are.
+    points : ndarray (k, m)
+        The same in the coordinates of comparison.
+    duration : float
+        Of one period; NaN where there is none.
+    """
+
+    kind: str
+    states: Floats
+    points: Floats
+    duration: float = float("nan")
+
+    @property
+    def period(self) -> int:
+        """The number of section points, 0 where it is aperiodic."""
+        return APERIODIC if self.kind == "aperiodic" else len(self.states)
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """For the nearest points."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
+
+    @cached_property
+    def spacing(self) -> float:
+        """Within this distance of a point of the set, nine times in ten there is another."""
+        distance, _ = self.tree.query(self.points, k=2)
+        return float(np.quantile(distance[:, 1], _QUANTILE))
+
+    def holds(self, points: Floats, tight: Tightness) -> NDArray[np.bool_]:
+        """Whether records (..., k, m) of the same kind are of this attractor.
+
+        Points of a periodic orbit must be near its own. Of an aperiodic motion most must lie within the set
+        as the set's own points do, and be spread over all of it: attractors that differ have no point in
+        common, but a transient may pass over an attractor.
+        """
+        distance, nearest = self.tree.query(points)
+        if self.kind != "aperiodic":
+            return np.asarray(distance.max(axis=-1) < tight.same)
+        within = (distance <= self.spacing).mean(axis=-1) > _SHARE
+        ordered = np.sort(nearest, axis=-1)
+        met = 1 + (np.diff(ordered, axis=-1) > 0).sum(axis=-1)
+        most = min(len(self.points), points.shape[-2])
+        return np.asarray(within & (met > _SPREAD * most))
+
+
+def alike(one: Attractor, other: Attractor, tight: Tightness) -> bool:
+    """Whether two records are of one attractor."""
+    if one.kind != other.kind and "aperiodic" in (one.kind, other.kind):
+        # Chaos in bands too narrow to be told from points.
+        periodic, bands = (other, one) if one.kind == "aperiodic" else (one, other)
+        return bool(periodic.holds(bands.points, tight))
+    return bool(one.holds(other.points, tight) and other.holds(one.points, tight))
+
+
+def apart(one: Attractor, other: Attractor) -> float:
+    """How far two sets of points are from each other: the mean distance to the other's nearest point."""
+    there, _ = one.tree.query(other.points)
+    back, _ = other.tree.query(one.points)
+    return max(float(there.mean()), float(back.mean()))
+
+
+def mirrored(attractor: Attractor, sign: Floats, coordinates: Coordinates) -> Attractor:
+    """The mirror image."""
+    states = sign * attractor.states
+    return Attractor(attractor.kind, states, coordinates(states), attractor.duration)

@@ -1,0 +1,264 @@
+"""Basins of attraction on a grid of initial states."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from udd._util.validation import whole
+from udd.chaos.recurrence import tightness
+from udd.errors import ModelError, interrupted
+from udd.models import Model
+from udd.models.state_scaling import Floats, coordinates_of
+from udd.simulation.outcomes import FINISHED, OUTCOMES
+
+from .arguments import increasing, parameter_rows, runner_of, start_states
+from .attractor import KINDS, Attractor
+from .basin_sampling import InitialStates
+from .basin_statistics import basin_fractions, uncertainty
+from .catalogue import AttractorCatalogue
+from .classification import MotionClassifier
+from .dataset import (
+    Variables,
+    of_flags,
+    of_outcomes,
+    of_result,
+    of_state,
+    require_xarray,
+    time_unit,
+)
+from .matching import mirror_images
+from .section_runs import ALL_OUTCOMES, INTERRUPTED, START_OUTSIDE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_NOT_RUN = [INTERRUPTED, START_OUTSIDE]
+_FINAL = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
+
+
+def basins(
+    model: Model,
+    grid: Mapping[str, ArrayLike],
+    *,
+    state0: ArrayLike | None = None,
+    section: str | None = None,
+    direction: str | None = None,
+    n: int = 100,
+    transient: int = 100,
+    extend: int = 16,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    t_max: float | None = None,
+    threads: int | None = None,
+    progress: bool | None = None,
+    partial: bool = False,
+) -> xr.Dataset:
+    """Which initial states end on which attractor.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    grid : mapping of str to array_like
+        One to three components of the state, usually two, with their increasing values at the start.
+    state0 : array_like, shape (dim,), optional
+        The other components at the start; by default those of :func:`udd.lyapunov`.
+    section : str, optional
+        The surface, as :func:`udd.poincare` takes it; by default ``"z"`` (``"Z"``, ``"theta"``).
+    direction : {"up", "down", "both"}, optional
+        In which direction it is crossed; by default upward.
+    n : int
+        By how many section points a motion is recognised, at least 12; periods up to a third of this are.
+    transient : int
+        How many points are left out before.
+    extend : int
+        What is not clear is followed further, up to this many times ``transient + n`` points.
+    rtol, atol : float
+        Tolerances of the runs.
+    t_max : float, optional
+        The longest time for the first ``transient + n`` points; by default generous.
+    threads : int, optional
+        How many; by default one per core.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the components of the grid:
+
+        - ``attractor``: its number, from 1 on, the largest basin first; 0 where there is none;
+        - ``outcome``: how it ended.
+
+        Over ``number``, the attractors: ``kind`` (equilibrium, periodic, aperiodic), ``period`` in section
+        points, ``period_time``, ``mirror`` (the number of the mirror image, 0 where none was met), and an
+        orbit: the components of the state at ``point``.
+
+        Over ``ending``, the attractors and other outcomes: ``fraction`` of the initial states that end so, of
+        those that were run, and ``fraction_error``.
+
+        Over ``stride``: ``uncertain``, the fraction of pairs of initial states at this distance that end
+        differently; ``uncertainty_exponent`` and ``uncertainty_exponent_error`` from it.
+
+    Raises
+    ------
+    ModelError
+        A component, value or option that cannot be used.
+    UddError
+        The extra ``scale`` is not installed.
+
+    Interrupted
+        On Ctrl-C, with the dataset as its ``partial``: what is not finished has the outcome "interrupted".
+
+    Warns
+    -----
+    IncompleteWarning
+        After Ctrl-C, where a partial result was asked for.
+
+    Notes
+    -----
+    Periodic orbits are known by their section points, aperiodic attractors by visiting the same places,
+    equilibria by their rates. No long transient shall pass for an attractor: what nearly comes back is
+    followed until it does, and aperiodic motions are followed twice as far, and on and on as long as some of
+    them end elsewhere. Where that does not stop within `extend`, they are "undecided".
+
+    The fractions' errors are those of a sample on a grid: binomial where neighbours have nothing in common,
+    smaller where the basins are large. With f ~ distance^alpha, the basins' boundary has the dimension of the
+    grid less alpha (Grebogi et al., Phys. Lett. A 99 (1983) 415); initial states without an attractor or a
+    final outcome are left out. The exponent is NaN where too few distances are small enough, as on a coarse
+    grid. Where the rates depend on time, every motion begins at time 0 again when it is followed further.
+
+    Examples
+    --------
+    At w = 6.2 two asymmetric orbits, mirror images of each other, share the states between them.
+
+    >>> import numpy as np
+    >>> import udd
+    >>> axis = np.linspace(-3, 3, 12)
+    >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
+    >>> found["period"].values.tolist(), found["mirror"].values.tolist()
+    ([2, 2], [2, 1])
+    """
+    from tqdm import tqdm
+
+    xarray = require_xarray()
+    n, transient = whole("n", n, 12), whole("transient", transient, 0)
+    extend = whole("extend", extend, 1)
+    axes, starts = _starts(model, grid, state0)
+    rows = parameter_rows(model, {}, 1)
+    runner = runner_of(model, rows, section, direction, rtol, atol, threads, t_max, transient + n)
+    judge = MotionClassifier(model, None, coordinates_of(model, starts), tightness(runner.rtol))
+    samples = InitialStates(runner, AttractorCatalogue(judge), starts, n, extend * (transient + n))
+
+    shown = sys.stderr.isatty() if progress is None else progress
+    with tqdm(total=len(starts), unit="start", disable=not shown, leave=False) as bar:
+        stopped = samples.run(transient, bar)
+    options = {"n": n, "transient": transient, "extend": extend, "complete": int(not stopped)}
+    attrs = of_result(runner, "basins of attraction", options)
+    for k, name in enumerate(model.state_names):
+        if name not in axes:
+            attrs[f"start_{name}"] = float(starts[0, k])
+    data, coords = _arrays(samples, axes)
+    made: xr.Dataset = xarray.Dataset(data, coords, {**attrs, "grid": " ".join(axes)})
+    if stopped:
+        left = int((samples.outcome == INTERRUPTED).sum())
+        message = (
+            f"{left} of {len(starts)} initial states are not finished: stopped by Ctrl-C"
+            if left
+            else "stopped by Ctrl-C before the aperiodic motions were followed further"
+        )
+        interrupted(made, message, partial)
+    return made
+
+
+def _starts(
+    model: Model, grid: Mapping[str, ArrayLike], state0: ArrayLike | None
+) -> tuple[dict[str, Floats], Floats]:
+    """The axes of the grid, and its states (jobs, dim), the last axis first to vary."""
+    if not isinstance(grid, Mapping) or not 1 <= len(grid) <= 3:
+        raise ModelError("grid must name one to three components of the state with their values")
+    if state0 is None and isinstance(model, Model) and set(model.state_names) <= set(grid):
+        state0 = np.zeros(len(model.state_names))  # the grid says everything
+    base = start_states(model, state0)
+    if len(base) != 1:
+        raise ModelError("state0 must be one state")
+    for name in grid:
+        if name not in model.state_names:
+            raise ModelError(f"the state has no {name!r}; it has {', '.join(model.state_names)}")
+    axes = {name: increasing(name, values) for name, values in grid.items()}
+    mesh = np.meshgrid(*axes.values(), indexing="ij")
+    starts = np.tile(base[0], (mesh[0].size, 1))
+    for name, values in zip(axes, mesh, strict=True):
+        starts[:, model.state_names.index(name)] = values.ravel()
+    return axes, starts
+
+
+def _arrays(samples: InitialStates, axes: dict[str, Floats]) -> tuple[Variables, Variables]:
+    """The arrays and the coordinates of the result."""
+    model = samples.runner.model
+    shape = tuple(len(values) for values in axes.values())
+    found, number = samples.ranked()
+    others = [k for k in range(1, len(ALL_OUTCOMES)) if k not in _NOT_RUN and (samples.outcome == k).any()]
+    endings = [f"attractor {k + 1}" for k in range(len(found))] + [ALL_OUTCOMES[k] for k in others]
+    ends = number - 1
+    for place, k in enumerate(others):
+        ends[samples.outcome == k] = len(found) + place
+    run = np.where(np.isin(samples.outcome, _NOT_RUN), -1, ends).reshape(shape)
+    final = np.where(np.isin(samples.outcome, [FINISHED, *_FINAL]), ends, -1).reshape(shape)
+    share, error = basin_fractions(run, len(endings))
+    fine = uncertainty(final)
+
+    data: Variables = {
+        "attractor": (tuple(axes), number.reshape(shape), {"long_name": "number of the attractor"}),
+        "outcome": (tuple(axes), samples.outcome.astype(np.int8).reshape(shape), of_outcomes()),
+        "fraction": ("ending", share, {"long_name": "fraction of the initial states", "units": "1"}),
+        "fraction_error": ("ending", error, {"long_name": "its standard error", "units": "1"}),
+        "uncertain": ("stride", fine.fraction, {"long_name": "fraction of pairs that end differently"}),
+        "fitted": ("stride", fine.fitted.astype(np.int8), {"long_name": "whether the exponent is from it"}),
+        "uncertainty_exponent": ((), fine.exponent, {"long_name": "exponent of uncertain over stride"}),
+        "uncertainty_exponent_error": ((), fine.standard_error, {"long_name": "its standard error"}),
+        **_table(samples, found),
+    }
+    coords: Variables = {
+        **{name: (name, values, of_state(model, name, "at the start")) for name, values in axes.items()},
+        "number": ("number", np.arange(1, len(found) + 1, dtype=np.int32)),
+        "ending": ("ending", np.array(endings, dtype=str)),
+        "stride": ("stride", fine.stride, {"long_name": "distance in steps of the grid"}),
+    }
+    return data, coords
+
+
+def _table(samples: InitialStates, found: list[Attractor]) -> Variables:
+    """The attractors themselves."""
+    judge, model = samples.register.judge, samples.runner.model
+    mirror = np.zeros(len(found), dtype=np.int32)
+    for k in range(len(found)):
+        images = mirror_images(found, k, judge.coordinates, judge.tight)
+        mirror[k] = images[0] + 1 if images else 0
+    longest = max((len(one.states) for one in found), default=0)
+    orbits = np.full((len(found), longest, len(model.state_names)), np.nan)
+    for k, one in enumerate(found):
+        orbits[k, : len(one.states)] = one.states
+    kind = of_flags("kind", KINDS)
+    time = {"long_name": "duration of a period", "units": time_unit(model)}
+    return {
+        "kind": ("number", np.array([KINDS.index(one.kind) for one in found], dtype=np.int8), kind),
+        "period": (
+            "number",
+            np.array([one.period for one in found], dtype=np.int32),
+            {"long_name": "number of distinct section points, 0 where aperiodic"},
+        ),
+        "period_time": ("number", np.array([one.duration for one in found]), time),
+        "mirror": ("number", mirror, {"long_name": "number of the mirror image, 0 where none was met"}),
+        **{
+            f"orbit_{name}": (("number", "point"), orbits[:, :, k], of_state(model, name, "on the orbit"))
+            for k, name in enumerate(model.state_names)
+        },
+    }

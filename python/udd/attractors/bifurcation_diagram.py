@@ -1,0 +1,287 @@
+"""Bifurcation diagrams by brute force: attractors over a parameter, up and down."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd._util.validation import number, whole
+from udd.chaos.recurrence import SETTLING, tightness
+from udd.errors import ModelError, interrupted
+from udd.models import Model
+from udd.models.state_scaling import Floats, coordinates_of
+
+from .arguments import parameter_rows, parameter_values, runner_of, start_states
+from .classification import Classification, MotionClassifier, again, decided, follow, put
+from .dataset import (
+    Variables,
+    of_flags,
+    of_outcomes,
+    of_parameter,
+    of_result,
+    of_state,
+    require_xarray,
+    time_unit,
+)
+from .kinds import MOTIONS, kinds_of
+from .labelling import DiagramLabels, tell
+from .matching import intervals
+from .section_runs import INTERRUPTED, UNDECIDED, parts
+from .sweep_order import PATHS, kick, nothing, walk
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def bifurcation(
+    model: Model,
+    parameter: str,
+    values: ArrayLike,
+    *,
+    section: str | None = None,
+    direction: str | None = None,
+    n: int = 200,
+    transient: int = 200,
+    starts: ArrayLike | None = None,
+    path: Literal["independent", "up", "down", "both"] = "independent",
+    component: str | Sequence[str] | None = None,
+    attractors: bool = True,
+    extend: int = 64,
+    nudge: float = 1e-4,
+    reach: float = 0.25,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    t_max: float | None = None,
+    threads: int | None = None,
+    progress: bool | None = None,
+    partial: bool = False,
+) -> xr.Dataset:
+    """Section points over a parameter, with the attractors told apart.
+
+    Parameters
+    ----------
+    model : Model
+        The model; `parameter` is varied in it.
+    parameter : str
+        One of ``model.parameters``; an effect's as ``"effect.name"``.
+    values : array_like, shape (v,)
+        Its values, increasing.
+    section : str, optional
+        The surface, as :func:`udd.poincare` takes it; by default ``"z"`` (``"Z"``, ``"theta"``).
+    direction : {"up", "down", "both"}, optional
+        In which direction it is crossed; by default upward.
+    n : int
+        How many points are kept, at least 12. Periods up to a third of this are recognised.
+    transient : int
+        How many points are left out before.
+    starts : array_like, shape (s, dim) or (dim,), optional
+        Initial states; by default that of :func:`udd.lyapunov`.
+    path : {"independent", "up", "down", "both"}
+        Whether every value begins at the initial states, or where the one before (after) it ended.
+    component : str or sequence of str, optional
+        Which components of the state are kept; by default all.
+    attractors : bool
+        Whether to tell periods and attractors; otherwise the points and outcomes are all there is.
+    extend : int
+        What still settles is followed further, up to this many times ``transient + n`` points.
+    nudge : float
+        What is added to a state that is carried over, relative to the size of the motion, lest it stay on an
+        orbit that is no longer stable.
+    reach : float
+        How far an attractor's points may move, on average and relative to the size of the motion, from one
+        value to the next.
+    rtol, atol : float
+        Tolerances of the runs.
+    t_max : float, optional
+        The longest time for the first ``transient + n`` points; by default generous.
+    threads : int, optional
+        How many; by default one per core.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``path``, ``start``, the parameter and ``point``.
+
+        - the components of the state at the section, NaN where there are fewer points;
+        - ``outcome``: how each job ended;
+        - ``kind``: ``flag_meanings`` names what each number stands for: equilibrium, rotating state, cycle,
+          torus, chaos; aperiodic where the exponents leave that open; left; none without a verdict;
+        - ``period``: the number of distinct points (the rounds of a cycle, 1 at rest), 0 not periodic, -1
+          without a verdict;
+        - ``period_time``: how long a period takes;
+        - ``attractor``: a label from 1 on, 0 where there is none; attractors of neighbouring values have the
+          same one where the points hardly move;
+        - ``symmetric``: 1 where it is its own mirror image under the model's symmetry, 0 where not, -1 where
+          there is no symmetry or no attractor;
+        - ``hysteresis``: whether the way up and the way down end on different attractors (mirror images count
+          as the same); ``hysteresis_interval``: the stretches of such values, which a value without a verdict
+          does not end.
+
+    Raises
+    ------
+    ModelError
+        A parameter, value or option that cannot be used.
+    UddError
+        The extra ``scale`` is not installed.
+
+    Interrupted
+        On Ctrl-C, with the dataset as its ``partial``: what is not finished is NaN with the outcome
+        "interrupted", and attractors have neither labels nor kinds.
+
+    Warns
+    -----
+    IncompleteWarning
+        After Ctrl-C, where a partial result was asked for.
+
+    Notes
+    -----
+    What is not periodic is told by the exponents of a short run on. A chaotic transient that outlives the
+    run looks like chaos; where the ways up and down differ, all are followed to the length of
+    `extend` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the way up
+    or down begins at its initial state again with the next value.
+
+    The numbers do not depend on the number of threads. Where the rates depend on time, every run begins at
+    time 0, carried over or not.
+
+    Examples
+    --------
+    The figure-eight, stable at large drives, loses its symmetry at w = 7.0964; at 5.3947 its period doubles.
+
+    >>> import udd
+    >>> found = udd.bifurcation(udd.DLE(1.0), "w", [5.3, 6.0, 7.5, 9.0])
+    >>> found["period"].values.squeeze().tolist()
+    [4, 2, 2, 2]
+    """
+    from tqdm import tqdm
+
+    xarray = require_xarray()
+    axis = parameter_values(model, parameter, values)
+    n, transient = whole("n", n, 12 if attractors else 1), whole("transient", transient, 0)
+    longest = whole("extend", extend, 1) * (transient + n)
+    nudge, reach = number("nudge", nudge, least=0.0), number("reach", reach, above=0.0)
+    if path not in PATHS:
+        raise ModelError(f"path must be one of {', '.join(PATHS)}, not {path!r}")
+    kept = _components(model, component)
+    begin = start_states(model, starts)
+    middle = model.with_parameters({parameter: float(axis[len(axis) // 2])})
+    shape = (len(PATHS[path]), len(begin), len(axis))
+    places = np.arange(np.prod(shape)).reshape(shape)
+    of_job = np.broadcast_to(axis, shape).ravel()
+    rows = parameter_rows(model, {parameter: of_job}, places.size)
+    runner = runner_of(model, rows, section, direction, rtol, atol, threads, t_max, transient + n)
+    judge = MotionClassifier(model, parameter, coordinates_of(middle, begin), tightness(runner.rtol))
+    found = nothing(places.size, n, begin.shape[1])
+    verdicts = Classification.none(places.size)
+
+    def work(these: NDArray[np.intp], states: Floats) -> None:
+        if attractors:
+            one, own = follow(runner, judge, rows[these], of_job[these], states, transient, n, longest)
+            verdicts.put(these, own)
+        else:
+            one = runner(rows[these], states, transient, n)
+        put(found, these, one)
+
+    shown = sys.stderr.isatty() if progress is None else progress
+    with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
+        added = kick(judge.coordinates.size, nudge)
+        stopped = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
+    told, kinds = DiagramLabels.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
+    try:
+        if attractors and (partial or not stopped):
+            told = tell(judge, found, verdicts, places, reach)
+        if told.differ.any() and not stopped:
+            unsure = places[:, :, told.differ].ravel()
+            unsure = unsure[decided(found, verdicts)[unsure]]
+            for part in parts(len(unsure), longest + n):
+                if not again(runner, judge, rows, of_job, found, verdicts, unsure[part], longest, n):
+                    raise KeyboardInterrupt
+            found.outcome[unsure[verdicts.period[unsure] == SETTLING]] = UNDECIDED
+            told = tell(judge, found, verdicts, places, reach)
+        if attractors and (partial or not stopped):
+            kinds = kinds_of(runner, judge, found, verdicts, rows, of_job)
+    except KeyboardInterrupt:
+        stopped = True
+    dims = ("path", "start", parameter)
+    data: Variables = {
+        name: (
+            (*dims, "point"),
+            found.points[:, :, k].reshape(*shape, n),
+            of_state(model, name, "on the section"),
+        )
+        for k, name in enumerate(model.state_names)
+        if name in kept
+    }
+    data["outcome"] = (dims, found.outcome.astype(np.int8).reshape(shape), of_outcomes())
+    if attractors:
+        data |= _of_attractors(model, parameter, axis, shape, verdicts, told, kinds)
+        if path == "both":
+            data |= _of_hysteresis(model, parameter, axis, told)
+    coords: Variables = {
+        "path": ("path", list(PATHS[path])),
+        "start": ("start", np.arange(len(begin), dtype=np.int32)),
+        parameter: (parameter, axis, of_parameter(model, parameter)),
+    }
+    for k, name in enumerate(model.state_names):
+        coords[f"start_{name}"] = ("start", begin[:, k], of_state(model, name, "at the start"))
+    options = {"parameter": parameter, "n": n, "transient": transient, "extend": extend, "nudge": nudge}
+    more = {"reach": reach, "complete": int(not stopped)}
+    made: xr.Dataset = xarray.Dataset(
+        data, coords, of_result(runner, "bifurcation diagram", {**options, **more})
+    )
+    if stopped:
+        left = int((found.outcome == INTERRUPTED).sum())
+        missing = f"{left} of {places.size} runs are" if left else "telling the attractors apart is"
+        interrupted(made, f"{missing} not finished: stopped by Ctrl-C", partial)
+    return made
+
+
+def _of_attractors(
+    model: Model,
+    parameter: str,
+    axis: Floats,
+    shape: tuple[int, ...],
+    verdicts: Classification,
+    told: DiagramLabels,
+    kinds: NDArray[np.int8],
+) -> Variables:
+    dims = ("path", "start", parameter)
+    period = np.where(told.label > 0, verdicts.period, SETTLING).astype(np.int32)
+    time = {"long_name": "duration of a period", "units": time_unit(model)}
+    return {
+        "kind": (dims, kinds.reshape(shape), of_flags("kind of motion", MOTIONS)),
+        "period": (dims, period.reshape(shape), {"long_name": "number of distinct section points"}),
+        "period_time": (dims, told.duration.reshape(shape), time),
+        "attractor": (dims, told.label.reshape(shape), {"long_name": "label of the attractor"}),
+        "symmetric": (
+            dims,
+            told.symmetric.reshape(shape),
+            {"long_name": "whether it is its own mirror image"},
+        ),
+    }
+
+
+def _of_hysteresis(model: Model, parameter: str, axis: Floats, told: DiagramLabels) -> Variables:
+    words = {"long_name": "whether the ways up and down end on different attractors"}
+    edges = {**of_parameter(model, parameter), "long_name": f"first and last {parameter} with hysteresis"}
+    return {
+        "hysteresis": (parameter, told.differ.astype(np.int8), words),
+        "hysteresis_interval": (("interval", "edge"), intervals(told.differ, told.unknown, axis), edges),
+    }
+
+
+def _components(model: Model, component: str | Sequence[str] | None) -> tuple[str, ...]:
+    if component is None:
+        return tuple(model.state_names)
+    names = (component,) if isinstance(component, str) else tuple(component)
+    for name in names:
+        if name not in model.state_names:
+            raise ModelError(f"the state has no {name!r}; it has {', '.join(model.state_names)}")
+    return names

@@ -1,0 +1,144 @@
+"""Classification of long-term motion: runs are extended until it is clear, or undecided."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.chaos.recurrence import APERIODIC, SETTLING, Tightness, periods
+from udd.models import Model
+from udd.models.state_scaling import Coordinates, Floats
+from udd.simulation.outcomes import FINISHED
+
+from .attractor import Attractor
+from .section_runs import INTERRUPTED, OUT_OF_TIME, UNDECIDED, Crossings, SectionRunner
+
+
+@dataclass(frozen=True)
+class MotionClassifier:
+    """Tells equilibria, periodic and aperiodic motions, and what still settles."""
+
+    model: Model
+    parameter: str | None
+    coordinates: Coordinates
+    tight: Tightness
+
+    def __call__(self, found: Crossings, values: Floats) -> Classification:
+        """The verdict on each job; `values` (jobs,) are those of the parameter that varies."""
+        jobs = len(found.points)
+        whole = np.flatnonzero(found.outcome == FINISHED)
+        period = np.full(jobs, APERIODIC, dtype=np.int32)
+        period[whole] = periods(self.coordinates(found.points[whole]), self.tight)
+        rest = np.zeros(jobs, dtype=bool)
+        # An equilibrium lies on the section, or the motion never gets there.
+        for rows, states in (
+            (np.flatnonzero((period == 1) & (found.outcome == FINISHED)), found.points[:, -1]),
+            (np.flatnonzero(found.outcome == OUT_OF_TIME), found.end),
+        ):
+            for value in np.unique(values[rows]):
+                here = rows[values[rows] == value]
+                speed = self.coordinates.speed(self.at(value), states[here])
+                rest[here] = speed < 20.0 * self.tight.settled
+        period[rest] = 1
+        return Classification(period, rest)
+
+    def at(self, value: float) -> Model:
+        """The model with a value of the parameter."""
+        return self.model if self.parameter is None else self.model.with_parameters({self.parameter: value})
+
+    def attractor(self, found: Crossings, verdicts: Classification, job: int) -> Attractor:
+        """What a job with a verdict ended on."""
+        period = int(verdicts.period[job])
+        if verdicts.rest[job]:
+            last = found.points[job, -1]
+            states = (last if np.isfinite(last).all() else found.end[job])[None]
+            return Attractor("equilibrium", states, self.coordinates(states))
+        if period == APERIODIC:
+            states = found.points[job].copy()
+            return Attractor("aperiodic", states, self.coordinates(states))
+        states = found.points[job, -period:].copy()
+        t = found.t[job]
+        return Attractor("periodic", states, self.coordinates(states), float(t[-1] - t[-1 - period]))
+
+
+@dataclass(eq=False)
+class Classification:
+    """The period of each job (see :func:`udd.chaos.recurrence.periods`), and whether it is at rest."""
+
+    period: NDArray[np.int32]
+    rest: NDArray[np.bool_]
+
+    @classmethod
+    def none(cls, jobs: int) -> Classification:
+        """Before the work."""
+        return cls(np.full(jobs, APERIODIC, dtype=np.int32), np.zeros(jobs, dtype=bool))
+
+    def only(self, some: NDArray[np.bool_]) -> Classification:
+        """Those of some jobs."""
+        return Classification(self.period[some], self.rest[some])
+
+    def put(self, rows: NDArray[np.intp], other: Classification) -> None:
+        """Replace some."""
+        self.period[rows], self.rest[rows] = other.period, other.rest
+
+
+def put(found: Crossings, rows: NDArray[np.intp], other: Crossings) -> None:
+    """Replace some jobs' points by later ones."""
+    for name in ("points", "t", "outcome", "end"):
+        getattr(found, name)[rows] = getattr(other, name)
+    found.t_end[rows] += other.t_end
+
+
+def decided(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
+    """Which jobs have ended on an attractor."""
+    known: NDArray[np.bool_] = ((found.outcome == FINISHED) & (verdicts.period != SETTLING)) | verdicts.rest
+    return known
+
+
+def follow(
+    runner: SectionRunner,
+    judge: MotionClassifier,
+    rows: Floats,
+    values: Floats,
+    starts: Floats,
+    transient: int,
+    n: int,
+    longest: int,
+) -> tuple[Crossings, Classification]:
+    """Run jobs, and those that still settle for twice as long, again and again, up to `longest` points.
+
+    What is not clear then has the outcome "undecided".
+    """
+    found = runner(rows, starts, transient, n)
+    verdicts = judge(found, values)
+    spent = transient + n
+    while len(open_ := np.flatnonzero((found.outcome == FINISHED) & (verdicts.period == SETTLING))):
+        stopped = (found.outcome == INTERRUPTED).any()
+        if 2 * spent + n > longest and not stopped:
+            found.outcome[open_] = UNDECIDED
+        elif stopped or not again(runner, judge, rows, values, found, verdicts, open_, spent, n):
+            still = open_[verdicts.period[open_] == SETTLING]
+            found.outcome[still], found.points[still] = INTERRUPTED, np.nan
+        spent += spent + n
+    return found, verdicts
+
+
+def again(
+    runner: SectionRunner,
+    judge: MotionClassifier,
+    rows: Floats,
+    values: Floats,
+    found: Crossings,
+    verdicts: Classification,
+    jobs: NDArray[np.intp],
+    skip: int,
+    n: int,
+) -> bool:
+    """Follow some jobs on from where they are; whether all were finished. Others stay as they were."""
+    more = runner(rows[jobs], found.end[jobs], skip, n)
+    done = more.outcome != INTERRUPTED
+    put(found, jobs[done], more.only(done))
+    verdicts.put(jobs[done], judge(more, values[jobs]).only(done))
+    return bool(done.all())

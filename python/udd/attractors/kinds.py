@@ -1,0 +1,93 @@
+"""What kind of motion each attractor of a diagram is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.chaos.recurrence import APERIODIC
+from udd.models.state_scaling import Floats
+from udd.simulation.outcomes import FINISHED, OUTCOMES
+
+from .classification import Classification, MotionClassifier, decided
+from .section_runs import Crossings, SectionRunner
+
+__all__ = ["MOTIONS", "kinds_of"]
+
+MOTIONS = ("none", "equilibrium", "rotating state", "cycle", "torus", "chaos", "aperiodic", "left")
+"""``none`` has no verdict; of what is ``aperiodic`` the exponents leave open what it is; ``left`` is off the
+wheels, or at infinity."""
+
+_LEFT = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
+_PARTS = 20.0  # a distance that grows by exp of this does so in chaos
+_STAYS = 3.0  # one that changes by less than exp of this does not change
+_SPANS = (0.4, 4.0)  # of the time of the section points: for most chaos, and for the rest
+_TURNS = 1e-6  # typical sizes per typical time: what is slower does not turn
+
+
+def kinds_of(
+    runner: SectionRunner,
+    judge: MotionClassifier,
+    found: Crossings,
+    verdicts: Classification,
+    rows: Floats,
+    values: Floats,
+) -> NDArray[np.int8]:
+    """The place in `MOTIONS` of each job.
+
+    What does not come back is chaos if neighbouring orbits part, a torus if two directions neither grow nor
+    shrink, a cycle (of more rounds than can be counted) if one does.
+    """
+    kind = np.zeros(len(values), dtype=np.int8)
+    known = decided(found, verdicts)
+    kind[np.isin(found.outcome, _LEFT)] = MOTIONS.index("left")
+    kind[known & (verdicts.period > 0)] = MOTIONS.index("cycle")
+    kind[known & (verdicts.period == APERIODIC)] = MOTIONS.index("aperiodic")
+    rest = np.flatnonzero(known & verdicts.rest)
+    for job in rest.tolist():
+        state = judge.attractor(found, verdicts, job).states[0]
+        turns = _turns(judge, state, float(values[job]))
+        kind[job] = MOTIONS.index("rotating state" if turns else "equilibrium")
+    free = int((~np.isfinite(judge.coordinates.size)).sum())
+    for share in _SPANS:
+        open_ = np.flatnonzero(kind == MOTIONS.index("aperiodic"))
+        if not len(open_):
+            break
+        time = share * float(np.nanmedian(np.ptp(found.t[open_], axis=1)))
+        got = _core.lyapunov(
+            runner.model,
+            np.ascontiguousarray(rows[open_]),
+            np.ascontiguousarray(found.end[open_]),
+            True,
+            time,
+            0.0,
+            1e-300,
+            runner.rtol,
+            runner.atol,
+            runner.threads,
+            None,
+        )
+        growth = got["value"] * got["time"][:, None]
+        done = got["outcome"] == FINISHED
+        chaos = done & (growth.max(axis=1) > _PARTS)
+        kind[open_[chaos]] = MOTIONS.index("chaos")
+        if share == _SPANS[-1]:
+            # Angles that nothing depends on neither grow nor shrink on any motion.
+            stay = (np.abs(growth) < _STAYS).sum(axis=1) - free
+            still = done & (growth.max(axis=1) < _STAYS)
+            kind[open_[still & (stay >= 2)]] = MOTIONS.index("torus")
+            kind[open_[still & (stay == 1)]] = MOTIONS.index("cycle")
+    return kind
+
+
+def _turns(judge: MotionClassifier, state: Floats, value: float) -> bool:
+    """Whether a state at rest is one of rotation."""
+    model, coordinates = judge.at(value), judge.coordinates
+    if model.kind == "dle":
+        turning = abs(float(state[0])) / float(coordinates.size[0])
+    else:
+        free = ~np.isfinite(coordinates.size)
+        rates = model.rates(0.0, state)[free] * coordinates.clock
+        turning = float(np.abs(rates).max(initial=0.0))
+    return turning > _TURNS

@@ -1,0 +1,69 @@
+"""Matching of attractors at successive parameter values: which continues which, and hysteresis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.chaos.recurrence import Tightness
+from udd.models.state_scaling import Coordinates, Floats
+
+from .attractor import Attractor, alike, apart, mirrored
+
+
+def groups(found: list[Attractor], tight: Tightness) -> list[int]:
+    """For each attractor the place of the first that is the same."""
+    first: list[int] = []
+    for k, attractor in enumerate(found):
+        same = (j for j in sorted(set(first)) if alike(found[j], attractor, tight))
+        first.append(next(same, k))
+    return first
+
+
+def mirror_images(found: list[Attractor], of: int, coordinates: Coordinates, tight: Tightness) -> list[int]:
+    """The places of the mirror images of one of them, itself included where it is its own."""
+    images = [mirrored(found[of], sign, coordinates) for sign in coordinates.mirrors]
+    return [k for k, other in enumerate(found) if any(alike(image, other, tight) for image in images)]
+
+
+@dataclass
+class AttractorMatcher:
+    """Labels for attractors, from 1 on, carried from value to value.
+
+    An attractor continues the one whose points were nearest at the value before (where it was last seen),
+    unless the mean distance is above `reach`; each continues one at most.
+    """
+
+    reach: float
+    last: dict[int, Attractor] = field(default_factory=dict)
+
+    def label(self, found: list[Attractor]) -> list[int]:
+        """The labels of the distinct attractors at the next value."""
+        from scipy.optimize import linear_sum_assignment
+
+        known = list(self.last)
+        labels = [0] * len(found)
+        if known and found:
+            cost = np.array([[apart(self.last[label], one) for label in known] for one in found])
+            for k, j in zip(*linear_sum_assignment(np.minimum(cost, 1e3 * self.reach)), strict=True):
+                if cost[k, j] <= self.reach:
+                    labels[k] = known[j]
+        for k, label in enumerate(labels):
+            labels[k] = label or len(self.last) + 1
+            self.last[labels[k]] = found[k]
+        return labels
+
+
+def intervals(where: NDArray[np.bool_], unknown: NDArray[np.bool_], values: Floats) -> Floats:
+    """The first and last value of every stretch, shape (stretches, 2); what is unknown does not end one."""
+    result: list[list[float]] = []
+    open_ = False
+    for value, here, gap in zip(values.tolist(), where.tolist(), unknown.tolist(), strict=True):
+        if here and open_:
+            result[-1][1] = value
+        elif here:
+            result.append([value, value])
+        open_ = here or (open_ and gap)
+    return np.array(result).reshape(-1, 2)

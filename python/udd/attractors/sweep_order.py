@@ -1,0 +1,97 @@
+"""The order of a sweep: all values at once, or the state carried from value to value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.models.state_scaling import Floats
+from udd.simulation.outcomes import OUTCOMES
+
+from .section_runs import INTERRUPTED, UNDECIDED, Crossings, parts
+
+PATHS = {"independent": ("independent",), "up": ("up",), "down": ("down",), "both": ("up", "down")}
+
+# Of no particular direction, so that it does not stay within a symmetry.
+_KICK = np.array([1.0, -0.7, 0.4, -0.2, 0.1])
+_GOES_ON = [OUTCOMES.index("finished"), OUTCOMES.index("time ran out"), UNDECIDED]
+
+
+def nothing(jobs: int, n: int, dim: int) -> Crossings:
+    """Before the work: nothing is there, as after Ctrl-C."""
+    return Crossings(
+        np.full((jobs, n, dim), np.nan),
+        np.full((jobs, n), np.nan),
+        np.full(jobs, INTERRUPTED, dtype=np.uint8),
+        np.full((jobs, dim), np.nan),
+        np.zeros(jobs),
+    )
+
+
+def kick(size: Floats, nudge: float) -> Floats:
+    """What is added to a state that is carried over; `size` is that of the components."""
+    result: Floats = nudge * np.where(np.isfinite(size), size, 0.0) * np.resize(_KICK, len(size))
+    return result
+
+
+def walk(
+    work: Callable[[NDArray[np.intp], Floats], None],
+    found: Crossings,
+    begin: Floats,
+    places: NDArray[np.intp],
+    names: tuple[str, ...],
+    added: Floats,
+    each: int,
+    tell: Callable[[int], object],
+) -> bool:
+    """Do every job, and say whether it was stopped by Ctrl-C.
+
+    Parameters
+    ----------
+    work : callable
+        Takes jobs and their initial states, and fills `found`.
+    found : Crossings
+    begin : ndarray (starts, dim)
+    places : ndarray (paths, starts, values)
+        The number of each job.
+    names : tuple of str
+        Of the paths.
+    added : ndarray (dim,)
+        To a state that is carried over.
+    each : int
+        Section points of a job.
+    tell : callable
+        Is told how many more are done.
+    """
+    steps = _at_once(begin, places, each) if names == ("independent",) else None
+    states = np.tile(begin, (len(names), 1))
+    values = places.shape[2]
+    try:
+        if steps is not None:
+            for these, own in steps:
+                work(these, own)
+                tell(len(these))
+                if (found.outcome[these] == INTERRUPTED).any():
+                    return True
+            return False
+        for k in range(values):
+            columns = [k if name == "up" else values - 1 - k for name in names]
+            these = np.concatenate([places[i, :, c] for i, c in enumerate(columns)])
+            work(these, states)
+            tell(len(these))
+            if (found.outcome[these] == INTERRUPTED).any():
+                return True
+            end = found.end[these]
+            goes_on = np.isin(found.outcome[these], _GOES_ON) & np.isfinite(end).all(axis=1)
+            states = np.where(goes_on[:, None], end + added, np.tile(begin, (len(names), 1)))
+        return False
+    except KeyboardInterrupt:
+        return True
+
+
+def _at_once(begin: Floats, places: NDArray[np.intp], each: int) -> list[tuple[NDArray[np.intp], Floats]]:
+    """Neighbouring values side by side, each from its initial state."""
+    states = np.repeat(begin, places.shape[2], axis=0)
+    return [(places.ravel()[part], states[part]) for part in parts(places.size, each)]

@@ -1,0 +1,240 @@
+"""Location of bifurcation points between two points of a branch, with a bound of the error."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import optimize
+
+from .bifurcation_functions import TestFunctions, test_functions_at
+from .branch import AnyCurve, BifurcationPoint
+from .conservative_families import FamilyCurve
+from .equilibrium_curve import EquilibriumCurve
+from .error_bounds import COARSE, rounding_of
+from .floquet_multipliers import as_liouville
+from .flow_map import Floats
+from .pseudo_arclength import CorrectorFailed, CurvePoint, nearest_of_family, newton_corrector, tangent_at
+from .shooting_curve import PeriodicOrbitCurve
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = ["bifurcations_between", "changes", "frequency_of", "locate", "location_error", "point_at"]
+
+_TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
+_STILL = 1e-5  # a tangent with less of the parameter
+_SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
+_NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
+_SURE = 2.0  # and how far beyond the largest scatter the error may lie
+
+
+def changes(before: TestFunctions, after: TestFunctions) -> list[str]:
+    """Which functions change their signs."""
+    names = []
+    for name in ("fold", "plus", "minus", "torus", "collision"):
+        a, b = getattr(before, name), getattr(after, name)
+        if a * b < 0.0:
+            names.append(name)
+    return names
+
+
+def bifurcations_between(
+    curve: AnyCurve, a: CurvePoint, step: float, before: TestFunctions, after: TestFunctions
+) -> list[tuple[str, float, CurvePoint, TestFunctions]]:
+    """Kinds of bifurcation, distances from `a`, points and the functions there, in order.
+
+    `a` is followed by a point at the distance `step`, where the functions are `after`.
+    """
+    changed = changes(before, after)
+    found = []
+    for name in changed:
+        if name == "plus" and "fold" in changed:
+            continue
+        if name == "fold" and np.isnan([before.plus, after.plus]).any():
+            continue  # not decided: towards a connection the parameter stands still, but for rounding
+        if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
+            continue
+        try:
+            if name == "fold" and "plus" not in changed:
+                sigma, place = turning(curve, a, step, before, after)
+                found.append(("end", sigma, place, test_functions_at(curve, place)))
+                continue
+            sigma, place = locate(curve, a, step, name)
+        except (CorrectorFailed, ValueError):
+            continue
+        here = test_functions_at(curve, place)
+        if isinstance(curve, PeriodicOrbitCurve) and not as_liouville(curve, place.u):
+            continue
+        if name == "fold":
+            kind = "fold"
+        elif name == "plus":
+            # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
+            turns = abs(here.fold) <= _STILL and not isinstance(curve, FamilyCurve)
+            kind = "fold" if turns else "branch point"
+        elif name == "minus":
+            symmetric = isinstance(curve, PeriodicOrbitCurve) and curve.symmetric
+            kind = "symmetry breaking" if symmetric else "period doubling"
+        elif name == "collision":
+            if not 1e-6 < abs(np.angle(here.pair)) < np.pi - 1e-6 or abs(abs(here.pair) - 1.0) > 1e-3:
+                continue  # on the real axis: unstable before and after
+            kind = "Krein collision"
+        else:
+            pair = here.pair
+            if (
+                isinstance(curve, EquilibriumCurve)
+                and abs(pair.imag) * curve.flow.clock > _TURNING
+                and _on_axis(pair)
+            ):
+                kind = "Hopf"
+            elif (
+                isinstance(curve, PeriodicOrbitCurve)
+                and abs(np.angle(pair)) > _TURNING
+                and abs(abs(pair) - 1.0) < 1e-5
+            ):
+                kind = "Neimark-Sacker"
+            else:
+                continue  # two real ones: a neutral saddle
+        found.append((kind, sigma, place, here))
+    return sorted(found, key=lambda one: one[1])
+
+
+def turning(
+    curve: AnyCurve, a: CurvePoint, step: float, before: TestFunctions, after: TestFunctions
+) -> tuple[float, CurvePoint]:
+    """About where the parameter turns at a branch point, near which the equations are nearly singular."""
+    low, high = (0.0, before.fold), (step, after.fold)
+    sigma, place = 0.0, a
+    for _ in range(6):
+        middle = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
+        try:
+            u = newton_corrector(curve, a.u + middle * a.tangent, a.tangent)
+            place = CurvePoint(u, tangent_at(curve, u, a.tangent))
+        except CorrectorFailed:
+            break
+        sigma, fold = middle, test_functions_at(curve, place).fold
+        if fold * low[1] > 0.0:
+            low = (middle, fold)
+        else:
+            high = (middle, fold)
+    return sigma, place
+
+
+def _on_axis(pair: complex) -> bool:
+    return abs(pair.real) < 1e-6 * abs(pair.imag)
+
+
+def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
+    """The zero of one of the functions between `a` and the point at the distance `step` after it.
+
+    Raises
+    ------
+    CorrectorFailed, ValueError
+        The curve cannot be followed there, or the function does not change its sign.
+    """
+    cache: dict[float, CurvePoint] = {}
+
+    def at(sigma: float) -> float:
+        u = _beside(curve, a, sigma)
+        cache[sigma] = CurvePoint(u, tangent_at(curve, u, a.tangent))
+        return float(getattr(test_functions_at(curve, cache[sigma]), name))
+
+    sigma = float(optimize.brentq(at, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
+    if sigma not in cache:
+        at(sigma)
+    return sigma, cache[sigma]
+
+
+def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> Floats:
+    """The point of the curve at a distance from `a`.
+
+    Next to a branch point the equations leave a second direction free, in which rounding alone would move
+    Newton's method: there it takes the shortest steps.
+
+    Raises
+    ------
+    CorrectorFailed
+    """
+    guess = a.u + distance * a.tangent
+    try:
+        return newton_corrector(curve, guess, a.tangent)
+    except CorrectorFailed:
+        return nearest_of_family(curve, guess, a.tangent)
+
+
+def location_error(
+    curve: AnyCurve, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
+) -> tuple[float, float]:
+    """Bounds of the errors of the value and of the period at a zero of the test function `name`.
+
+    Of cycles: how far they move when runs are less accurate. Of equilibria: what the rounding of the test
+    function, seen in its values near by, makes of its zero; the period is that of the cycles born there.
+    """
+    if isinstance(curve, EquilibriumCurve):
+        return _scatter(curve, a, sigma, place, step, name)
+
+    def at(distance: float) -> tuple[float, Floats]:
+        u = _beside(curve, a, distance)
+        there = CurvePoint(u, tangent_at(curve, u, a.tangent))
+        return float(getattr(test_functions_at(curve, there), name)), np.array(
+            [curve.value(u), curve.period(u)]
+        )
+
+    known = np.array([curve.value(place.u), curve.period(place.u)])
+    aside = 1e-3 * step
+    (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
+    curve.loose, curve.seen = COARSE, None
+    try:
+        moved, there = at(sigma)
+    finally:
+        curve.loose, curve.seen = 1.0, None
+    here, _ = at(sigma)
+    shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
+    value, period = rounding_of(known) + np.abs(there - known) + np.abs(shift)
+    return float(value), float(period)
+
+
+def _scatter(
+    curve: EquilibriumCurve, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
+) -> tuple[float, float]:
+    """Bounds of the errors of the value and of the period: from how those near by scatter about a curve."""
+    near = np.linspace(-1.0, 1.0, _SAMPLES)
+    seen = []
+    for distance in sigma + _NEAR * step * near:
+        u = newton_corrector(curve, a.u + distance * a.tangent, a.tangent)
+        signs = test_functions_at(curve, CurvePoint(u, tangent_at(curve, u, a.tangent)))
+        turning = abs(signs.pair.imag)
+        period = 2.0 * np.pi / turning if name == "torus" and turning else np.nan
+        seen.append((float(getattr(signs, name)), curve.value(u), period))
+    table, powers = np.array(seen), np.vander(near, 3)
+    fitted = np.linalg.lstsq(powers, np.nan_to_num(table), rcond=None)[0]
+    noise = np.abs(powers @ fitted - table).max(axis=0)
+    slope = np.abs(fitted[1])
+    # So far along the branch the zero may be off.
+    off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
+    value, period = _SURE * (noise[1:] + off * slope[1:])
+    return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(table[0, 2]))
+
+
+def frequency_of(curve: AnyCurve, u: Floats, signs: TestFunctions) -> float:
+    """Of the pair that bifurcates there, per unit of time."""
+    if isinstance(curve, PeriodicOrbitCurve):
+        return float(np.angle(signs.pair)) / curve.span(u)
+    return signs.pair.imag
+
+
+def point_at(
+    curve: AnyCurve,
+    kind: str,
+    place: CurvePoint,
+    signs: TestFunctions,
+    solution: Equilibrium | PeriodicOrbit,
+    arclength: float,
+    errors: tuple[float, float],
+) -> BifurcationPoint:
+    """The point with what belongs to its kind."""
+    frequency = coefficient = float("nan")
+    if kind in ("Hopf", "Neimark-Sacker"):
+        frequency = frequency_of(curve, place.u, signs)
+    if kind == "Hopf" and isinstance(solution, Equilibrium):
+        coefficient = solution.lyapunov_coefficient
+    value = curve.value(place.u)
+    return BifurcationPoint(
+        kind, curve.name, value, *errors, solution, arclength, frequency, coefficient, curve, place
+    )

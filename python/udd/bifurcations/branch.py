@@ -1,0 +1,219 @@
+"""Branches of equilibria and cycles, and the points where they change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.models import Model
+
+from .equilibrium_curve import EquilibriumCurve
+from .flow_map import Floats
+from .pseudo_arclength import CurvePoint
+from .shooting_curve import PeriodicOrbitCurve
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = ["AnyCurve", "BifurcationPoint", "Branch"]
+
+Complex = NDArray[np.complex128]
+AnyCurve = EquilibriumCurve | PeriodicOrbitCurve
+
+
+@dataclass(frozen=True, eq=False)
+class BifurcationPoint:
+    """Where a branch changes.
+
+    Attributes
+    ----------
+    kind : str
+        Of equilibria and cycles: "fold", "branch point"; of equilibria: "Hopf", "border collision" (on a
+        surface where the law changes, the branch goes on) and "nonsmooth fold" (there, it turns back); of
+        cycles: "symmetry breaking", "period doubling", "Neimark-Sacker"; of families of cycles: "Krein
+        collision", where two pairs of multipliers meet on the unit circle and leave it.
+    parameter : str
+    value : float
+        The parameter's value.
+    error : float
+        A bound of the value's error: of cycles how far it moves when runs are a hundred times less accurate,
+        of equilibria what rounding makes of it.
+    period_error : float
+        The same of the cycle's period, and of that of cycles born at a Hopf bifurcation; else NaN.
+    solution : Equilibrium or PeriodicOrbit
+        What changes there.
+    arclength : float
+        Where on the branch.
+    frequency : float
+        Of the motion that a Hopf or a Neimark-Sacker bifurcation brings (the latter per unit of time, from
+        the angle of the multipliers), else NaN.
+    lyapunov_coefficient : float
+        The first Lyapunov coefficient of a Hopf bifurcation, else NaN.
+    """
+
+    kind: str
+    parameter: str
+    value: float
+    error: float
+    period_error: float
+    solution: Equilibrium | PeriodicOrbit
+    arclength: float
+    frequency: float = float("nan")
+    lyapunov_coefficient: float = float("nan")
+    _curve: AnyCurve | None = field(default=None, repr=False)
+    _place: CurvePoint | None = field(default=None, repr=False)
+
+    @property
+    def period(self) -> float:
+        """The cycle's period; of a Hopf bifurcation that of the cycles born there; else NaN."""
+        if isinstance(self.solution, PeriodicOrbit):
+            return self.solution.period
+        return 2.0 * np.pi / self.frequency
+
+    @property
+    def criticality(self) -> str:
+        """Of a Hopf bifurcation: "supercritical" (cycles are born stable) or "subcritical"; else empty."""
+        if np.isnan(self.lyapunov_coefficient):
+            return ""
+        return "supercritical" if self.lyapunov_coefficient < 0 else "subcritical"
+
+    def __repr__(self) -> str:
+        more = f", {self.criticality} (first Lyapunov coefficient {self.lyapunov_coefficient:.6g})"
+        bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"
+        period = f", period {self.period:.12g} ({bound})" if np.isfinite(self.period) else ""
+        return (
+            f"<{self.kind} at {self.parameter} = {self.value:.13g} (error below {self.error:.1g}){period}"
+            f"{more if self.criticality else ''}>"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A family of equilibria or cycles over a parameter, in the order in which the curve was followed.
+
+    Attributes
+    ----------
+    model : Model
+        That of the start.
+    parameter : str
+    kind : {"equilibrium", "cycle"}
+    values : ndarray, shape (n,)
+        The parameter along the branch.
+    states : ndarray, shape (n, dim)
+        The equilibrium, or a state on the cycle.
+    periods : ndarray, shape (n,)
+        The cycle's periods; NaN for equilibria.
+    multipliers : ndarray of complex, shape (n, r - 1) or (n, r)
+        Floquet multipliers of cycles, eigenvalues of equilibria.
+    stable : ndarray of bool, shape (n,)
+    symmetric : bool
+        Whether the solutions are their own mirror images.
+    arclength : ndarray, shape (n,)
+    points : tuple of BifurcationPoint
+        In the order of the arclength.
+    ends : tuple of str
+        Why the branch ends, at its beginning and at its end.
+    """
+
+    model: Model
+    parameter: str
+    kind: str
+    values: Floats
+    states: Floats
+    periods: Floats
+    multipliers: Complex
+    stable: NDArray[np.bool_]
+    symmetric: bool
+    arclength: Floats
+    points: tuple[BifurcationPoint, ...]
+    ends: tuple[str, str]
+    _places: tuple[tuple[AnyCurve, CurvePoint], ...] = field(default=(), repr=False)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @cached_property
+    def extremes(self) -> tuple[Floats, Floats]:
+        """The least and the largest value of each component on each orbit, two arrays of shape (n, dim)."""
+        from .orbit_geometry import extremes_of
+
+        pairs = [extremes_of(curve, place.u) for curve, place in self._places]
+        return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
+
+    def crossings(
+        self, section: str | None = None, direction: str | None = None
+    ) -> tuple[NDArray[np.intp], Floats]:
+        """Where the cycles cross a section.
+
+        Parameters
+        ----------
+        section, direction : str, optional
+            As :func:`udd.poincare` takes them; by default ``"z"`` (``"Z"``, ``"theta"``) upward.
+
+        Returns
+        -------
+        which : ndarray of int, shape (k,)
+            The places on the branch.
+        states : ndarray, shape (k, dim)
+            The states there; of cycles that are not symmetric those of the mirror image are not among them.
+        """
+        from .orbit_geometry import crossings_of
+
+        return crossings_of(self, section, direction)
+
+    def solution(self, i: int) -> Equilibrium | PeriodicOrbit:
+        """The equilibrium or cycle of one point of the branch."""
+        from udd.bifurcations.branch_solutions import solution_at
+
+        curve, place = self._places[i]
+        return solution_at(curve, place.u)
+
+    def find(self, kind: str) -> list[BifurcationPoint]:
+        """The bifurcation points of one kind."""
+        return [point for point in self.points if point.kind == kind]
+
+    def at(self, value: float) -> list[Equilibrium | PeriodicOrbit]:
+        """The solutions at a value of the parameter, polished; more than one where the branch folds."""
+        from udd.bifurcations.branch_solutions import solutions_at
+
+        return solutions_at(self._places, self.values, value)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The branch as plain numbers, for JSON."""
+        return {
+            "parameter": self.parameter,
+            "kind": self.kind,
+            "symmetric": self.symmetric,
+            "values": self.values.tolist(),
+            "states": self.states.tolist(),
+            "periods": self.periods.tolist(),
+            "stable": self.stable.tolist(),
+            "low": self.extremes[0].tolist(),
+            "high": self.extremes[1].tolist(),
+            "points": [
+                {
+                    "kind": point.kind,
+                    "value": point.value,
+                    "error": point.error,
+                    "period": point.period,
+                    "period_error": point.period_error,
+                    "state": point.solution.state.tolist(),
+                    "frequency": point.frequency,
+                    "lyapunov_coefficient": point.lyapunov_coefficient,
+                    "criticality": point.criticality,
+                }
+                for point in self.points
+            ],
+            "ends": list(self.ends),
+        }
+
+    def __repr__(self) -> str:
+        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}" if len(self) else "nowhere"
+        found = "; ".join(f"{point.kind} at {point.value:.10g}" for point in self.points)
+        what = "equilibria" if self.kind == "equilibrium" else "cycles"
+        what = f"symmetric {what}" if self.symmetric else what
+        return (
+            f"<Branch of {what}, {self.parameter} = {ends}, {len(self)} points: {found or 'no bifurcation'}>"
+        )

@@ -1,0 +1,273 @@
+"""Numerical continuation of equilibria and periodic orbits in a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd._util.validation import number, whole
+from udd.errors import ModelError
+from udd.models import Model, beyond_the_edge
+
+from .bifurcation_functions import TestFunctions
+from .branch import AnyCurve, BifurcationPoint, Branch
+from .branch_following import BranchTrace, ContinuationLimits, follow_branch
+from .branch_switching import born_at
+from .conservative_families import PERIOD, Conserved, FamilyCurve
+from .equilibrium_curve import EquilibriumCurve
+from .flow_map import FlowMap, flow_of
+from .forced_orbits import require_period
+from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
+from .shooting_curve import HELD, PeriodicOrbitCurve
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = ["bounds_of", "branch_from", "continuation"]
+
+
+def continuation(
+    start: Equilibrium | PeriodicOrbit | BifurcationPoint,
+    parameter: str | None = None,
+    bounds: Sequence[float] = (0.0, np.inf),
+    *,
+    direction: Literal["both", "up", "down"] = "both",
+    step: float = 0.02,
+    longest: float = 0.1,
+    most: int = 2000,
+    period: float | None = None,
+    until: str | Callable[[BifurcationPoint], bool] | None = None,
+    amplitude: float = 0.01,
+) -> Branch:
+    """Follow an equilibrium or a cycle over a parameter, through folds, and tell where it bifurcates.
+
+    Parameters
+    ----------
+    start : Equilibrium, PeriodicOrbit or BifurcationPoint
+        From :func:`udd.equilibria`, :func:`udd.periodic_orbit`, or from another branch: of a bifurcation
+        point the branch that is born there is followed (of a Hopf bifurcation the cycles, of a period
+        doubling those of twice the period, ...), away from it.
+    parameter : str, optional
+        One of ``model.parameters``; by default that of the bifurcation point. Of cycles of a conservative
+        model also ``"period"``, or the formula of a conserved quantity such as ``"v^2/2 - cos(x)"``: cycles
+        come in families over it while all parameters stay.
+    bounds : (float, float)
+        The branch ends where the parameter leaves them.
+    direction : {"both", "up", "down"}
+        Whether the parameter rises or falls from the start on, or the branch is followed both ways.
+    step, longest : float
+        The first and the longest step, in arclength: states count in typical sizes, the parameter in units
+        of its value at the start.
+    most : int
+        Points at most, in either direction.
+    period : float, optional
+        A branch of cycles ends where the period exceeds this, by default 40 typical times, or 8
+        times that of the start.
+    until : str or callable, optional
+        A kind of bifurcation whose first point ends the branch, or what tells it of a
+        :class:`BifurcationPoint`.
+    amplitude : float
+        How far from a bifurcation point its new branch is looked for first. It is halved, and the first step
+        with it, until the branch does as the normal form of the bifurcation says.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    ModelError
+        A parameter or option that cannot be used; a point where no branch is born.
+
+    Notes
+    -----
+    The curve is followed by its arclength (H. B. Keller, 1977): a step along the tangent, then Newton's
+    method in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of
+    pairs of multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method
+    along the arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its
+    period, where losing the symmetry is a multiplier -1. Multipliers come from a periodic Schur decomposition
+    of the pieces' derivatives, so that weak ones are right beside strong ones; where rounding leaves their
+    sign open, or their product is not that of Liouville's formula, no bifurcation is told. Where an
+    equilibrium meets a surface on which the law has a kink (a border collision), the branch lands on it, from
+    whichever side, and goes on with the other law's tangent.
+
+    Examples
+    --------
+    The symmetric figure-eight of the diffusionless Lorenz equations loses its symmetry:
+
+    >>> import udd
+    >>> branch = udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (6.5, 12.0))
+    >>> [(point.kind, round(point.value, 9)) for point in branch.points]
+    [('symmetry breaking', 7.096426431)]
+
+    The swings of a pendulum, from small ones to those that nearly stand upside down:
+
+    >>> swings = udd.Model(["x", "v"], ["v", "-sin(x)"])
+    >>> family = udd.continuation(udd.periodic_orbit(swings, [1.0, 0.0]), "v^2/2 - cos(x)", (-0.999, 0.99))
+    >>> print(family.periods[[0, -1]].round(6))
+    [ 6.283971 16.15703 ]
+    """
+    if isinstance(start, BifurcationPoint):
+        parameter = start.parameter if parameter is None else parameter
+        if parameter != start.parameter:
+            raise ModelError(f"the branch born there is one over {start.parameter}, not {parameter}")
+    elif not isinstance(start, Equilibrium | PeriodicOrbit):
+        raise ModelError(
+            "the start must come from udd.equilibria, udd.periodic_orbit or a branch's points, "
+            f"not {type(start).__name__}"
+        )
+    if parameter is None:
+        raise ModelError("say which parameter is varied")
+    if direction not in ("both", "up", "down"):
+        raise ModelError(f"direction must be both, up or down, not {direction!r}")
+    low, high = bounds_of(bounds)
+    step = number("step", step, above=0.0)
+    longest = max(number("longest", longest, above=0.0), step)
+    if isinstance(start, BifurcationPoint):
+        size = number("amplitude", amplitude, above=0.0)
+        curve, place, off = born_at(start, size)
+        step *= min(1.0, off / size)
+        model = start.solution.model
+    else:
+        model = start.model
+        curve, place = _at(start, parameter)
+    value = curve.value(place.u)
+    if not low <= value <= high:
+        raise ModelError(
+            f"the start, at {parameter} = {value:.6g}, lies outside the bounds {low:g} to {high:g}"
+        )
+    own = curve.span(place.u) if isinstance(curve, PeriodicOrbitCurve) else 0.0
+    limit = max(40.0 * curve.flow.clock, 8.0 * own)
+    limit = limit if period is None else number("period", period, above=0.0)
+    wanted = _wanted(until)
+    limits = ContinuationLimits(low, high, step, longest, whole("most", most, 1), limit, wanted)
+    if isinstance(start, BifurcationPoint):
+        return branch_from([follow_branch(curve, place, limits)], model, parameter, f"born at a {start.kind}")
+    up = place if place.tangent[-1] >= 0 else CurvePoint(place.u, -place.tangent)
+    ways = []
+    if direction in ("both", "down"):
+        ways.append(follow_branch(curve, CurvePoint(up.u, -up.tangent), limits))
+    if direction in ("both", "up"):
+        ways.append(follow_branch(curve, up, limits))
+    return branch_from(ways, model, parameter, "the start")
+
+
+def bounds_of(bounds: Sequence[float]) -> tuple[float, float]:
+    """Checked bounds of a parameter."""
+    try:
+        low, high = (float(bound) for bound in bounds)
+    except (TypeError, ValueError):
+        raise ModelError(f"bounds must be two numbers, not {bounds!r}") from None
+    if not low < high:
+        raise ModelError(f"the first of the bounds must be below the second, not {low:g} and {high:g}")
+    return low, high
+
+
+def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[[BifurcationPoint], bool]:
+    if until is None:
+        return lambda point: False
+    if isinstance(until, str):
+        return lambda point: point.kind == until
+    return until
+
+
+def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, CurvePoint]:
+    """The curve through a solution, and the place there."""
+    made = start._curve if isinstance(start, PeriodicOrbit) else None
+    forcing = None if made is None else made.flow.forcing
+    flow: FlowMap = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
+    family = isinstance(start, PeriodicOrbit) and parameter not in flow.names
+    if family and forcing is not None:
+        raise ModelError(f"a forced cycle is followed over a parameter, not over {parameter}")
+    index = HELD if family else flow.index(parameter)
+    if forcing is not None:
+        require_period(flow.model, forcing, flow.kept, flow.size, parameter)
+    value = 0.0 if family else float(flow.values[index])
+    curve: AnyCurve
+    if isinstance(start, Equilibrium):
+        scale = abs(value) or 1.0
+        curve = EquilibriumCurve(flow, flow.values, index, scale)
+        u = curve.pack(flow.reduced(start.state), value)
+    else:
+        if start._curve is None or start._unknowns is None:
+            raise ModelError("this cycle was not made by udd.periodic_orbit")
+        old, span = start._curve, start._curve.span(start._unknowns)
+        nodes = old.nodes(start._unknowns)
+        own = replace(old.flow, model=flow.model)
+        kept = Conserved.of(own, parameter) if family and parameter != PERIOD else None
+        if kept is not None:
+            value = kept.at(own, nodes[0])[0]
+        scale = abs(value) or 1.0
+        where = old.mirror, old.shift, old.reference, old.across, old.share
+        common = own, flow.values, index, scale, span, old.pieces, *where
+        curve = FamilyCurve(*common, conserved=kept) if family else PeriodicOrbitCurve(*common)
+        u = curve.pack(nodes, span, value)
+        if isinstance(curve, FamilyCurve):
+            curve.require_one(u)
+        curve.fix_phase(u)
+    row = natural_constraint(u)
+    try:
+        u = newton_corrector(curve, u, row)
+        if isinstance(curve, PeriodicOrbitCurve):
+            curve.fix_phase(u)
+        return curve, CurvePoint(u, tangent_at(curve, u, row))
+    except CorrectorFailed as error:
+        reason = str(error)
+        if isinstance(start, PeriodicOrbit) and start.neutral:
+            reason = "where energy is kept cycles come in families, of which no parameter singles out one"
+        raise ModelError(f"the start cannot be followed: {reason}") from None
+
+
+def branch_from(ways: list[BranchTrace], model: Model, parameter: str, begin: str) -> Branch:
+    """The branch made of one way, or of two that begin at the same place, the first of them turned round."""
+    entries: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]]
+    if len(ways) == 2:
+        back, on = ways
+        length = back.places[-1][3]
+        turned = [(c, CurvePoint(p.u, -p.tangent), s, length - a) for c, p, s, a in reversed(back.places)]
+        entries = [*turned[:-1], *((c, p, s, length + a) for c, p, s, a in on.places)]
+        points = [replace(p, arclength=length - p.arclength) for p in reversed(back.points)]
+        points += [replace(p, arclength=length + p.arclength) for p in on.points]
+        ends = (back.end, on.end)
+    else:
+        entries, points, ends = ways[0].places, ways[0].points, (begin, ways[0].end)
+    values = np.array([curve.value(place.u) for curve, place, _, _ in entries])
+    symmetric = False
+    multipliers, states, periods = [], [], []
+    for curve, place, signs, _ in entries:
+        own = signs.values
+        if isinstance(curve, PeriodicOrbitCurve):
+            symmetric = curve.symmetric
+            own = own**2 + 0.0 if symmetric else own
+            state = curve.flow.full(curve.nodes(place.u)[0])
+            periods.append(curve.period(place.u))
+        else:
+            state = curve.flow.full(curve.state(place.u))
+            mirror = curve.flow.mirror
+            if mirror is not None:
+                symmetric = bool(np.allclose(mirror * curve.state(place.u), curve.state(place.u), atol=1e-12))
+            periods.append(np.nan)
+        states.append(state)
+        key = -np.abs(own) if isinstance(curve, PeriodicOrbitCurve) else -own.real
+        multipliers.append(own[np.argsort(key, kind="stable")])
+    table = np.array(multipliers)
+    cycle = isinstance(entries[0][0], PeriodicOrbitCurve)
+    inside = np.abs(table) < 1 if cycle else table.real < 0
+    stable: NDArray[np.bool_] = np.all(inside, axis=1)
+    return Branch(
+        model,
+        parameter,
+        "cycle" if cycle else "equilibrium",
+        values,
+        np.array(states),
+        np.array(periods),
+        table,
+        stable,
+        symmetric,
+        np.array([a for _, _, _, a in entries]),
+        tuple(points),
+        ends,
+        tuple((curve, place) for curve, place, _, _ in entries),
+    )

@@ -1,0 +1,173 @@
+"""Branch switching: from a bifurcation point to the branch that is born there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from udd.errors import IntegrationError, ModelError
+
+from .bifurcation_functions import test_functions_at
+from .bifurcation_location import changes
+from .branch import AnyCurve, BifurcationPoint
+from .conservative_families import FamilyCurve
+from .equilibrium_curve import EquilibriumCurve, expansion
+from .flow_map import Floats
+from .periodic_orbits import pieces_for
+from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at
+from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["born_at", "doubled"]
+
+_HALVINGS = 24
+_BENT = 1.5  # by so much the ratio of two distances, at an amplitude and at half of it, may differ from 4
+_ROUNDING = 1e-6  # a test function that is smaller has no sign
+_STILL = 1e-9  # a parameter that moves less does not move, as where a conservative cycle is born
+
+
+def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurvePoint, float]:
+    """The curve of the solutions that bifurcate at a point, a place on it, and the amplitude there.
+
+    The place's tangent leads away. The amplitude is halved until nothing more bifurcates between the point
+    and the place.
+
+    Raises
+    ------
+    ModelError
+        A point where no branch is born, or where none is found.
+    """
+    curve, place = point._curve, point._place
+    if curve is None or place is None:
+        raise ModelError("this bifurcation point was not made by udd.continuation")
+    if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, PeriodicOrbitCurve):
+        made: tuple[AnyCurve, Floats, Floats] = doubled(curve, place)
+    elif point.kind == "Hopf" and isinstance(curve, EquilibriumCurve):
+        made = _from_rest(curve, place)
+    elif point.kind == "branch point":
+        made = _crossing(curve, place)
+    else:
+        raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
+    new, base, row = made
+    # Over the period a family of two rounds begins at twice the value.
+    begins = new.value(base) if isinstance(new, FamilyCurve) else point.value
+
+    def at(size: float) -> CurvePoint | None:
+        try:
+            u = newton_corrector(new, base + size * row, row, patience=20)
+            return CurvePoint(u, tangent_at(new, u, row))
+        except (CorrectorFailed, IntegrationError):
+            return None
+
+    # Nearer and nearer to the point: the branch may bend away from its first direction.
+    for size in (amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03])).tolist():
+        found = at(size)
+        if found is None:
+            continue
+        for _ in range(_HALVINGS):
+            nearer = at(0.5 * size)
+            if nearer is None or _nothing_between(new, point, begins, nearer, found):
+                break
+            found, size = nearer, 0.5 * size
+        if isinstance(new, PeriodicOrbitCurve):
+            new.fix_phase(found.u)
+            found = CurvePoint(found.u, tangent_at(new, found.u, row))
+        return new, found, size
+    where = f"the {point.kind} at {point.parameter} = {point.value:.10g}"
+    raise ModelError(
+        f"the branch born at {where} is not found at amplitudes of {0.03 * amplitude:.2g} to "
+        f"{3 * amplitude:.2g}"
+    )
+
+
+def _nothing_between(
+    curve: AnyCurve, point: BifurcationPoint, begins: float, half: CurvePoint, whole: CurvePoint
+) -> bool:
+    """Whether a branch does as its normal form says, up to an amplitude and up to half of it.
+
+    It `begins` at this value of the parameter.
+    """
+    before, after = test_functions_at(curve, half), test_functions_at(curve, whole)
+    # What vanishes all along, as where energy is kept, changes its sign by rounding.
+    clear = [max(abs(getattr(s, name)) for s in (before, after)) for name in changes(before, after)]
+    if any(size > _ROUNDING for size in clear):
+        return False
+    if point.kind == "branch point":
+        return True
+    # At birth no multiplier is negative: they are squares, or exponentials of eigenvalues.
+    if after.minus < 0.0:
+        return False
+    # The parameter moves with the square of the amplitude.
+    first, last = (curve.value(place.u) - begins for place in (half, whole))
+    still = abs(last) < _STILL * curve.scale
+    return still or abs(last / first - 4.0) < _BENT if first else still
+
+
+def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, Floats, Floats]:
+    """Twice the time, and the direction in which the two rounds differ."""
+    u, m = place.u, curve.pieces
+    values, vectors = np.linalg.eig(curve.closing(u))
+    k = int(np.argmin(np.abs(values + 1.0)))
+    along = vectors[:, k].real
+    nodes = curve.nodes(u)
+    moves = [along]
+    for matrix in curve.flight(u).by_state[:-1]:
+        moves.append(matrix @ moves[-1])
+    first = np.array(moves)
+    both = np.vstack([nodes, curve.mirror * (nodes - curve.shift)])
+    away = np.vstack([first, -curve.mirror * first])
+    plain = np.ones(curve.flow.dim)
+    shift = curve.shift + curve.mirror * curve.shift
+    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
+    base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
+    new.fix_phase(base)
+    row = new.pack(away, 0.0, 0.0)
+    return new, base, row / np.linalg.norm(row)
+
+
+def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, Floats, Floats]:
+    """An ellipse around the equilibrium."""
+    flow, values, x = curve.flow, curve.values_at(place.u), curve.state(place.u)
+    numbers, vectors = np.linalg.eig(expansion(flow, values, x).by_state)
+    turning = np.flatnonzero(numbers.imag > 0)
+    k = turning[np.argmin(np.abs(numbers[turning].real))]
+    period = 2.0 * np.pi / float(numbers[k].imag)
+    pieces = max(4, pieces_for(flow, period))
+    phases = np.exp(2j * np.pi * np.arange(pieces) / pieces)
+    away = np.outer(phases, vectors[:, k]).real
+    ones, zeros = np.ones(flow.dim), np.zeros(flow.dim)
+    new = PeriodicOrbitCurve(
+        flow, curve.values, curve.parameter, curve.scale, period, pieces, ones, zeros, x, zeros
+    )
+    base = new.pack(np.tile(x, (pieces, 1)), period, curve.value(place.u))
+    row = new.pack(away, 0.0, 0.0)
+    row /= np.linalg.norm(row)
+    # The plane across the ellipse where it begins: at rest there is no flow to lie across.
+    rate = expansion(flow, values, x).by_state @ away[0]
+    new.across = rate / np.linalg.norm(rate / flow.size) / flow.size**2
+    # The plane goes through the ellipse's own beginning; `away[0]` need not lie across its rate.
+    return _through(new, x, away[0]), base, row
+
+
+def _through(curve: PeriodicOrbitCurve, x: Floats, away: Floats) -> PeriodicOrbitCurve:
+    """The curve whose plane holds both the equilibrium and the first node beside it."""
+    scaled = curve.across * curve.flow.size
+    side = away / curve.flow.size
+    scaled = scaled - side * (scaled @ side) / (side @ side)
+    curve.across = scaled / np.linalg.norm(scaled) / curve.flow.size
+    curve.reference = x
+    return curve
+
+
+def _crossing(curve: AnyCurve, place: CurvePoint) -> tuple[AnyCurve, Floats, Floats]:
+    """The other of two directions that the equations leave free."""
+    _, matrix = curve.equations(place.u)
+    dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+    free = np.linalg.svd(dense)[2][-2:]
+    known = place.tangent
+    rest = free - np.outer(free @ known, known)
+    row = rest[np.argmax(np.linalg.norm(rest, axis=1))]
+    fresh = replace(curve)
+    if isinstance(fresh, PeriodicOrbitCurve):
+        fresh.fix_phase(place.u)
+    return fresh, place.u, row / np.linalg.norm(row)

@@ -1,0 +1,402 @@
+"""All connections of an interval of a parameter: where a manifold of one dimension passes an equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from udd._util.validation import number, whole
+from udd.errors import IntegrationError, ModelError
+from udd.models import Model, beyond_the_edge
+from udd.simulation.trajectory import simulate
+
+from .branch_continuation import bounds_of
+from .connecting_orbits import Connection, Problem, found_by
+from .equilibrium_curve import expansion
+from .equilibrium_search import equilibria, refined
+from .flow_map import Floats, FlowMap, flow_of
+from .periodic_orbits import pieces_for
+
+__all__ = ["Connections", "connections"]
+
+_FINE = 24  # states looked at in a typical time
+_ASIDE = 1e-3  # from equilibria, in typical sizes, begin runs that show the extent of the motion
+_AWAY = 1e-6  # from the equilibrium, in typical sizes, the manifold begins as a straight line
+_LEFT = 0.1  # further away it has left the equilibrium,
+_LEAVES = 80.0  # which takes as many typical times at most
+_SHOWN = 20.0  # typical times that show the extent of the motion
+_FAR = 30.0  # typical sizes, beyond which nothing comes back
+_BEND = 3.0  # typical sizes beyond which distances count less and less
+_APART = 0.6  # curves that stay nearer than this to each other are alike
+_NEAR = 1.0  # a passage at a larger distance is none
+_LOOSE = 10.0  # times 1e-13: so accurate are the runs
+_CLOSE = 3e-2  # from so near a passage Newton's method starts,
+_TRIED = 1e-6  # or from an interval this narrow: towards a slow spiral passages come nearer slowly;
+_NARROW = 1e-12  # none is cut that is narrower
+_BESIDE = 1e3  # widths of an interval, within which what passes as soon is what is known
+_SOONER = 0.5  # typical times
+_TRIES = 4  # to find an equilibrium
+_PARTS = 4  # into which an interval is cut
+_MOST = 30_000  # curves are compared at most
+_ROWS = 2000  # curves followed together
+_SAME = 1e-11  # relative distance of connections that are one
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """One side of an equilibrium's manifold of one dimension: states (k, r) at equal distances of time.
+
+    With the left eigenvector that tells the side of the other manifold, and the first state that has left.
+    """
+
+    value: float
+    rest: Floats
+    left: Floats
+    path: Floats
+    left_at: float
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Where two curves part: when they came near the equilibrium that parts them, and were nearest to it.
+
+    Whether it is the mirror image, and how near they were: infinite where none parts them.
+    """
+
+    came: int
+    nearest: int
+    image: bool
+    distance: float
+
+
+_Found = tuple[int, Connection]  # when it came near the equilibrium at its end
+
+
+class Connections(list[Connection]):
+    """Connections in the order of their values.
+
+    Attributes
+    ----------
+    search : str
+        What was searched, and how.
+    """
+
+    def __init__(self, found: list[Connection], search: str) -> None:
+        super().__init__(found)
+        self.search = search
+
+    def __repr__(self) -> str:
+        return f"<{super().__repr__()}; {self.search}>"
+
+
+def connections(
+    model: Model,
+    parameter: str,
+    bounds: Sequence[float],
+    *,
+    n: int = 300,
+    longest: float | None = None,
+) -> Connections:
+    """The homoclinic and heteroclinic orbits of an interval of a parameter.
+
+    Parameters
+    ----------
+    model : Model
+        Its other parameters stay.
+    parameter : str
+    bounds : (float, float)
+        Of the parameter, both finite.
+    n : int
+        At so many values, equally far apart, the manifolds are compared at first.
+    longest : float, optional
+        Connections are looked for that come near the equilibrium at their end within this time after they
+        have left the one at their beginning, by default 10 typical times.
+
+    Returns
+    -------
+    Connections
+        A list of :class:`Connection` in the order of their values; its ``search`` says what was searched.
+
+    Raises
+    ------
+    ModelError
+        A parameter or option that cannot be used, or no equilibrium with one direction on its own.
+
+    Notes
+    -----
+    Of each equilibrium that has one eigenvalue alone on its side of the imaginary axis, the manifold along it
+    is a pair of curves, followed forward or backward in time. An interval at whose ends these curves take
+    different courses is cut again and again; where they part at the equilibrium, or at its mirror image,
+    which they pass on two sides, there is a connection between, and Newton's method finds it as
+    :func:`udd.connection` does. About a connection with a slow spiral there are infinitely many others, which
+    take longer. Missed are those between neighbouring values at which the curves take one course, and a few
+    that lie nearer to each other than 1e-7.
+
+    Examples
+    --------
+    >>> import udd
+    >>> found = udd.connections(udd.DLE(4.0, B=0.2), "w", (4.0, 4.5), n=20, longest=10.0)
+    >>> [(one.kind, round(one.value, 8)) for one in found]
+    [('homoclinic', 4.25994905)]
+    """
+    low, high = bounds_of(bounds)
+    if not np.isfinite([low, high]).all():
+        raise ModelError(f"the bounds must be finite, not {low:g} and {high:g}")
+    grid = np.linspace(low, high, whole("n", n, 2))
+    start = beyond_the_edge(model).with_parameters({parameter: float(np.median(grid))})
+    there = equilibria(start)
+    flow = flow_of(start, _extent(start, [rest.state for rest in there]))
+    index = flow.index(parameter)
+    span = number("longest", 10.0 * flow.clock if longest is None else longest, above=0.0)
+    rests = [flow.reduced(rest.state) for rest in there]
+    found: list[Connection] = []
+    followed, whole_search = 0, True
+    for k, rest in enumerate(rests):
+        mirror = flow.mirror
+        if mirror is not None and any(np.allclose(mirror * rest, other, atol=1e-9) for other in rests[:k]):
+            continue  # the mirror image of one that was followed
+        for sign in (1.0, -1.0):
+            own = mirror is not None and np.allclose(mirror * rest, rest, atol=1e-9)
+            if sign < 0.0 and own:
+                continue  # so are the two sides of this one
+            manifold = _Manifold(flow, index, grid, rest, sign, span)
+            followed += manifold.exists
+            its, ended = manifold.connections(parameter)
+            found += [one for one in its if not any(_same(one, other) for other in found)]
+            whole_search &= ended
+    if not followed:
+        raise ModelError("no equilibrium there has one eigenvalue alone on its side of the imaginary axis")
+    found.sort(key=lambda one: one.value)
+    search = (
+        f"{followed} manifolds compared at {len(grid)} values of {parameter} from {low:g} to {high:g}, "
+        f"each followed for {span:.4g}: longer ones may exist"
+    )
+    if not whole_search:
+        search += ", and others in intervals that were not narrowed to the end"
+    return Connections(found, search)
+
+
+def _extent(model: Model, rests: list[Floats]) -> Floats:
+    """States that show how large the motion is: of runs that leave the equilibria."""
+    clock = flow_of(model, np.ones((1, len(model.state_names)))).clock
+    times = np.linspace(0.0, _SHOWN * clock, 10 * _FINE)
+    seen = [np.ones(len(model.state_names)) if not rests else rests[0]]
+    for rest in rests:
+        # What blows up does so later than half of the time, or than a quarter, ...
+        for part in 0.5 ** np.arange(8):
+            try:
+                aside = rest + _ASIDE * (1.0 + np.abs(rest))
+                seen += [*simulate(model, part * times, aside, method="auto").state]
+                break
+            except IntegrationError:
+                continue
+    states = np.array(seen)
+    return states[np.isfinite(states).all(axis=1)]
+
+
+class _Manifold:
+    """One side of an equilibrium's manifold of one dimension, at all values of the parameter."""
+
+    def __init__(
+        self, flow: FlowMap, index: int, grid: Floats, rest: Floats, sign: float, longest: float
+    ) -> None:
+        self.flow, self.index, self.grid, self.sign, self.longest = flow, index, grid, sign, longest
+        self.rests: list[Floats | None] = [None] * len(grid)
+        middle = len(grid) // 2
+        for way in (range(middle, len(grid)), range(middle - 1, -1, -1)):
+            guess: Floats | None = rest
+            for i in way:
+                guess = None if guess is None else self.rest_near(grid[i], guess)
+                self.rests[i] = guess
+        here = self.rests[middle]
+        self.exists = here is not None and self.alone(grid[middle], here) is not None
+
+    def values_at(self, value: float) -> Floats:
+        values = self.flow.values.copy()
+        values[self.index] = value
+        return values
+
+    def rest_near(self, value: float, guess: Floats) -> Floats | None:
+        """The equilibrium near a guess; where Powell's method stalls, from a little beside it."""
+        aside = np.random.default_rng(8).uniform(-_ASIDE, _ASIDE, (_TRIES, len(guess)))
+        for shift in (np.zeros(len(guess)), *aside):
+            found = refined(self.flow, self.values_at(value), guess + shift * self.flow.size)
+            if found is not None:
+                return found
+        return None
+
+    def alone(self, value: float, rest: Floats) -> tuple[float, Floats, Floats] | None:
+        """The eigenvalue on its own, with its right and left vectors, scaled; none where there is no such."""
+        size = self.flow.size
+        matrix = expansion(self.flow, self.values_at(value), rest).by_state * size / size[:, None]
+        numbers, right = np.linalg.eig(matrix)
+        growing = numbers.real > 0.0
+        for side in (growing, ~growing):
+            if side.sum() == 1 and len(numbers) > 1:
+                k = int(np.flatnonzero(side)[0])
+                vector, left = right[:, k].real, np.linalg.inv(right)[k].real
+                turn = float(np.sign(vector[np.argmax(np.abs(vector))]))
+                return float(numbers[k].real), turn * vector, turn * left
+        return None
+
+    def curves(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
+        """The curve at each value, from beside the equilibrium until it has gone far or time is up."""
+        found: list[_Curve] = []
+        for first in range(0, len(values), _ROWS):
+            part = slice(first, first + _ROWS)
+            found += self._followed(values[part], rests[part])
+        return found
+
+    def _followed(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
+        flow, step = self.flow, self.flow.clock / _FINE
+        size, count = flow.size, len(values)
+        ways = [self.alone(value, rest) for value, rest in zip(values.tolist(), rests, strict=True)]
+        center, left = np.array(rests), np.zeros((count, flow.dim))
+        x, time = center.copy(), np.ones(count)
+        for i, way in enumerate(ways):
+            if way is not None:
+                x[i] += size * self.sign * _AWAY * way[1]
+                time[i], left[i] = np.sign(way[0]), way[2]
+        rows = np.tile(flow.values, (count, 1))
+        rows[:, self.index] = values
+        going = np.array([way is not None for way in ways])
+        states, away_at, end = [x.copy()], np.full(count, np.inf), np.zeros(count, dtype=np.intp)
+        # Between values that are hardly apart it is seen late on which side an equilibrium is passed.
+        rates = [abs(way[0]) for way in ways if way is not None]
+        lasts = self.longest - float(np.log(_NARROW)) / min(rates, default=1.0)
+        for k in range(1, round(_FINE * (_LEAVES + lasts / flow.clock))):
+            own = np.flatnonzero(going)
+            if not len(own):
+                break
+            x[own] = self._on(rows[own], x[own], time[own] * step)
+            states.append(x.copy())
+            end[own] = k
+            scaled = np.linalg.norm((x - center) / size, axis=1)
+            away_at = np.where(going & (scaled > _LEFT), np.minimum(away_at, k), away_at)
+            going &= (scaled < _FAR) & ((k - away_at) * step < lasts)
+        path = np.array(states)
+        return [
+            _Curve(value, rests[i], left[i], path[: end[i] + 1, i], away_at[i])
+            for i, value in enumerate(values.tolist())
+        ]
+
+    def _on(self, rows: Floats, x: Floats, spans: Floats) -> Floats:
+        """The states a step later; infinite where the run blows up."""
+        try:
+            return self.flow.fly_each(rows, x, spans, _LOOSE)
+        except IntegrationError:
+            if len(x) == 1:
+                return np.full_like(x, np.inf)
+        half = len(x) // 2
+        parts = (slice(None, half), slice(half, None))
+        return np.concatenate([self._on(rows[part], x[part], spans[part]) for part in parts])
+
+    def connections(self, parameter: str) -> tuple[list[Connection], bool]:
+        """Those at which the curve changes its course, and whether the search came to an end."""
+        values = np.array([v for v, rest in zip(self.grid, self.rests, strict=True) if rest is not None])
+        if not self.exists:
+            return [], True
+        spacing = float(self.grid[1] - self.grid[0])
+        curves = self.curves(values, [rest for rest in self.rests if rest is not None])
+        # Where the equilibrium was lost between two values, nothing is compared.
+        pairs = [(a, b) for a, b in pairwise(curves) if b.value - a.value < 1.5 * spacing]
+        found: list[_Found] = []
+        followed = 0
+        while pairs and followed < _MOST:
+            wide = []
+            for a, b in pairs:
+                part = self._part(a, b)
+                if part is None:
+                    continue
+                self._try(a, b, part, parameter, found)
+                if b.value - a.value > _NARROW * max(abs(a.value), abs(b.value)):
+                    wide.append((a, b))
+            cuts = [np.linspace(a.value, b.value, _PARTS + 1)[1:-1] for a, b in wide]
+            guesses = [a.rest for a, _ in wide for _ in range(_PARTS - 1)]
+            values = np.concatenate([np.zeros(0), *cuts])
+            near = [self.rest_near(v, guess) for v, guess in zip(values.tolist(), guesses, strict=True)]
+            rests = [guess if rest is None else rest for rest, guess in zip(near, guesses, strict=True)]
+            between = self.curves(values, rests)
+            followed += len(between)
+            pairs = []
+            for k, (a, b) in enumerate(wide):
+                inner = between[k * (_PARTS - 1) : (k + 1) * (_PARTS - 1)]
+                pairs += list(pairwise([a, *inner, b]))
+        return [one for _, one in found], not pairs
+
+    def _part(self, a: _Curve, b: _Curve) -> _Part | None:
+        """Where two curves part; none where they are alike for as long as is asked."""
+        flow = self.flow
+        many = min(len(a.path), len(b.path))
+        one, other = (_bent(c.path[:many] - c.rest, flow) for c in (a, b))
+        apart = np.flatnonzero(np.linalg.norm(one - other, axis=1) > _APART)
+        left = max(a.left_at, b.left_at)
+        if not len(apart) or not left < apart[0]:
+            return None
+        first, last = int(left) + 1, int(apart[0])
+        latest = left + _FINE * self.longest / flow.clock
+        best = None
+        ways = [(False, np.ones(flow.dim))]
+        if flow.mirror is not None and not np.allclose(flow.mirror * a.rest, a.rest, atol=1e-9):
+            ways.append((True, flow.mirror))
+        for image, mirror in ways:
+            away = [(c.path[first : last + 1] - mirror * c.rest) / flow.size for c in (a, b)]
+            side = [far @ (mirror * c.left) for far, c in zip(away, (a, b), strict=True)]
+            distance = np.maximum(*(np.linalg.norm(far, axis=1) for far in away))
+            beside = np.where(side[0] * side[1] < 0.0, distance, np.inf)
+            k = int(np.argmin(beside))
+            if beside[k] < (_NEAR if best is None else best.distance):
+                # It came when it was last further away.
+                far = np.flatnonzero(distance[: k + 1] > _NEAR)
+                came = first + (int(far[-1]) if len(far) else 0)
+                best = _Part(came, first + k, image, float(beside[k]))
+        part = best or _Part(last, last, False, np.inf)
+        return part if part.came <= latest else None
+
+    def _try(self, a: _Curve, b: _Curve, part: _Part, parameter: str, found: list[_Found]) -> None:
+        """Newton's method, where two curves pass an equilibrium on its two sides."""
+        width = b.value - a.value
+        narrow = width < _TRIED * max(abs(a.value), abs(b.value))
+        if not (part.distance < _CLOSE or (narrow and np.isfinite(part.distance))):
+            return
+        kind = "heteroclinic" if part.image else "homoclinic"
+        beside = _BESIDE * width
+        for came, one in found:
+            known = one.kind == kind and abs(came - part.came) < _SOONER * _FINE
+            if known and a.value - beside <= one.value <= b.value + beside:
+                return
+        try:
+            one = self._solved(a, part.nearest, part.image, parameter)
+        except (ModelError, IntegrationError):
+            return
+        if not self.grid[0] <= one.value <= self.grid[-1] or abs(one.value - a.value) > 2.0 * beside:
+            return
+        if not any(_same(one, other) for _, other in found):
+            found.append((part.came, one))
+
+    def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
+        flow, step = self.flow, self.flow.clock / _FINE
+        pieces = pieces_for(flow, last * step)
+        every = max(1, last // pieces)
+        where = np.arange(last % every, last + 1, every)
+        nodes, span = curve.path[where], float((len(where) - 1) * every * step)
+        mirror = flow.mirror if image and flow.mirror is not None else np.ones(flow.dim)
+        rest, way = curve.rest, self.alone(curve.value, curve.rest)
+        if way is not None and way[0] < 0.0:
+            # Followed backward: the orbit comes from the target.
+            nodes, rest = nodes[::-1].copy(), mirror * rest
+        values = self.values_at(curve.value)
+        return found_by(Problem(flow, values, self.index, rest, mirror, nodes, span, curve.value), parameter)
+
+
+def _same(one: Connection, other: Connection) -> bool:
+    return one.kind == other.kind and abs(one.value - other.value) < _SAME * abs(one.value)
+
+
+def _bent(away: Floats, flow: FlowMap) -> Floats:
+    """Scaled distances from the equilibrium; beyond what is typical only the direction counts."""
+    scaled = np.nan_to_num(away / flow.size, posinf=1e9, neginf=-1e9)
+    return np.asarray(scaled / np.sqrt(1.0 + (scaled**2).sum(axis=1, keepdims=True) / _BEND**2))

@@ -1,0 +1,188 @@
+"""Cycles of a conservative model as a curve over their period or a conserved quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from udd import _core
+from udd.errors import ModelError
+from udd.models import Model
+from udd.models.formula_model import FormulaModel
+
+from .condensation import CyclicEquations
+from .flow_map import Floats, FlowMap
+from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["PERIOD", "Conserved", "FamilyCurve"]
+
+PERIOD = "period"
+"""What a family is followed over where no conserved quantity is given."""
+
+_KEPT = 1e-9  # of the sizes of its terms: a rate of change below is zero
+_PROBES = 16
+_FREE = 1e-5  # a singular value below this part of the largest is that of the family
+
+
+@dataclass(frozen=True, eq=False)
+class Conserved:
+    """A quantity that a model's motion keeps, as a formula of its states and parameters.
+
+    Attributes
+    ----------
+    text : str
+    law : FormulaModel
+        Of the same states; the first of them has the quantity for its rate.
+    """
+
+    text: str
+    law: FormulaModel
+
+    @classmethod
+    def of(cls, flow: FlowMap, text: str) -> Conserved:
+        """The quantity with this formula.
+
+        Raises
+        ------
+        ModelError
+            A formula that cannot be used, or a quantity that changes along the motion.
+        """
+        model = flow.model
+        states = list(model.state_names)
+        try:
+            law = FormulaModel(states, [text, *["0"] * (len(states) - 1)], _plain(model))
+        except ModelError as error:
+            known = ", ".join(flow.names) or "none"
+            raise ModelError(
+                f"{type(model).__name__} has no parameter {text!r}; it has {known}. "
+                f"Nor is that {PERIOD!r} or the formula of a conserved quantity: {error}"
+            ) from None
+        made = cls(text, law)
+        random = np.random.default_rng(6)
+        for x in flow.size * random.uniform(-0.9, 0.9, (_PROBES, flow.dim)):
+            _, slope = made.at(flow, x)
+            parts = slope * model.rates(0.0, flow.full(x))[flow.kept]
+            if abs(parts.sum()) > _KEPT * np.abs(parts).max(initial=0.0):
+                raise ModelError(f"{text} is not kept along the motion of this model")
+        return made
+
+    def at(self, flow: FlowMap, x: Floats) -> tuple[float, Floats]:
+        """The quantity at a reduced state, and its derivatives (r,)."""
+        found = _core.expansion(self.law, 0.0, flow.full(x).tolist(), False)
+        slope: Floats = found["by_state"][0, flow.kept]
+        return float(found["rate"][0]), slope
+
+
+def _plain(model: Model) -> dict[str, float]:
+    return {name: value for name, value in model.parameters.items() if "." not in name}
+
+
+@dataclass(eq=False)
+class FamilyCurve(PeriodicOrbitCurve):
+    """Scaled nodes of a cycle where something is kept, its time, and what singles it out of its family.
+
+    What is kept makes one of the equations depend on the others. So the last gap may be of any size in the
+    direction in which the quantity grows: one more unknown, which is zero in every solution, since an orbit
+    comes back with what it had (the unfolding of F. J. Munoz-Almaraz et al., Physica D 181 (2003) 1). Over
+    the period this unknown stands where the time stands in other curves, and the time in the parameter's
+    place; over a conserved quantity it is how far the orbit's is from that in the parameter's place.
+
+    Attributes
+    ----------
+    conserved : Conserved or None
+        By default the period singles cycles out.
+    free : ndarray (r,)
+        The direction of the last gap, in scaled coordinates.
+    """
+
+    conserved: Conserved | None = None
+    free: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.conserved is None:
+            self.scale = self.clock * (2.0 if self.symmetric else 1.0)
+
+    @property
+    def name(self) -> str:
+        """What the family is followed over."""
+        return PERIOD if self.conserved is None else self.conserved.text
+
+    def pack(self, nodes: Floats, span: float, value: float) -> Floats:
+        """Unknowns from nodes (m, r), the time and the value of the conserved quantity."""
+        u = super().pack(nodes, span, value)
+        if self.conserved is None:
+            u[-2:] = 0.0, span / self.clock
+        return u
+
+    def span(self, u: Floats) -> float:
+        """The time until the orbit closes."""
+        return float(u[-1 if self.conserved is None else -2] * self.clock)
+
+    def fix_phase(self, u: Floats) -> None:
+        """Take this orbit's first node for the reference, and see in which direction the last gap is free."""
+        super().fix_phase(u)
+        self.free = self.slope(u)
+
+    def slope(self, u: Floats) -> Floats:
+        """The direction (r,), in scaled coordinates, in which the kept quantity grows at the first node."""
+        size, start = self.flow.size, self.nodes(u)[0]
+        if self.conserved is not None:
+            found: Floats = self.conserved.at(self.flow, start)[1] * size
+            return found / (float(np.linalg.norm(found)) or 1.0)
+        free, _ = self._kept(u)
+        return -free if self.free is not None and free @ self.free < 0.0 else free
+
+    def require_one(self, u: Floats) -> None:
+        """Refuse cycles that do not come in a family of one dimension.
+
+        Raises
+        ------
+        ModelError
+        """
+        _, sizes = self._kept(u)
+        kept = int((sizes < _FREE * sizes[0]).sum())
+        if kept == 0:
+            raise ModelError("no quantity is kept: cycles of this model do not come in families")
+        if kept > 1:
+            raise ModelError(f"{kept} quantities are kept, or the cycles near by all have the same period")
+
+    def _kept(self, u: Floats) -> tuple[Floats, Floats]:
+        """What the map keeps, a left eigenvector of the multiplier 1 across the flow; how singular it is."""
+        size, start = self.flow.size, self.nodes(u)[0]
+        closing = self.closing(u) * size / size[:, None]
+        flow = self.rate_at(self.values_at(u), start) * self.clock / size
+        left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(self.flow.dim), flow]))
+        return left[:, -1], sizes
+
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
+        """Scaled gaps between the pieces and the phase, and their derivatives."""
+        residual, matrix = super().equations(u)
+        m, r = self.pieces, self.flow.dim
+        free = self.slope(u) if self.free is None else self.free
+        rows = slice((m - 1) * r, m * r)
+        both = (
+            matrix.both.copy()
+            if isinstance(matrix, CyclicEquations)
+            else matrix[: m * r, -2:].reshape(m, r, 2)
+        )
+        both = np.array(both)
+        if self.conserved is None:
+            residual[rows] += free * u[-2]
+            both[:, :, 1] = both[:, :, 0]
+            both[:, :, 0] = 0.0
+            both[-1, :, 0] = free
+            inside = np.zeros((r, r))
+        else:
+            # At the start of the last piece, whose gap then depends on no other node.
+            at, slope = self.conserved.at(self.flow, self.nodes(u)[-1])
+            residual[rows] += free * (at - self.value(u)) / self.scale
+            both[-1, :, 1] = -free
+            inside = np.outer(free, slope * self.flow.size * np.sqrt(m) / self.scale)
+        if isinstance(matrix, CyclicEquations):
+            pieces = matrix.pieces.copy()
+            pieces[-1] += inside
+            return residual, CyclicEquations(pieces, matrix.after, both, matrix.phase, matrix.last)
+        matrix[rows, rows] += inside
+        matrix[: m * r, -2:] = both.reshape(m * r, 2)
+        return residual, matrix

@@ -1,0 +1,94 @@
+"""Floquet multipliers by the periodic Schur decomposition, and how far they can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+
+from .equilibrium_curve import expansion
+from .flow_map import Floats
+
+if TYPE_CHECKING:
+    from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["Multipliers", "as_liouville", "multipliers_at"]
+
+_ROUGH = 1e-12  # relative error of a piece's derivatives: runs to the tolerance 1e-13, and rounding
+_KNOWN = 0.1  # a multiplier with a larger relative error has no sign of its own
+_WEAK = 0.5  # ... which does not matter where it is this far inside the unit circle
+_APART = 1e-2  # between the logarithms of the product of all multipliers and of Liouville's formula
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Multipliers across the flow of the map that closes an orbit.
+
+    Attributes
+    ----------
+    log : ndarray, shape (r - 1,), of a forced model (r,)
+        The logarithms of their absolute values, largest first.
+    phases : ndarray of complex, shape (r - 1,)
+        The values divided by these.
+    error : ndarray, shape (r - 1,)
+        Bounds of their relative errors, to first order.
+    """
+
+    log: Floats
+    phases: NDArray[np.complex128]
+    error: Floats
+
+    @property
+    def values(self) -> NDArray[np.complex128]:
+        """The multipliers; what is too large for its square to be a float is 1e150 long."""
+        with np.errstate(over="ignore", under="ignore"):
+            values: NDArray[np.complex128] = self.phases * np.minimum(np.exp(self.log), 1e150)
+        return values
+
+    @property
+    def decided(self) -> bool:
+        """Whether it is known of each multiplier where it lies beside the unit circle."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            # A direction that dies out, as where a contact sticks, is zero to the last bit.
+            weak = np.isneginf(self.log) | (np.exp(self.log) * (1.0 + self.error) < _WEAK)
+        return bool(((self.error < _KNOWN) | weak).all())
+
+
+def multipliers_at(curve: PeriodicOrbitCurve, u: Floats) -> Multipliers:
+    """The multipliers of the orbit with these unknowns.
+
+    The derivatives of the pieces, restricted to the planes across the flow at their ends, are never
+    multiplied with one another: weak multipliers are right beside strong ones.
+    """
+    factors = curve.factors_across(u)
+    found = _core.floquet(factors)
+    if found is None:
+        lost = np.full(factors.shape[1], np.nan)
+        return Multipliers(lost, lost.astype(complex), np.full(factors.shape[1], np.inf))
+    return Multipliers(found["log"], found["re"] + 1j * found["im"], _ROUGH * found["condition"])
+
+
+def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:
+    """Whether the product of the multipliers is the exponential of the divergence along the orbit.
+
+    Not asked where the law has kinks, across which volumes may jump.
+    """
+    from .orbit_geometry import orbit_states
+
+    flow, values, found = curve.flow, curve.values_at(u), multipliers_at(curve, u)
+    if len(expansion(flow, values, curve.nodes(u)[0]).surfaces):
+        return True
+    states = flow.reduced(orbit_states(curve, u))
+    # The mean over equal distances of time around a period converges faster than any power of their number.
+    times = np.arange(len(states)) * (curve.period(u) / len(states))
+    if flow.forcing is None:
+        times = np.zeros(len(states))
+    each = zip(states, times.tolist(), strict=True)
+    divergence = np.mean([np.trace(expansion(flow, values, x, t=t).by_state) for x, t in each])
+    known = float(divergence) * curve.span(u)
+    rough = _APART * max(1.0, abs(known)) + float(np.minimum(found.error, 1e3).sum())
+    return bool(abs(float(found.log.sum()) - known) < rough)

@@ -1,0 +1,186 @@
+"""The flow map of a model and its Jacobian, in the coordinates that matter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.errors import ModelError
+from udd.models import Model, require_model
+from udd.models.state_scaling import coordinates_of
+
+from .forced_orbits import Forcing, mirror_of, require_period
+
+__all__ = ["Floats", "FlowMap", "SegmentEnds", "flow_of"]
+
+Floats = NDArray[np.float64]
+
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class SegmentEnds:
+    """Where pieces of orbits end.
+
+    States (m, r), derivatives by the starts (m, r, r) and by up to two parameters (m, r, 2), rates (m, r).
+    """
+
+    x: Floats
+    by_state: Floats
+    by_parameter: Floats
+    rate: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FlowMap:
+    """A model without the angles that nothing depends on.
+
+    Attributes
+    ----------
+    model : Model
+        Its parameters' values are those of the start; every call brings its own.
+    kept : ndarray of int (r,)
+        The components of the state on which the rates depend.
+    size : ndarray (r,)
+        What is large for each of them.
+    clock : float
+        A typical time.
+    mirror : ndarray (r,) or None
+        The signs of the model's symmetry, if it has one; of a forced model's, half a period later.
+    forcing : Forcing or None
+        The period of the rates where they depend on time.
+    rtol, atol : float
+        Tolerances of the runs; `atol` is relative to the sizes.
+    """
+
+    model: Model
+    kept: NDArray[np.intp]
+    size: Floats
+    clock: float
+    mirror: Floats | None
+    forcing: Forcing | None = None
+    rtol: float = 1e-13
+    atol: float = 1e-15
+    _made: dict[bytes, Model] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The parameters' names."""
+        return list(self.model.parameters)
+
+    @cached_property
+    def values(self) -> Floats:
+        """The parameters' values."""
+        return np.array(list(self.model.parameters.values()))
+
+    @property
+    def dim(self) -> int:
+        """The number of components kept."""
+        return len(self.kept)
+
+    @cached_property
+    def _angle(self) -> NDArray[np.bool_]:
+        return np.array([self.model.state_names[k] in self.model.angles for k in self.kept])
+
+    def turns(self, gap: Floats) -> Floats:
+        """Whole turns of angles that undo gaps (..., r); zero for what is no angle."""
+        return np.where(self._angle, -_TURN * np.round(gap / _TURN), 0.0)
+
+    def index(self, parameter: str) -> int:
+        """The place of a parameter."""
+        if parameter not in self.names:
+            raise ModelError(
+                f"{type(self.model).__name__} has no parameter {parameter!r}; it has {', '.join(self.names)}"
+            )
+        return self.names.index(parameter)
+
+    def reduced(self, state: Floats) -> Floats:
+        """States (..., dim of the model) without the angles left out."""
+        return np.ascontiguousarray(np.asarray(state, dtype=np.float64)[..., self.kept])
+
+    def full(self, x: Floats) -> Floats:
+        """Reduced states as states of the model: the angles left out are zero."""
+        state = np.zeros((*x.shape[:-1], len(self.model.state_names)))
+        state[..., self.kept] = x
+        return state
+
+    def fly(
+        self,
+        values: Floats,
+        x: Floats,
+        spans: Floats,
+        wanted: tuple[int, ...] = (),
+        loose: float = 1.0,
+        t: Floats | None = None,
+    ) -> SegmentEnds:
+        """Follow pieces from `x` (m, r), each for its span; `values` (p,) are the parameters of all.
+
+        They begin at the times `t` (m,), by default at 0; `loose` multiplies the tolerances.
+        """
+        count = len(x)
+        begin = np.zeros(count) if t is None else t
+        rows = np.tile(values, (count, 1))
+        atol = self.atol * float(np.min(self.size)) * loose
+        found = _core.shoot(
+            self.model, rows, self.full(x), begin, spans, list(wanted), self.rtol * loose, atol
+        )
+        kept = self.kept
+        return SegmentEnds(
+            found["x"][:, kept],
+            found["by_state"][:, kept][:, :, kept],
+            found["by_parameter"][:, kept],
+            found["rate"][:, kept],
+        )
+
+    def fly_each(self, rows: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
+        """Where orbits from `x` (m, r), each with its own parameters `rows` (m, p), are after `spans`."""
+        atol = self.atol * float(np.min(self.size)) * loose
+        begin = np.zeros(len(x))
+        ends = _core.shoot(self.model, rows, self.full(x), begin, spans, [], self.rtol * loose, atol)["x"]
+        return np.ascontiguousarray(ends[:, self.kept])
+
+    def with_values(self, values: Floats) -> Model:
+        """The model with these parameters; made once for values that come several times in a row."""
+        key = values.tobytes()
+        if key not in self._made:
+            self._made.clear()
+            self._made[key] = self.model.with_parameters(dict(zip(self.names, values.tolist(), strict=True)))
+        return self._made[key]
+
+
+def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing | None = None) -> FlowMap:
+    """The flow of a model near these states (n, dim).
+
+    Raises
+    ------
+    ModelError
+        The rates depend on time and no `forcing` is given, or do not repeat after its period.
+    """
+    require_model(model)
+    # A component that happens to be small is no smaller than a tenth of the largest.
+    seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
+    found = coordinates_of(model, seen)
+    # At states of no particular kind; the same in every process.
+    finite = np.where(np.isfinite(found.size), found.size, 1.0)
+    probes = finite * np.random.default_rng(2).uniform(-0.9, 0.9, (8, len(finite)))
+    now, later = (model.rates(np.full(8, t), probes) for t in (0.0, 0.7371 * found.clock))
+    kept = np.flatnonzero(np.isfinite(found.size))
+    if not np.array_equal(now, later):
+        if forcing is None:
+            raise ModelError(
+                "the rates depend on time: such a model has no equilibria, and for its cycles the forcing's "
+                "period is needed, as in periodic_orbit(model, guess, period='2*pi/w')"
+            )
+        require_period(model, forcing, kept, finite[kept])
+        period, _ = forcing.period(np.array(list(model.parameters.values())))
+        mirror = mirror_of(model, kept, finite[kept], period)
+        return FlowMap(model, kept, finite[kept], found.clock, mirror, forcing, rtol)
+    mirror = found.mirrors[0][kept] if found.mirrors else None
+    if mirror is not None and (mirror > 0).all():
+        mirror = None
+    return FlowMap(model, kept, finite[kept], found.clock, mirror, None, rtol)

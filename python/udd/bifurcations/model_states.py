@@ -1,0 +1,40 @@
+"""States of attractors that runs have ended on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from udd.errors import ModelError
+from udd.models import Model
+
+from .flow_map import Floats
+
+__all__ = ["state_of_attractor"]
+
+
+def state_of_attractor(model: Model, found: Any) -> tuple[Model, Floats, float]:
+    """The model, a state and the period of one periodic attractor of a dataset of basins or of a diagram.
+
+    Raises
+    ------
+    ModelError
+        More than one attractor, another model's, or one that is not periodic.
+    """
+    names = model.state_names
+    prefix = "orbit_" if f"orbit_{names[0]}" in found else ""
+    if any(f"{prefix}{name}" not in found for name in names) or "period_time" not in found:
+        raise ModelError(
+            f"an attractor of udd.basins or udd.bifurcation of a model of {', '.join(names)} is needed"
+        )
+    points = [np.asarray(found[f"{prefix}{name}"], dtype=np.float64) for name in names]
+    if found["period_time"].ndim or any(component.ndim != 1 for component in points):
+        raise ModelError("one attractor is needed: select it, as in found.sel(number=1)")
+    time, state = float(found["period_time"]), np.array([component[0] for component in points])
+    if not np.isfinite(time) or time <= 0.0 or not np.isfinite(state).all():
+        raise ModelError("this attractor is not periodic")
+    parameter = str(found.attrs.get("parameter", ""))
+    if not prefix and parameter in model.parameters and parameter in found.coords:
+        model = model.with_parameters({parameter: float(found[parameter])})
+    return model, state, time

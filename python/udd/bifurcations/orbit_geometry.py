@@ -1,0 +1,106 @@
+"""What cycles look like between their nodes."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.errors import IncompleteWarning, ModelError
+from udd.simulation.trajectory import simulate
+
+from .equilibrium_curve import EquilibriumCurve
+from .flow_map import Floats
+from .shooting_curve import PeriodicOrbitCurve
+
+if TYPE_CHECKING:
+    from .branch import Branch
+
+__all__ = ["crossings_of", "extremes_of", "orbit_states"]
+
+_BETWEEN = 12  # states in a piece
+
+
+def orbit_states(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
+    """States (k, dim) all around a cycle; of a symmetric one over the whole period."""
+    flow, m = curve.flow, curve.pieces
+    times = np.linspace(0.0, curve.span(u) / m, _BETWEEN + 1)
+    starts = flow.full(curve.nodes(u))
+    model = flow.with_values(curve.values_at(u))
+    rows = curve.values_at(u)[np.newaxis]
+    if flow.forcing is None:
+        method = "auto" if _core.has_series(model) else "dop853"
+        found = _core.ensemble(model, rows, starts, times, 1e-10, 1e-13, method, 1)["states"]
+    else:
+        tight: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-13, "method": "auto"}
+        each = zip(curve.begins(u), starts, strict=True)
+        found = np.array([simulate(model, t + times, start, **tight).state for t, start in each])
+    states: Floats = found[:, :-1].reshape(m * _BETWEEN, -1)
+    if curve.symmetric:
+        image = flow.full(curve.mirror * flow.reduced(states))
+        states = np.vstack([states, image])
+    return states
+
+
+def extremes_of(curve: EquilibriumCurve | PeriodicOrbitCurve, u: Floats) -> tuple[Floats, Floats]:
+    """The least and the largest values of a solution's components, angles that nothing depends on left 0."""
+    if isinstance(curve, EquilibriumCurve):
+        state = curve.flow.full(curve.state(u))
+        return state, state
+    states = orbit_states(curve, u)
+    kept = curve.flow.kept
+    low, high = np.zeros(states.shape[1]), np.zeros(states.shape[1])
+    # A parabola through the largest sample and its neighbours: samples miss the peak.
+    for k in kept:
+        x = states[:, k]
+        high[k], low[k] = _peak(x), -_peak(-x)
+    return low, high
+
+
+def _peak(x: Floats) -> float:
+    i = int(np.argmax(x))
+    before, top, after = x[i - 1], x[i], x[(i + 1) % len(x)]
+    bend = before - 2.0 * top + after
+    return float(top - 0.125 * (after - before) ** 2 / bend) if bend < 0.0 else float(top)
+
+
+def crossings_of(
+    branch: Branch, section: str | None, direction: str | None
+) -> tuple[NDArray[np.intp], Floats]:
+    """Places on a branch of cycles, and the states where they cross a section."""
+    from udd.chaos.poincare_sections import poincare
+
+    which, states = [], []
+    for i, (curve, place) in enumerate(branch._places):
+        if not isinstance(curve, PeriodicOrbitCurve):
+            raise ModelError("equilibria do not cross a section")
+        flow, u = curve.flow, place.u
+        if flow.forcing is not None:
+            raise ModelError("a forced cycle's section is its state at the forcing's phase 0: Branch.states")
+        nodes, span = curve.nodes(u), curve.span(u)
+        if curve.symmetric:
+            nodes = np.vstack([nodes, curve.mirror * nodes])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing
+            found = poincare(
+                flow.with_values(curve.values_at(u)),
+                section,
+                4,
+                state0=flow.full(nodes),
+                direction=direction,
+                transient=0,
+                t_max=span / curve.pieces,
+                rtol=1e-10,
+                atol=1e-13,
+                threads=1,
+                progress=False,
+            )
+        real = np.isfinite(found.t)
+        own = found.state[real]
+        which += [i] * len(own)
+        states += [*own]
+    dim = len(branch.model.state_names)
+    return np.array(which, dtype=np.intp), np.array(states).reshape(-1, dim)

@@ -1,0 +1,108 @@
+"""The next doubling of a cascade, solved for along the amplitude of the doubled cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from udd.bifurcations.branch_solutions import solution_at
+from udd.errors import IntegrationError
+
+from .bifurcation_functions import TestFunctions, test_functions_at
+from .bifurcation_location import location_error, point_at
+from .branch import AnyCurve, BifurcationPoint, Branch
+from .branch_continuation import branch_from
+from .branch_following import BranchTrace
+from .branch_switching import doubled
+from .flow_map import Floats
+from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at
+from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["next_doubling"]
+
+_KIND = "period doubling"
+_MOST = 12  # orbits that the secant method may take
+_NOISE = 1e-5  # of the test function, below which rounding may keep it from getting smaller
+_EXACT = 1e-11  # of the square of the amplitude, relative: of the way between two doublings
+_WAY = (0.1, 0.5, 1.0)  # of the square that is expected: each orbit is the guess of the next
+_FARTHEST = 1e4  # between the squares of the first amplitude and the one that is expected
+
+
+def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Branch:
+    """The branch born at a doubling, up to the doubling of its own: a few points of it.
+
+    Parameters
+    ----------
+    point : BifurcationPoint
+        A period doubling.
+    ahead : float
+        About how far off the next one is, in the parameter.
+    amplitude : float
+        A small one, at which the branch is looked for first.
+
+    Raises
+    ------
+    CorrectorFailed
+        It is not there.
+
+    Notes
+    -----
+    By the normal form, parameter and multiplier are nearly linear in the square of the amplitude: the bend of
+    the parameter says where the next doubling is expected, the secant method finds the multiplier -1.
+    """
+    curve, start = point._curve, point._place
+    if not isinstance(curve, PeriodicOrbitCurve) or start is None:
+        raise CorrectorFailed("the point is not one of a cycle")
+    new, base, row = doubled(curve, start)
+    found: dict[float, tuple[CurvePoint, TestFunctions]] = {}
+
+    def at(square: float, near: Floats) -> Floats:
+        """The orbit at the square of an amplitude, from another one."""
+        before = float(row @ (near - base))
+        bent = near - base - before * row
+        # What is across the amplitude grows with its square.
+        guess = base + square**0.5 * row + bent * (square / before**2 if before else 0.0)
+        try:
+            u = newton_corrector(new, guess, row)
+            place = CurvePoint(u, tangent_at(new, u, row))
+        except IntegrationError as error:
+            raise CorrectorFailed(str(error)) from None
+        found[square] = place, test_functions_at(new, place)
+        return u
+
+    square = amplitude**2
+    u = at(square, base)
+    for part in _WAY:
+        expected = ahead * square / (new.value(u) - point.value)
+        if not 0.0 < expected < _FARTHEST * amplitude**2:
+            raise CorrectorFailed("the branch does not lead there")
+        square = part * expected
+        u = at(square, u)
+    value = found[square][1].minus
+    # From the birth to the doubling the multiplier falls from 1 to -1: half of it and 1, nearly along a line.
+    other = square * (1.0 + float(np.clip(value, -0.3, 0.3)))
+    for _ in range(_MOST):
+        if not 0.0 < other < 4.0 * square:
+            raise CorrectorFailed("the multiplier does not fall to -1")
+        if abs(other - square) <= _EXACT * square:
+            break
+        u = at(other, u)
+        before, value = value, found[other][1].minus
+        if abs(before) < _NOISE and abs(value) >= 0.5 * abs(before):
+            break  # as near as rounding lets it come
+        if not np.isfinite(value) or value == before:
+            raise CorrectorFailed("the multiplier does not fall to -1")
+        square, other = other, other - value * (other - square) / (value - before)
+    else:
+        raise CorrectorFailed("the secant method does not converge")
+    place, signs = found[square]
+    size = square**0.5
+    errors = location_error(
+        new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "minus"
+    )
+    own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
+    # What the secant method passed beyond the doubling is left out.
+    places: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]] = [
+        (new, *found[s], s**0.5) for s in sorted(found) if s <= square
+    ]
+    way = BranchTrace(places, [own], "the point that was wanted")
+    return branch_from([way], point.solution.model, point.parameter, f"born at a {_KIND}")

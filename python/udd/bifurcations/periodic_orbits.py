@@ -1,0 +1,345 @@
+"""Periodic orbits by multiple shooting."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from udd._util.validation import array, number
+from udd.errors import IntegrationError, ModelError
+from udd.models import Model, beyond_the_edge, require_model
+from udd.models.parameter_batch import default_state
+from udd.simulation.trajectory import simulate
+
+from .floquet_multipliers import multipliers_at
+from .flow_map import Floats, FlowMap, flow_of
+from .forced_orbits import forcing_of, repeats
+from .model_states import state_of_attractor
+from .pseudo_arclength import CorrectorFailed, natural_constraint, nearest_of_family, newton_corrector
+from .shooting_curve import HELD, PeriodicOrbitCurve
+from .solutions import PeriodicOrbit
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["closed", "cycle_at", "flown", "has_shorter_period", "periodic_orbit", "pieces_for"]
+
+_FINE = 64  # states looked at in a typical time
+_CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
+_SAME = 1e-7  # two states within this part of the sizes are one
+_HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
+_PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
+_LOOKS = 100  # states that show the extent of a cycle
+_WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
+_SINGULAR = (1e-2, 1e-4, 1e-7)  # singular values that count as zero, relative to the largest
+_FAMILY = 400  # unknowns up to which singular values are asked for
+_RESIDUAL = 1e-9  # gaps that are as good as none
+
+
+def periodic_orbit(
+    model: Model,
+    guess: ArrayLike | xr.Dataset | None = None,
+    *,
+    period: float | str | None = None,
+    settle: float | None = None,
+    longest: float | None = None,
+) -> PeriodicOrbit:
+    """A cycle of a model, with its Floquet multipliers and its symmetry.
+
+    Parameters
+    ----------
+    model : Model
+        Where its rates depend on time they must be periodic, with the `period` given. The disk's edge is
+        ignored.
+    guess : array_like, shape (dim,) or (n, dim), or xarray.Dataset, optional
+        A state near the cycle, or states on it at equal distances of time over one period, which must then
+        be given; or one attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
+        ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``: its state, its period and the
+        value of the parameter are taken. By default the search starts where :func:`udd.lyapunov` does.
+    period : float or str, optional
+        About its period. By default the run from the guess tells it: the first time that it comes back, or
+        nearly back, be it to the mirror image. Of a forced model exactly the forcing's period, or a multiple
+        of it: a number, or a formula of the parameters such as ``"2*pi/w"``, by which it also changes along a
+        branch.
+    settle : float, optional
+        For so long the model is run from the guess before, to get near a stable cycle; by default 0, or 600
+        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess. Of a forced model:
+        for as many whole periods as this takes; the guess is a state at time 0.
+    longest : float, optional
+        The longest period looked for, by default 40 typical times.
+
+    Returns
+    -------
+    PeriodicOrbit
+
+    Raises
+    ------
+    ModelError
+        A model whose rates depend on time while no period is given or do not repeat after it, a guess of the
+        wrong shape, or one from which Newton's method finds no cycle.
+
+    Notes
+    -----
+    The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
+    Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
+    Newton's method closes the gaps; where energy is kept, so that cycles come in families, the method of
+    Gauss and Newton finds one near the guess. Where the law has kinks, runs land on them. A cycle that is its
+    own mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's
+    close returns there are unstable ones.
+
+    A cycle of a forced model lasts as long as the forcing says; its multipliers are those of the stroboscopic
+    map, one for each component of the state.
+
+    Examples
+    --------
+    The figure-eight of the diffusionless Lorenz equations:
+
+    >>> import udd
+    >>> orbit = udd.periodic_orbit(udd.DLE(10.0))
+    >>> print(round(orbit.period, 10), orbit.symmetric, orbit.stable)
+    3.3583222491 True True
+
+    From an attractor that a basin belongs to:
+
+    >>> import numpy as np
+    >>> axis = np.linspace(-3, 3, 8)
+    >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
+    >>> udd.periodic_orbit(udd.DLE(6.2), found.sel(number=2)).symmetric
+    False
+
+    Duffing's oscillator, forced, and the frequencies at which its amplitude jumps:
+
+    >>> forced = {"c": 0.1, "F": 0.3, "w": 1.2}
+    >>> duffing = udd.Model(["x", "v"], ["v", "-x - x^3 - c*v + F*cos(w*t)"], forced)
+    >>> orbit = udd.periodic_orbit(duffing, [0.0, 0.0], period="2*pi/w", settle=200.0)
+    >>> branch = udd.continuation(orbit, "w", (0.8, 2.5))
+    >>> [(point.kind, round(point.value, 9)) for point in branch.points]
+    [('fold', 1.779719524), ('fold', 1.324236201)]
+    """
+    require_model(model)
+    if guess is not None and hasattr(guess, "data_vars"):
+        model, guess, lasts = state_of_attractor(model, guess)
+        period = lasts if period is None else period
+    dim = len(model.state_names)
+    given = array("guess", default_state(model) if guess is None else guess)
+    if given.ndim not in (1, 2) or given.shape[-1] != dim or given.size == 0:
+        raise ModelError(f"the guess must be states of {dim} components, not of shape {given.shape}")
+    free = beyond_the_edge(model)
+    forcing = None if period is None else forcing_of(free, period)
+    flow = flow_of(free, np.atleast_2d(given), forcing=forcing)
+    span = 0.0 if forcing is None else forcing.period(flow.values)[0]
+    if given.ndim == 2 and len(given) > 1:
+        if forcing is None:
+            raise ModelError("states over a period need the period")
+        nodes = flow.reduced(given)
+        return _polished(model, flow, nodes, span, np.ones(flow.dim), _shift_of(flow, nodes, span))
+    aside = 600.0 * flow.clock if guess is None else 0.0
+    aside = number("settle", aside if settle is None else settle, least=0.0)
+    if flow.forcing is not None:
+        aside = math.ceil(aside / span) * span
+    start = given.reshape(dim)
+    if aside > 0.0:
+        start = simulate(free, [0.0, aside], start, method="auto").state[-1]
+    limit = number("longest", 40.0 * flow.clock if longest is None else longest, above=0.0)
+    mirrored = False
+    if forcing is None:
+        span, mirrored = _return_time(flow, free, start, limit)
+    pieces = pieces_for(flow, span)
+    run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
+    ends = flow.reduced(run.state)
+    mirror = flow.mirror if mirrored and flow.mirror is not None else np.ones(flow.dim)
+    return _polished(model, flow, ends[:-1], span, mirror, flow.turns(mirror * ends[-1] - ends[0]))
+
+
+def pieces_for(flow: FlowMap, span: float) -> int:
+    """Into how many pieces an orbit of this length is cut."""
+    return max(3, math.ceil(2.0 * span / flow.clock))
+
+
+def cycle_at(curve: PeriodicOrbitCurve, u: Floats) -> PeriodicOrbit:
+    """The cycle that solves a curve's equations."""
+    flow, values = curve.flow, curve.values_at(u)
+    multipliers = multipliers_at(curve, u).values
+    if curve.symmetric:
+        multipliers = multipliers**2 + 0.0
+    multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
+    residual, _ = curve.equations(u)
+    nodes = flow.full(curve.nodes(u))
+    model = flow.with_values(values)
+    gap = float(np.abs(residual).max())
+    return PeriodicOrbit(model, nodes[0], curve.period(u), multipliers, curve.symmetric, nodes, gap, curve, u)
+
+
+def _polished(
+    model: Model, flow: FlowMap, nodes: Floats, span: float, mirror: Floats, shift: Floats
+) -> PeriodicOrbit:
+    """The cycle that Newton's method finds, in its simplest form."""
+    curve, u = closed(flow, nodes, span, mirror, shift)
+    curve, u = _simplest(curve, u)
+    found = cycle_at(curve, u)
+    # The model as it was given: its edge too.
+    return replace(found, model=model)
+
+
+def closed(
+    flow: FlowMap, nodes: Floats, span: float, mirror: Floats, shift: Floats
+) -> tuple[PeriodicOrbitCurve, Floats]:
+    """The curve at whose present parameters the orbit closes, and the unknowns there."""
+    # The parameter is held: any that does not vanish will do, and none where the model has none.
+    held = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
+    value = 0.0 if held == HELD else float(flow.values[held])
+    scale = abs(value) or 1.0
+    share = 1.0 if flow.forcing is None else span / flow.forcing.period(flow.values)[0]
+    curve = PeriodicOrbitCurve(
+        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes[0], np.zeros(flow.dim), share
+    )
+    guess = curve.pack(nodes, span, value)
+    curve.fix_phase(guess)
+    tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
+    row = natural_constraint(guess)
+    # Where energy is kept cycles come in families: near one the equations leave a direction nearly free.
+    few = _SINGULAR if len(guess) < _FAMILY else ()
+    ways: list[Callable[..., Floats]] = [newton_corrector]
+    ways += [partial(nearest_of_family, singular=size) for size in few]
+    failure = ""
+    for way in ways:
+        try:
+            u = way(curve, guess, row, patience=30)
+            reason = _no_cycle(curve, u)
+        except (CorrectorFailed, IntegrationError) as error:
+            reason = str(error)
+        if not reason:
+            return curve, u
+        failure = failure or reason
+    raise ModelError(f"{tried}: {failure}")
+
+
+def _no_cycle(curve: PeriodicOrbitCurve, u: Floats) -> str:
+    """Why what solves the equations is no cycle, if it is none."""
+    flow, (residual, _), start = curve.flow, curve.equations(u), curve.nodes(u)[0]
+    if not np.isfinite(u).all() or np.abs(residual).max() > _RESIDUAL:
+        return "Newton's method does not converge"
+    if flow.forcing is not None:
+        return ""
+    rest = np.abs(curve.rate_at(curve.values_at(u), start) * flow.clock / flow.size).max()
+    short = curve.span(u) < 1e-6 * flow.clock
+    return "the orbit shrinks to a state of rest" if rest < 1e-9 or short else ""
+
+
+def has_shorter_period(curve: PeriodicOrbitCurve, u: Floats) -> str:
+    """Of which bifurcation an orbit is that closes after half its time already, if it does."""
+    if curve.symmetric:
+        return ""
+    flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
+    end = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))[-1]
+    ways = [(np.ones(flow.dim), "a period doubling")]
+    if flow.mirror is not None:
+        ways.append((flow.mirror, "a symmetry breaking"))
+    for mirror, kind in ways:
+        gap = mirror * end - start
+        if np.abs((gap + flow.turns(gap)) / flow.size).max() < _HALF:
+            return kind
+    return ""
+
+
+def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve, Floats]:
+    """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
+    flow, values = curve.flow, curve.values_at(u)
+    span, start = curve.span(u), curve.nodes(u)[0]
+    # What is symmetric closes after odd parts only, seen in the mirror.
+    ways = [(k, curve.mirror) for k in _PRIMES if k > 2 or not curve.symmetric]
+    if flow.mirror is not None and not curve.symmetric:
+        ways.append((2, flow.mirror))
+    ways.sort(key=lambda way: -way[0])
+    times = np.array([0.0, *(span / k for k, _ in ways)])
+    model = flow.with_values(values)
+
+    def states_at(moments: Floats) -> Floats:
+        run = simulate(model, moments, flow.full(start), rtol=1e-12, atol=1e-14, method="auto")
+        return flow.reduced(run.state)
+
+    def extent(time: float) -> float:
+        # At unequal distances: equal ones may be a round each.
+        states = states_at(time * np.linspace(0.0, 1.0, _LOOKS) ** 1.3)
+        return float((np.ptp(states, axis=0) / flow.size).max())
+
+    distinct, place = np.unique(times, return_inverse=True)
+    ends = states_at(distinct)[place]
+    for (parts, mirror), end in zip(ways, ends[1:], strict=True):
+        gap = mirror * end - start
+        shift = flow.turns(gap)
+        if np.abs((gap + shift) / flow.size).max() > _SAME:
+            continue
+        if flow.forcing is not None and not repeats(model, flow.kept, flow.size, span / parts, mirror):
+            continue
+        share = span / parts
+        if extent(share) < _WHOLE * extent(span):
+            continue  # it has hardly left its start, where it is slow
+        nodes = flown(flow, values, start, share, pieces_for(flow, share))
+        try:
+            found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
+        except ModelError:
+            continue
+        return _simplest(*found)
+    return curve, u
+
+
+def replace_values(flow: FlowMap, values: Floats) -> FlowMap:
+    """The flow whose model has these values."""
+    return replace(flow, model=flow.with_values(values))
+
+
+def flown(flow: FlowMap, values: Floats, start: Floats, span: float, pieces: int) -> Floats:
+    """States (pieces + 1, r) at equal distances of time along an orbit."""
+    states = [start]
+    for i in range(pieces):
+        begin = np.array([i * span / pieces])
+        states.append(flow.fly(values, states[-1][np.newaxis], np.array([span / pieces]), t=begin).x[0])
+    return np.array(states)
+
+
+def _shift_of(flow: FlowMap, nodes: Floats, span: float) -> Floats:
+    share = np.array([span / len(nodes)])
+    end = flow.fly(flow.values, nodes[-1:], share, t=span - share).x[0]
+    return flow.turns(end - nodes[0])
+
+
+def _return_time(flow: FlowMap, model: Model, start: Floats, longest: float) -> tuple[float, bool]:
+    """When the run from a state comes back, and whether it is its mirror image that comes back."""
+    count = math.ceil(_FINE * longest / flow.clock)
+    times = np.linspace(0.0, longest, count + 1)
+    states = flow.reduced(simulate(model, times, start, rtol=1e-10, atol=1e-13, method="auto").state)
+    images = [(np.ones(flow.dim), False)] + ([] if flow.mirror is None else [(flow.mirror, True)])
+    returns = []
+    for mirror, mirrored in images:
+        gap = mirror * states - states[0]
+        gap = gap + flow.turns(gap)
+        away = np.linalg.norm(gap / flow.size, axis=1)
+        left = np.maximum.accumulate(away) > 4 * _CLOSE
+        # A minimum lies between samples; the distance there, of a straight line between neighbours.
+        for i in range(1, count):
+            if not (away[i] <= away[i - 1] and away[i] < away[i + 1] and left[i]):
+                continue
+            before, after = gap[i - 1] / flow.size, gap[i + 1] / flow.size
+            line = after - before
+            part = float(np.clip(-(before @ line) / (line @ line), 0.0, 1.0)) if line.any() else 0.5
+            time = times[i - 1] + part * (times[i + 1] - times[i - 1])
+            # Curved between samples: near the minimum the gap's part across the line is what counts.
+            middle = gap[i] / flow.size
+            across = middle - line * ((middle @ line) / (line @ line)) if line.any() else middle
+            returns.append((float(np.linalg.norm(across)), float(time), mirrored))
+    if not returns:
+        raise ModelError(f"the run from the guess does not come back within {longest:.4g}")
+    best = min(away for away, _, _ in returns)
+    if best > 10 * _CLOSE:
+        raise ModelError(
+            f"the run from the guess does not come near its start within {longest:.4g}: give the period"
+        )
+    _, time, mirrored = min((r for r in returns if r[0] <= max(3.0 * best, 1e-3)), key=lambda r: r[1])
+    return time, mirrored

@@ -1,0 +1,165 @@
+"""Pseudo-arclength continuation: tangent predictor, Newton corrector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from udd.errors import IntegrationError
+
+from .condensation import CyclicEquations
+from .flow_map import Floats
+
+__all__ = [
+    "CorrectorFailed",
+    "Curve",
+    "CurvePoint",
+    "natural_constraint",
+    "nearest_of_family",
+    "newton_corrector",
+    "predictor_corrector_step",
+    "tangent_at",
+]
+
+_ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
+_NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
+_MOST = 8  # Newton steps from a good guess
+_TURN = 0.95  # least cosine between one tangent and the next
+_MOVED = 0.25  # of a step, from the tangent to the curve
+_STRAIGHT = 0.995  # from here on the next step may be longer
+_DENSE = 60  # unknowns up to which a dense matrix is as fast
+
+
+class CorrectorFailed(Exception):
+    """Newton's method did not converge."""
+
+
+class Curve(Protocol):
+    """`n` equations for `n + 1` scaled unknowns."""
+
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
+        """Residuals (n,) and their derivatives (n, n + 1)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePoint:
+    """A point of the curve and the direction in which it goes on."""
+
+    u: Floats
+    tangent: Floats
+
+
+def solve(matrix: Floats | CyclicEquations, row: Floats, right: Floats) -> Floats:
+    """The solution of the equations below which one more row stands."""
+    result: Floats
+    if isinstance(matrix, np.ndarray):
+        full = np.vstack([matrix, row])
+        try:
+            result = np.asarray(np.linalg.solve(full, right), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            result = np.asarray(np.linalg.lstsq(full, right, rcond=None)[0], dtype=np.float64)
+        return result
+    try:
+        result = matrix.solve(row, right)
+    except np.linalg.LinAlgError:
+        raise CorrectorFailed("the equations are singular") from None
+    return result
+
+
+def natural_constraint(u: Floats) -> Floats:
+    """The direction in which the parameter, the last of the unknowns, alone rises: the row that holds it."""
+    row = np.zeros(len(u))
+    row[-1] = 1.0
+    return row
+
+
+def newton_corrector(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> Floats:
+    """The point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
+
+    Raises
+    ------
+    CorrectorFailed
+    """
+    u, before = guess.copy(), np.inf
+    for _ in range(patience):
+        try:
+            residual, matrix = curve.equations(u)
+        except IntegrationError as error:
+            raise CorrectorFailed(str(error)) from None
+        step = solve(matrix, row, np.append(-residual, row @ (guess - u)))
+        size = float(np.abs(step).max())
+        if not np.isfinite(size) or size > 1e3:
+            raise CorrectorFailed("Newton's method diverges")
+        u = u + step
+        if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
+            return u
+        before = size
+    raise CorrectorFailed("Newton's method does not converge")
+
+
+def nearest_of_family(
+    curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, singular: float = 1e-7
+) -> Floats:
+    """A solution in the plane through `guess` of equations that are singular but can be solved.
+
+    By the method of Gauss and Newton: each step is the shortest of those that solve the linear equations;
+    singular values below `singular` times the largest count as zero.
+
+    Raises
+    ------
+    CorrectorFailed
+    """
+    u, before = guess.copy(), np.inf
+    for _ in range(patience):
+        residual, matrix = curve.equations(u)
+        dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+        full, right = np.vstack([dense, row]), np.append(-residual, row @ (guess - u))
+        step = np.linalg.lstsq(full, right, rcond=singular)[0]
+        size = float(np.abs(step).max())
+        if not np.isfinite(size) or size > 1e3:
+            break
+        u = u + step
+        if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
+            return u
+        before = size
+    raise CorrectorFailed("Newton's method does not converge")
+
+
+def tangent_at(curve: Curve, u: Floats, along: Floats) -> Floats:
+    """The unit tangent at a point, in the sense of `along`."""
+    _, matrix = curve.equations(u)
+    t = solve(matrix, along, np.append(np.zeros(len(u) - 1), 1.0))
+    unit: Floats = t / np.linalg.norm(t)
+    return unit
+
+
+def predictor_corrector_step(
+    curve: Curve, here: CurvePoint, step: float, longest: float, shortest: float = 1e-8
+) -> tuple[CurvePoint, float, float]:
+    """The next point along the curve, its distance, and the step to be tried next.
+
+    Raises
+    ------
+    CorrectorFailed
+        No step longer than `shortest` finds one.
+    """
+    reason = "the curve turns too sharply"
+    while step >= shortest:
+        try:
+            guess = here.u + step * here.tangent
+            u = newton_corrector(curve, guess, here.tangent)
+            tangent = tangent_at(curve, u, here.tangent)
+        except (CorrectorFailed, IntegrationError) as error:
+            step, reason = 0.5 * step, str(error)
+            continue
+        turn = float(tangent @ here.tangent)
+        # A curve that turns no more does not move further: it would be another one.
+        if turn < _TURN or np.linalg.norm(u - guess) > _MOVED * step:
+            step *= 0.5
+            continue
+        # Where the curve is nearly straight steps may grow.
+        return CurvePoint(u, tangent), step, min(step * (1.5 if turn > _STRAIGHT else 1.0), longest)
+    raise CorrectorFailed(reason)

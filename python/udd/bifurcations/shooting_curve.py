@@ -1,0 +1,208 @@
+"""Periodic orbits as a curve over a parameter: multiple shooting with a phase condition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .condensation import CyclicEquations
+from .flow_map import Floats, FlowMap, SegmentEnds
+from .pseudo_arclength import _DENSE
+
+__all__ = ["HELD", "PeriodicOrbitCurve"]
+
+HELD = -1
+"""The index of a parameter that the model does not have: a cycle alone needs none."""
+
+
+def _planes(rates: Floats) -> Floats:
+    """Orthonormal bases (m, r, r - 1) of the planes across these rates (m, r)."""
+    m, r = rates.shape
+    stacked = np.concatenate([rates[:, :, None], np.broadcast_to(np.eye(r), (m, r, r))], axis=2)
+    # The first vector of each basis is along the flow, which the pieces take to one another.
+    bases, _ = np.linalg.qr(stacked)
+    return bases[:, :, 1:]
+
+
+@dataclass(eq=False)
+class PeriodicOrbitCurve:
+    """Scaled nodes of an orbit that closes after the time `span`, and that time, and the parameter.
+
+    The orbit is cut into pieces of equal time. What comes out of the last one, seen in the mirror where
+    `mirror` has signs and turned by `shift`, must be where the first one starts: a symmetric cycle is
+    followed over half its period. The phase is fixed by the plane through a reference across its flow; that
+    of a forced model by the time, and instead the orbit lasts as long as the forcing says.
+
+    Attributes
+    ----------
+    flow : FlowMap
+    values : ndarray
+        The model's parameters, of which the one with the index `parameter` is varied: `HELD` where there are
+        none.
+    scale : float
+        The unit of the parameter in the unknowns.
+    clock : float
+        The unit of time in the unknowns.
+    pieces : int
+    mirror : ndarray (r,)
+        Signs, all of them +1 where there is no mirror.
+    shift : ndarray (r,)
+        What is added at the end: turns of angles.
+    reference, across : ndarray (r,)
+        The plane that the first node lies in.
+    share : float
+        Of a forced model: after how many of the forcing's periods the orbit closes.
+    """
+
+    flow: FlowMap
+    values: Floats
+    parameter: int
+    scale: float
+    clock: float
+    pieces: int
+    mirror: Floats
+    shift: Floats
+    reference: Floats
+    across: Floats
+    share: float = 1.0
+    loose: float = 1.0
+    seen: tuple[Floats, SegmentEnds] | None = field(default=None, init=False)
+
+    def pack(self, nodes: Floats, span: float, value: float) -> Floats:
+        """Unknowns from nodes (m, r), the time and the parameter's value."""
+        weight = 1.0 / np.sqrt(self.pieces)
+        scaled = (nodes / self.flow.size * weight).ravel()
+        return np.append(scaled, [span / self.clock, value / self.scale])
+
+    def nodes(self, u: Floats) -> Floats:
+        """The nodes (m, r)."""
+        nodes: Floats = u[:-2].reshape(self.pieces, -1) * self.flow.size * np.sqrt(self.pieces)
+        return nodes
+
+    def span(self, u: Floats) -> float:
+        """The time until the orbit closes."""
+        return float(u[-2] * self.clock)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the orbit closes in the mirror, after half its period."""
+        return bool((self.mirror < 0).any())
+
+    def period(self, u: Floats) -> float:
+        """The time until the orbit is back at its start."""
+        return self.span(u) * (2.0 if self.symmetric else 1.0)
+
+    @property
+    def name(self) -> str:
+        """The parameter's name."""
+        return self.flow.names[self.parameter]
+
+    def value(self, u: Floats) -> float:
+        """The parameter's value."""
+        return float(u[-1] * self.scale)
+
+    def values_at(self, u: Floats) -> Floats:
+        """All parameters."""
+        values = self.values.copy()
+        if self.parameter != HELD:
+            values[self.parameter] = self.value(u)
+        return values
+
+    def fix_phase(self, u: Floats) -> None:
+        """Take this orbit's first node for the reference."""
+        if self.flow.forcing is not None:
+            return
+        self.reference = self.nodes(u)[0]
+        rate = self.rate_at(self.values_at(u), self.reference)
+        self.across = rate / np.linalg.norm(rate / self.flow.size) / self.flow.size**2
+
+    def begins(self, u: Floats) -> Floats:
+        """When the pieces begin (m,); always at 0 where the law does not ask."""
+        if self.flow.forcing is None:
+            return np.zeros(self.pieces)
+        return np.linspace(0.0, self.span(u), self.pieces, endpoint=False)
+
+    def rate_at(self, values: Floats, x: Floats) -> Floats:
+        """The rate at a reduced state."""
+        rate: Floats = self.flow.with_values(values).rates(0.0, self.flow.full(x))[self.flow.kept]
+        return rate
+
+    def flight(self, u: Floats) -> SegmentEnds:
+        """Where the pieces end, with derivatives by the parameter."""
+        if self.seen is None or not np.array_equal(self.seen[0], u):
+            spans = np.full(self.pieces, self.span(u) / self.pieces)
+            wanted = () if self.parameter == HELD else (self.parameter,)
+            found = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, self.loose, self.begins(u))
+            self.seen = u.copy(), found
+        return self.seen[1]
+
+    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
+        """Scaled gaps between the pieces and the phase, and their derivatives."""
+        m, r, size = self.pieces, self.flow.dim, self.flow.size
+        weight = 1.0 / np.sqrt(m)
+        nodes, found = self.nodes(u), self.flight(u)
+        turn = np.ones((m, r))
+        turn[-1] = self.mirror
+        ends = found.x * turn
+        ends[-1] += self.shift
+        gaps = (ends - np.roll(nodes, -1, axis=0)) / size
+        by_state = found.by_state * turn[:, :, None] * size / size[:, None] / weight
+        by_span = found.rate * turn / size * (self.clock / m)
+        by_value = found.by_parameter[:, :, 0] * turn / size * self.scale
+        forcing = self.flow.forcing
+        if forcing is None:
+            phase, first = float(self.across @ (nodes[0] - self.reference)), self.across * size / weight
+            last = np.zeros(2)
+        else:
+            # A later piece also begins later, by as much as those before it take longer.
+            rates = self._rates_at_nodes(u)
+            moved = found.rate - np.einsum("mij,mj->mi", found.by_state, rates)
+            by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
+            period, by_values = forcing.period(self.values_at(u))
+            phase, first = (self.span(u) - self.share * period) / self.clock, np.zeros(r)
+            by_own = 0.0 if self.parameter == HELD else float(by_values[self.parameter])
+            last = np.array([1.0, -self.share * by_own * self.scale / self.clock])
+        residual = np.append(gaps.ravel(), phase)
+        n = m * r
+        if n <= _DENSE:
+            dense = np.zeros((n + 1, n + 2))
+            for i in range(m):
+                rows, after = slice(i * r, i * r + r), ((i + 1) % m) * r
+                dense[rows, rows] += by_state[i]
+                dense[rows, after : after + r] -= np.eye(r) / weight
+            dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
+            dense[n, :r], dense[n, n:] = first, last
+            return residual, dense
+        both = np.stack([by_span, by_value], axis=2)
+        return residual, CyclicEquations(by_state, 1.0 / weight, both, first, last)
+
+    def _rates_at_nodes(self, u: Floats) -> Floats:
+        model = self.flow.with_values(self.values_at(u))
+        rates: Floats = model.rates(self.begins(u), self.flow.full(self.nodes(u)))[:, self.flow.kept]
+        return rates
+
+    def closing(self, u: Floats) -> Floats:
+        """The derivative (r, r) of the map from the first node to where the orbit closes."""
+        product = np.eye(self.flow.dim)
+        for matrix in self.flight(u).by_state:
+            product = matrix @ product
+        return self.mirror[:, None] * product
+
+    def factors_across(self, u: Floats) -> Floats:
+        """The pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
+
+        Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
+        Of a forced model's all are those of the stroboscopic map: the whole derivatives (m, r, r).
+        """
+        size, found = self.flow.size, self.flight(u)
+        turn = np.ones((self.pieces, self.flow.dim))
+        turn[-1] = self.mirror
+        scaled = found.by_state * turn[:, :, None] * size / size[:, None]
+        if self.flow.forcing is not None:
+            return np.ascontiguousarray(scaled)
+        # Where one piece ends the next begins, in the same plane.
+        after = _planes(found.rate * turn / size)
+        before = np.roll(after, 1, axis=0)
+        factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before
+        return np.ascontiguousarray(factors)

@@ -1,0 +1,150 @@
+"""Equilibria and cycles, one at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.models import Model, beyond_the_edge
+
+from .flow_map import Floats
+
+if TYPE_CHECKING:
+    from udd.simulation.trajectory import Trajectory
+
+    from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
+
+Complex = NDArray[np.complex128]
+
+_ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
+_FAMILY = 1e-6  # of its period: by more no inaccuracy moves a neutral cycle
+
+
+def kind_of_rest(eigenvalues: Complex) -> str:
+    """What the flow near an equilibrium with these eigenvalues looks like."""
+    growing, turning = eigenvalues.real > 0, np.abs(eigenvalues.imag) > 0
+    if (eigenvalues.real == 0.0).all() and turning.all():
+        return "centre"
+    if growing.all() or not growing.any():
+        word = "unstable" if growing.all() else "stable"
+        return f"{word} focus" if turning.any() else f"{word} node"
+    return "saddle-focus" if turning.any() else "saddle"
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A state at which nothing changes but angles that nothing depends on.
+
+    Attributes
+    ----------
+    model : Model
+    state : ndarray, shape (dim,)
+        Angles that nothing depends on are 0; they turn at their constant rates.
+    eigenvalues : ndarray of complex, shape (r,)
+        Of the rates' derivative by the components that the rates depend on; largest real part first.
+    kind : str
+        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node", "unstable focus"; "centre"
+        where small swings neither grow nor decay.
+    residual : float
+        What is left of the rates, in typical sizes per typical time.
+    lyapunov_coefficient : float
+        The first Lyapunov coefficient of the complex pair nearest to the imaginary axis, NaN where there is
+        none: where the pair crosses the axis, a Hopf bifurcation is supercritical if it is negative.
+    """
+
+    model: Model
+    state: Floats
+    eigenvalues: Complex
+    kind: str
+    residual: float
+    lyapunov_coefficient: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether all eigenvalues have negative real parts."""
+        return bool((self.eigenvalues.real < 0).all())
+
+    def __repr__(self) -> str:
+        state = ", ".join(
+            f"{name}={value:.6g}" for name, value in zip(self.model.state_names, self.state, strict=True)
+        )
+        values = ", ".join(f"{value:.5g}" for value in self.eigenvalues)
+        return f"<Equilibrium of {self.model!r} at {state}: {self.kind}, eigenvalues {values}>"
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """A cycle of a model.
+
+    Attributes
+    ----------
+    model : Model
+    state : ndarray, shape (dim,)
+        A state on it; angles that nothing depends on are 0.
+    period : float
+        Its period, the time after which all that the rates depend on is as before.
+    multipliers : ndarray of complex, shape (r - 1,)
+        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out. Of a
+        forced model: those of the stroboscopic map, shape (r,).
+    symmetric : bool
+        Whether it is its own image under the model's symmetry, half a period later.
+    nodes : ndarray, shape (m, dim)
+        States on it at equal distances of time, from `state` on; of a symmetric one over half the period.
+    residual : float
+        The largest gap between the pieces of orbits that it was found of, in typical sizes.
+    """
+
+    model: Model
+    state: Floats
+    period: float
+    multipliers: Complex
+    symmetric: bool
+    nodes: Floats
+    residual: float
+    _curve: PeriodicOrbitCurve | None = field(default=None, repr=False)
+    _unknowns: Floats | None = field(default=None, repr=False)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers are inside the unit circle, and not on it but for rounding."""
+        return bool((np.abs(self.multipliers) < 1.0 - _ON).all())
+
+    @property
+    def neutral(self) -> bool:
+        """Whether no multiplier is outside the unit circle, and one on it but for rounding."""
+        return not self.stable and bool((np.abs(self.multipliers) <= 1.0 + _ON).all())
+
+    @cached_property
+    def period_error(self) -> float:
+        """A bound of the period's error: how far it moves when runs are a hundred times less accurate."""
+        from udd.bifurcations.error_bounds import period_error_of
+
+        if self._curve is None or self._unknowns is None:
+            return float("nan")
+        error = period_error_of(self._curve, self._unknowns)
+        # In a family less accurate runs find another cycle, unless its period or energy is held.
+        return error if error < _FAMILY * self.period or not self.neutral else float("nan")
+
+    def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
+        """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
+        from udd.simulation.trajectory import simulate
+
+        times = np.linspace(0.0, self.period, n + 1)
+        tight: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"} | options
+        return simulate(beyond_the_edge(self.model), times, self.state, **tight)
+
+    def __repr__(self) -> str:
+        stable = "stable" if self.stable else "neutral" if self.neutral else "unstable"
+        mirror = "symmetric, " if self.symmetric else ""
+        largest = ", ".join(f"{value:.6g}" for value in self.multipliers)
+        bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"
+        return (
+            f"<PeriodicOrbit of {self.model!r}: period {self.period:.13g} ({bound}), "
+            f"{mirror}{stable}, multipliers {largest}>"
+        )

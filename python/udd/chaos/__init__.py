@@ -1,0 +1,1 @@
+"""Lyapunov exponents, Poincare sections, recurrence and the lifetimes of transients."""

@@ -1,0 +1,243 @@
+"""The largest Lyapunov exponent, by the variational equations."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any, Literal, TypedDict, Unpack, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.progress import progress_bar, thread_count
+from udd._util.validation import number
+from udd.errors import ConvergenceWarning, IntegrationError, ModelError
+from udd.models import DLE, Model
+from udd.models.parameter_batch import default_state, parameter_batch
+from udd.simulation.outcomes import FINISHED, OUTCOMES
+from udd.simulation.trajectory import initial_state, tolerances
+
+__all__ = ["ConvergenceWarning", "lyapunov"]
+
+
+class _Options(TypedDict, total=False):
+    t: float | None
+    tol: float | None
+    transient: float | None
+    state0: ArrayLike | None
+    rtol: float
+    atol: float
+    threads: int | None
+    progress: bool | None
+
+
+@overload
+def lyapunov(
+    w: float | Model, *, with_error: Literal[False] = False, **options: Unpack[_Options]
+) -> float: ...
+
+
+@overload
+def lyapunov(
+    w: ArrayLike, *, with_error: Literal[False] = False, **options: Unpack[_Options]
+) -> NDArray[np.float64]: ...
+
+
+@overload
+def lyapunov(
+    w: float | Model, *, with_error: Literal[True], **options: Unpack[_Options]
+) -> tuple[float, float]: ...
+
+
+@overload
+def lyapunov(
+    w: ArrayLike, *, with_error: Literal[True], **options: Unpack[_Options]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+
+@overload
+def lyapunov(
+    w: ArrayLike | Model,
+    *,
+    parameters: Mapping[str, ArrayLike] | None,
+    with_error: bool = False,
+    **options: Unpack[_Options],
+) -> Any: ...
+
+
+def lyapunov(
+    w: ArrayLike | Model,
+    *,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    t: float | None = None,
+    tol: float | None = None,
+    transient: float | None = None,
+    state0: ArrayLike | None = None,
+    rtol: float = 1e-8,
+    atol: float = 1e-10,
+    threads: int | None = None,
+    progress: bool | None = None,
+    with_error: bool = False,
+) -> Any:
+    """The largest Lyapunov exponent: the mean rate at which neighbouring orbits part.
+
+    Parameters
+    ----------
+    w : float, array_like or Model
+        Drive of the undamped diffusionless Lorenz equations, or any model. Arrays of any shape are spread
+        over all cores.
+    parameters : mapping of str to array_like, optional
+        Other values of some of the model's parameters, of shapes that broadcast with one another and with
+        `w`; the result has their shape.
+    t : float, optional
+        Time to run at most; by default 1e5, or 25000 s for a model with units.
+    tol : float, optional
+        The run ends once the standard error is down to this; by default 2e-3 per unit of time, or 8e-3 /s.
+    transient : float, optional
+        Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
+        Should the first half of what follows disagree with the second, it is left out too.
+    state0 : array_like, shape (dim,), optional
+        Initial state. Where several attractors coexist it decides between them.
+    rtol, atol : float
+        Tolerances of the run.
+    threads : int, optional
+        How many threads to use, by default one per core. No bit of the result depends on it.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default for long arrays, where stderr is a terminal.
+    with_error : bool
+        Whether to return the standard error too.
+
+    Returns
+    -------
+    exponent : float, or ndarray of the shape of `w` and the `parameters`
+        Per unit of time (1/s for a model with units).
+    standard_error : float or ndarray
+        Where `with_error` is set: from the scatter of the means over blocks of the run. Blocks of a short run
+        are not long beside the motion's memory, and the error is on the large side: by a half at t = 3000 and
+        w = 1.
+
+    Raises
+    ------
+    ModelError
+        A drive or an option that cannot be used.
+    IntegrationError
+        The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up. In an array such an
+        exponent is NaN, with a warning.
+    KeyboardInterrupt
+        On Ctrl-C, at once.
+
+    Warns
+    -----
+    ConvergenceWarning
+        Where the standard error does not meet `tol` after the time `t`, or an orbit of an array has no
+        exponent.
+
+    Notes
+    -----
+    The tangent vector is the derivative part of a run over dual numbers, kept at length 1
+    (Benettin et al., Meccanica 15 (1980) 9); steps are taken by the Taylor method, many orbits at once. The
+    exponent is that of the orbit from `state0`: a transient longer than `t`, as near w = 4.5, is not seen as
+    one. See :func:`udd.lyapunov_spectrum` for a verdict. Drives are taken in portions, so that memory hardly
+    grows beyond the result.
+
+    Examples
+    --------
+    >>> import udd
+    >>> value, error = udd.lyapunov(1.0, tol=5e-3, with_error=True)
+    >>> abs(value - 0.21016) < 4 * error
+    True
+
+    With damping, and of a model with units:
+
+    >>> udd.lyapunov([1.0, 2.0, 3.0], parameters={"B": 0.2}, tol=0.02).shape
+    (3,)
+    >>> disk = udd.Disk(0.05, edge="ignore")
+    >>> udd.lyapunov(disk, parameters={"W": [0.055, 0.06], "k0": [[0.012], [0.013]]}, tol=0.2).shape
+    (2, 2)
+    """
+    model, own = (w, {}) if isinstance(w, Model) else (DLE(1.0), {"w": w})
+    for name in own.keys() & (parameters or {}).keys():
+        raise ModelError(f"{name} is given twice, also among the parameters")
+    orbits = parameter_batch(model, {**own, **(parameters or {})})
+    n, shape = len(orbits), orbits.shape
+    for drives in (orbits.values[name] for name in own if n):
+        DLE(float(drives.min()))  # refuses what is negative
+    slow = model.slow
+    time, skipped = span(t, transient, longest=1e5 * slow, skip=400.0 * slow)
+    goal = number("tol", 2e-3 / slow if tol is None else tol, above=0.0)
+    rtol, atol = tolerances(rtol, atol)
+    start = initial_state(model, default_state(model) if state0 is None else state0)
+    workers = thread_count(threads)
+
+    exponents, errors = np.empty(n), np.empty(n if with_error else 0)
+    missed, worst = 0, 0.0
+    outcomes: list[int] = []
+    with progress_bar(n, "exponents", progress) as show:
+        for first in range(0, n, PORTION):
+            part = slice(first, min(first + PORTION, n))
+            rows = orbits.rows(part)
+            found = _core.lyapunov(
+                model, rows, start[None, :], False, time, skipped, goal, rtol, atol, workers, show(first)
+            )
+            done = found["outcome"] == FINISHED
+            exponents[part] = np.where(done, found["value"][:, 0], np.nan)
+            if with_error:
+                errors[part] = np.where(done, found["standard_error"][:, 0], np.nan)
+            error = np.nan_to_num(found["standard_error"][:, 0], nan=np.inf)  # too short for blocks
+            short = done & (error > goal)
+            if short.any():
+                missed += int(short.sum())
+                worst = max(worst, float(error[short].max()))
+            if not done.all():
+                outcomes += found["outcome"][~done].tolist()
+    if outcomes:
+        _tell(outcomes, n, shape == ())
+    if missed:
+        which = "the exponent has" if shape == () else f"{missed} of {n} exponents have"
+        warnings.warn(
+            f"{which} a standard error up to {worst:.2g}, above tol = {goal:g}; "
+            f"a longer t (now {time:g}) would help",
+            ConvergenceWarning,
+            stacklevel=2,
+        )
+    if shape == ():
+        return (float(exponents[0]), float(errors[0])) if with_error else float(exponents[0])
+    exponents = exponents.reshape(shape)
+    return (exponents, errors.reshape(shape)) if with_error else exponents
+
+
+PORTION = 1 << 10
+"""So many orbits are handed to the core at a time."""
+
+
+def _tell(outcomes: list[int], n: int, single: bool) -> None:
+    """Says what became of the orbits that have no exponent."""
+    counts = {OUTCOMES[code]: outcomes.count(code) for code in sorted(set(outcomes))}
+    if single:
+        (outcome,) = counts
+        raise IntegrationError(f"there is no exponent: {reason(outcome)}")
+    list_ = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+    warnings.warn(
+        f"{len(outcomes)} of {n} orbits have no exponent ({list_}) and are NaN",
+        ConvergenceWarning,
+        stacklevel=3,
+    )
+
+
+def reason(outcome: str) -> str:
+    """Why a run that ended so has no exponents."""
+    reasons = {
+        "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
+        "failed": "the solution blew up",
+    }
+    return reasons.get(outcome, outcome)
+
+
+def span(t: float | None, transient: float | None, *, longest: float, skip: float) -> tuple[float, float]:
+    """The checked time to run and how much of it is left out at the start."""
+    time = number("t", longest if t is None else t, above=0.0)
+    skipped = number("transient", min(skip, 0.1 * time) if transient is None else transient, least=0.0)
+    if skipped >= time:
+        raise ModelError(f"transient must be below t = {time:g}, not {skipped:g}")
+    return time, skipped

@@ -1,0 +1,447 @@
+"""Poincaré sections: where orbits cross a surface, and the maps from crossing to crossing."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.labelled import axes, dataset
+from udd._util.progress import progress_bar, thread_count
+from udd._util.validation import number, whole
+from udd.errors import IncompleteWarning, ModelError, interrupted
+from udd.models import Model, require_model
+from udd.models.parameter_batch import orbits_of
+from udd.simulation.outcomes import OUTCOMES
+from udd.simulation.trajectory import tolerances
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Section", "poincare"]
+
+_Floats = NDArray[np.float64]
+
+_DEFAULT = {"dle": "z", "disk": "Z", "pendulum": "theta"}
+_HEIGHT = {"dle": "z", "disk": "Z", "pendulum": "theta"}
+_DIRECTIONS = {"up": 1, "down": -1, "both": 0}
+# Named surfaces of a component X: the zero of its rate, and the direction that the name implies.
+_EXTREMA = {"maxima": -1, "minima": 1, "turning points": 0}
+_EXTREMUM = re.compile(rf"({'|'.join(_EXTREMA)}) of (\w+)")
+CLOCKS = 100.0  # typical times that a crossing may take on average
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Crossings of a surface, or of several, along one orbit or many.
+
+    Attributes
+    ----------
+    t : ndarray, shape (..., n)
+        When. One orbit that ended before n crossings has fewer; of many orbits such rows end in NaN.
+    state : ndarray, shape (..., n, dim)
+        Where, in the order of ``model.state_names``.
+    which : ndarray of int, shape (..., n)
+        Of which surface, counted from 0; -1 where there is none.
+    section : tuple of str
+        The surfaces: expressions that are zero there.
+    direction : tuple of {"up", "down", "both"}
+        In which direction of the expression they are crossed.
+    found : int, or ndarray of int, shape (...)
+        How many crossings there are.
+    residual : float, or ndarray, shape (...)
+        The largest absolute value of the expressions at the points.
+    outcome : str, or ndarray of str, shape (...)
+        ``"finished"``, or why there are fewer crossings: ``"ejected"``, ``"time ran out"``, ``"escaped"`` (to
+        infinity), ``"failed"``, ``"chattering"``, ``"interrupted"``.
+    end : ndarray, shape (..., dim)
+        The last state: the last crossing where it finished.
+    t_end : float, or ndarray, shape (...)
+        The time of that.
+    model : Model
+        What was run, before parameters were varied.
+    """
+
+    t: _Floats
+    state: _Floats
+    which: NDArray[np.int64]
+    section: tuple[str, ...]
+    direction: tuple[str, ...]
+    found: Any
+    residual: Any
+    outcome: Any
+    end: _Floats
+    t_end: Any
+    model: Model
+
+    @property
+    def return_times(self) -> _Floats:
+        """Times from crossing to crossing, shape (..., n - 1); of one surface: see :meth:`of`."""
+        self._single("return_times")
+        return np.diff(self.t, axis=-1)
+
+    def component(self, name: str) -> _Floats:
+        """One component of the points, shape (..., n).
+
+        Raises
+        ------
+        ModelError
+            The state has no such component.
+        """
+        names = self.model.state_names
+        if name not in names:
+            raise ModelError(f"the state has no component {name!r}; it has {', '.join(names)}")
+        return self.state[..., names.index(name)]
+
+    def of(self, which: int) -> Section:
+        """The crossings of one of several surfaces.
+
+        Parameters
+        ----------
+        which : int
+            Its place in :attr:`section`.
+
+        Returns
+        -------
+        Section
+            With rows as long as the longest, the others end in NaN.
+
+        Raises
+        ------
+        ModelError
+            There is no such surface.
+        """
+        if which not in range(len(self.section)):
+            raise ModelError(f"there are {len(self.section)} surfaces, counted from 0, and none is {which!r}")
+        own = self.which == which
+        count = own.sum(axis=-1)
+        order = np.argsort(~own, axis=-1, kind="stable")[..., : int(count.max(initial=0))]
+        there = np.take_along_axis(own, order, axis=-1)
+        t = np.where(there, np.take_along_axis(self.t, order, axis=-1), np.nan)
+        state = np.take_along_axis(self.state, order[..., None], axis=-2)
+        state = np.where(there[..., None], state, np.nan)
+        found = int(count) if count.ndim == 0 else count
+        index = np.where(there, 0, -1)
+        names, directions = (self.section[which],), (self.direction[which],)
+        rest = (self.residual, self.outcome, self.end, self.t_end, self.model)
+        return Section(t, state, index, names, directions, found, *rest)
+
+    def return_map(self, component: str) -> tuple[_Floats, _Floats]:
+        """Each crossing beside the next one.
+
+        Parameters
+        ----------
+        component : str
+            A component of the state, such as ``"y"``.
+
+        Returns
+        -------
+        x, x_next : ndarray, shape (..., n - 1)
+
+        Raises
+        ------
+        ModelError
+            The state has no such component, or there are several surfaces.
+        """
+        self._single("return_map")
+        x = self.component(component)
+        return x[..., :-1], x[..., 1:]
+
+    def cusp_map(self, component: str | None = None) -> tuple[_Floats, _Floats]:
+        """Lorenz's map: each maximum beside the next one.
+
+        It is made of the orbits from the first points of this section, followed from maximum to maximum.
+
+        Parameters
+        ----------
+        component : str, optional
+            Of what the maxima are; by default the height z of the DLE, Z of a disk, theta of a pendulum.
+
+        Returns
+        -------
+        height, next_height : ndarray, shape (..., n - 1)
+            With as many maxima n as this section has points.
+
+        Raises
+        ------
+        ModelError
+            The state has no such component, or there is no point to start from, or parameters were varied.
+        """
+        name = _HEIGHT.get(self.model.kind, self.model.state_names[0]) if component is None else component
+        self.component(name)
+        if self.t.ndim != 1:
+            raise ModelError("the cusp map is that of one orbit; ask udd.poincare for the maxima of many")
+        if not len(self.t):
+            raise ModelError("this section has no point from which to look for maxima")
+        maxima = poincare(self.model, f"maxima of {name}", len(self.t), state0=self.state[0], transient=0)
+        return maxima.return_map(name)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The points as labelled arrays: ``t``, ``which`` and every state, over the orbits and ``crossing``.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.poincare(udd.DLE(10.0), n=20).to_xarray().sizes["crossing"]
+        20
+        """
+        model = self.model
+        units = dict(zip(model.state_names, model.state_units, strict=True))
+        columns: dict[str, NDArray[Any]] = {
+            name: self.state[..., k] for k, name in enumerate(model.state_names)
+        }
+        columns |= {"t": self.t, "which": self.which}
+        orbits = axes(self.t.shape[:-1], "orbit") if self.t.ndim > 1 else []
+        surfaces = "; ".join(self.section)
+        return dataset(columns, [*orbits, "crossing"], units, {}, model=repr(model), section=surfaces)
+
+    def _single(self, what: str) -> None:
+        if len(self.section) > 1:
+            raise ModelError(f"{what} is that of one surface: choose one of {len(self.section)} by .of(k)")
+
+    def __repr__(self) -> str:
+        what = " and ".join(f"{s} = 0 ({d})" for s, d in zip(self.section, self.direction, strict=True))
+        if self.t.ndim == 1:
+            return (
+                f"<Section {what} of {self.model!r}: {self.found} points, residual {self.residual:.1e}, "
+                f"{self.outcome}>"
+            )
+        worst = float(np.max(self.residual, initial=0.0))
+        return (
+            f"<Section {what} of {self.model!r}: {self.t.shape[:-1]} orbits, up to {self.t.shape[-1]} "
+            f"points each, residual {worst:.1e}>"
+        )
+
+
+def poincare(
+    model: Model,
+    section: str | Sequence[str] | None = None,
+    n: int = 1000,
+    *,
+    state0: ArrayLike | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    direction: str | Sequence[str] | None = None,
+    transient: int = 100,
+    t_max: float | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    threads: int | None = None,
+    progress: bool | None = None,
+    partial: bool = False,
+) -> Section:
+    """Crossings of a surface along orbits: a Poincaré section.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+    section : str or list of str, optional
+        Surfaces, each an expression that is zero there, or an equation, of the state's components
+        (``"z"``, ``"omega = y"``), their rates (``"z'"``), the time ``t``, the parameters and numbers, with
+        ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tanh``, ``atan2(y, x)``, ``abs`` and
+        ``pi``. Or a name:
+        ``"maxima of z"``, ``"minima of z"``, ``"turning points of z"`` of any component, ``"reversal"``
+        (the angular velocity is zero). By default z = 0 of the DLE, Z = 0 of a disk, theta = 0 of a
+        pendulum, and the maxima of the first state of a user's own model.
+    n : int
+        How many crossings are wanted.
+    state0 : array_like, shape (..., dim), optional
+        Initial states, at time 0. An orbit that starts on the surface does not cross it there.
+    parameters : mapping of str to array_like, optional
+        Other values of some of the model's parameters, of shapes that broadcast with one another and with
+        the leading axes of `state0`; the result has these axes.
+    direction : {"up", "down", "both"} or list of these, optional
+        Whether crossings count where the expression rises, falls, or both. By default ``"up"``; for turning
+        points and reversals ``"both"``.
+    transient : int
+        How many crossings are left out first.
+    t_max : float, optional
+        The time at which an orbit ends in any case; by default 100 typical times of the motion for every
+        crossing.
+    rtol, atol : float
+        Tolerances of the run.
+    threads : int, optional
+        By default one per core. The result does not depend on it.
+    progress : bool, optional
+        Whether to show a progress bar; by default for many orbits in a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+
+    Returns
+    -------
+    Section
+
+    Raises
+    ------
+    ModelError
+        An expression, a state or an option that cannot be used.
+
+    Interrupted
+        On Ctrl-C, with the crossings found as its ``partial``.
+    MemoryError
+        There is no room for so many points.
+
+    Warns
+    -----
+    IncompleteWarning
+        Where orbits end before the surface is crossed n times; after Ctrl-C where a partial result was asked
+        for.
+
+    Notes
+    -----
+    Steps are taken by a Taylor method, whose polynomials are as accurate as the steps; a crossing is a zero
+    of the expression on such a polynomial. Two crossings within an eighth of a step can be missed; a surface
+    that is only touched is not crossed.
+
+    Examples
+    --------
+    >>> import udd
+    >>> points = udd.poincare(udd.DLE(10.0), n=20, transient=1000)
+    >>> points.residual < 1e-12
+    True
+    >>> print(f"{points.return_times.mean():.6f}")  # half a period of the symmetric orbit
+    1.679161
+    """
+    require_model(model)
+    surfaces, ways = surfaces_of(model, section, direction)
+    count, skipped = whole("n", n, 1), whole("transient", transient, 0)
+    rtol, atol = tolerances(rtol, atol)
+    shape, rows, starts = orbits_of(model, parameters or {}, state0)
+    if t_max is None:
+        end = CLOCKS * clock_of(model, rows) * (count + skipped)
+    else:
+        end = number("t_max", t_max, above=0.0)
+    jobs = max(len(rows), len(starts))
+    with progress_bar(jobs, "orbit", progress) as since:
+        found = _core.sections(
+            model,
+            rows,
+            starts,
+            list(surfaces),
+            list(ways),
+            skipped,
+            count,
+            end,
+            rtol,
+            atol,
+            thread_count(threads),
+            since(0),
+        )
+    names = np.array(OUTCOMES)[found["outcome"]]
+    numbers = found["found"].astype(np.int64)
+    columns = found["t"].shape[1]  # as many as were asked for, or were found until Ctrl-C
+    which = np.where(np.arange(columns) < numbers[:, None], found["which"].astype(np.int64), -1)
+    words = tuple(next(word for word, sign in _DIRECTIONS.items() if sign == way) for way in ways)
+    if shape == ():
+        own = int(numbers[0])
+        made = Section(
+            found["t"][0, :own],
+            found["points"][0, :own],
+            which[0, :own],
+            surfaces,
+            words,
+            own,
+            float(found["residual"][0]),
+            str(names[0]),
+            found["end"][0],
+            float(found["t_end"][0]),
+            model,
+        )
+    else:
+        made = Section(
+            found["t"].reshape(*shape, columns),
+            found["points"].reshape(*shape, columns, len(model.state_names)),
+            which.reshape(*shape, columns),
+            surfaces,
+            words,
+            numbers.reshape(shape),
+            found["residual"].reshape(shape),
+            names.reshape(shape),
+            found["end"].reshape(*shape, -1),
+            found["t_end"].reshape(shape),
+            model,
+        )
+    _tell(found["outcome"], numbers, count, made, partial)
+    return made
+
+
+def surfaces_of(
+    model: Model, section: str | Sequence[str] | None, direction: str | Sequence[str] | None
+) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """The expressions, and the signs of the directions in which they are crossed."""
+    if section is None:
+        section = _DEFAULT.get(model.kind, f"maxima of {model.state_names[0]}")
+    texts = [section] if isinstance(section, str) else section
+    if not isinstance(texts, Sequence) or not texts or not all(isinstance(text, str) for text in texts):
+        raise ModelError(f"section must be an expression such as 'z', or a list of them, not {section!r}")
+    if direction is None or isinstance(direction, str):
+        wanted: list[str | None] = [direction] * len(texts)
+    else:
+        wanted = list(direction)
+    if len(wanted) != len(texts):
+        raise ModelError(f"there are {len(texts)} sections but {len(wanted)} directions")
+    pairs = [_surface(model, *pair) for pair in zip(texts, wanted, strict=True)]
+    return tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs)
+
+
+def _surface(model: Model, text: str, direction: str | None) -> tuple[str, int]:
+    """A name as an expression."""
+    if direction is not None and direction not in _DIRECTIONS:
+        raise ModelError(f'direction must be "up", "down" or "both", not {direction!r}')
+    extremum = _EXTREMUM.fullmatch(text.strip())
+    if extremum is not None:
+        kind, name = extremum.groups()
+        implied = _EXTREMA[kind]
+        if name not in model.state_names:
+            raise ModelError(f"the state has no component {name!r}; it has {', '.join(model.state_names)}")
+        given = None if direction is None else _DIRECTIONS[direction]
+        if kind != "turning points" and given not in (None, implied):
+            raise ModelError(f"{text} say the direction themselves: leave direction out")
+        return f"{name}'", implied if given is None else given
+    if text.strip() == "reversal":
+        return model.state_names[0], _DIRECTIONS[direction or "both"]
+    return text, _DIRECTIONS[direction or "up"]
+
+
+def clock_of(model: Model, rows: _Floats) -> float:
+    """A typical time between crossings, that of the slowest orbit; `rows` are the orbits' parameters."""
+    p = dict(zip(model.parameters, rows.T, strict=True))
+    if model.kind == "dle":
+        # The symmetric orbit at strong drive takes 10.6 / sqrt(w).
+        rate = np.sqrt(p["w"]) / 10.0
+    elif model.kind == "disk":
+        # The same, as w = tau W/L.
+        rate = np.sqrt(p["g"] * p["W"] / (4.0 * p["k0"])) / 10.0
+    elif model.kind == "own":
+        rate = np.full(len(rows), 0.1)  # its unit of time is the user's
+    else:
+        rate = np.sqrt(p["g"] * p["length"] / p["inertia"]) / (2.0 * np.pi)
+    slowest = float(rate[np.isfinite(rate) & (rate > 0)].min(initial=1.0))
+    return 1.0 / max(slowest, 1e-6)
+
+
+def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Section, partial: bool) -> None:
+    """Tell of orbits with fewer points."""
+    short = outcome != OUTCOMES.index("finished")
+    if not short.any():
+        return
+    kinds, counts = np.unique(outcome[short], return_counts=True)
+    if len(outcome) == 1:
+        message = f"the orbit has {int(found[0])} crossings instead of {n}: {OUTCOMES[kinds[0]]}"
+    else:
+        whys = ", ".join(f"{OUTCOMES[kind]} {count}" for kind, count in zip(kinds, counts, strict=True))
+        message = f"{int(short.sum())} of {len(outcome)} orbits have fewer than {n} crossings: {whys}"
+    if (outcome == OUTCOMES.index("interrupted")).any():
+        interrupted(section, message, partial)
+    else:
+        warnings.warn(IncompleteWarning(message), stacklevel=3)

@@ -1,0 +1,508 @@
+"""Lyapunov spectrum by QR, Kaplan-Yorke dimension, and covariant Lyapunov vectors."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.validation import number, whole
+from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError
+from udd.models import DLE, Disk, Model, require_model
+from udd.models.parameter_batch import default_state
+from udd.simulation.outcomes import FINISHED, OUTCOMES
+from udd.simulation.trajectory import initial_state, tolerances
+
+from .largest_exponent import reason, span
+
+if TYPE_CHECKING:
+    from .poincare_sections import Section
+
+__all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
+
+_Floats = NDArray[np.float64]
+
+_SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_STAYS = 1e-3  # an exponent that is smaller than this, per typical time, is as good as zero
+_FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
+_LATE = 4  # times that a motion that nearly comes back is looked at again
+_POINTS = 600  # section points in which a periodic motion shows itself
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """The Lyapunov exponents of an orbit.
+
+    Attributes
+    ----------
+    exponents : ndarray, shape (dim,)
+        Largest first, per unit of time (1/s for a model with units); -inf where a contact sticks.
+    standard_errors : ndarray, shape (dim,)
+        From the scatter of the means over blocks of the run.
+    dimension : float
+        The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero.
+    verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "undecided"}
+        What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which
+        comes back or rests; chaos by a largest exponent at least four standard errors above zero; a torus
+        (quasiperiodic motion) by two exponents or more that are smaller than 1e-3 per typical time, and none
+        above.
+    period : float
+        The period of a periodic orbit, else NaN.
+    invariants : dict of str to float
+        What must vanish on every bounded orbit, such as ``"<z>"`` or the sum of the exponents less the mean
+        divergence: how far the run is from it. Averages of chaotic motion scatter like the exponents do.
+    t : float
+        The time that the averages cover, after the transient.
+    transient : float
+        How long the orbit at most took to settle on what it ends on, where the first averages were those of
+        another motion on the way there, such as chaos that lasts long but not for ever; else 0.
+    end : ndarray, shape (dim,)
+        The last state.
+    converged : bool
+        Whether the largest exponent's standard error met the tolerance, and the motion has settled.
+    model : Model
+        What was run.
+    section : Section or None
+        Where the orbit crosses a surface from its last state on, if that was asked for.
+    """
+
+    exponents: _Floats
+    standard_errors: _Floats
+    dimension: float
+    verdict: str
+    period: float
+    invariants: dict[str, float]
+    t: float
+    transient: float
+    end: _Floats
+    converged: bool
+    model: Model
+    section: Section | None = None
+
+    def __repr__(self) -> str:
+        pairs = zip(self.exponents, self.standard_errors, strict=True)
+        values = ", ".join(f"{value:.5g}({error:.1g})" for value, error in pairs)
+        after = f" after a transient of {self.transient:.4g}" if self.transient else ""
+        return (
+            f"<Spectrum of {self.model!r}: {values}; {self.verdict}{after}, dimension {self.dimension:.4g}>"
+        )
+
+
+def lyapunov_spectrum(
+    w: float | Model,
+    *,
+    t: float | None = None,
+    tol: float | None = None,
+    transient: float | None = None,
+    state0: ArrayLike | None = None,
+    section: str | Sequence[str] | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+) -> Spectrum:
+    """All Lyapunov exponents of an orbit, and a verdict on its motion.
+
+    Parameters
+    ----------
+    w : float or Model
+        Drive of the undamped diffusionless Lorenz equations, or any model.
+    t : float, optional
+        Time to run at most; by default 2e5, or 5e4 s for a model with units.
+    tol : float, optional
+        The run ends once the standard error of the largest exponent is down to this; by default 1e-3 per
+        unit of time, or 4e-3 /s.
+    transient : float, optional
+        Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
+        Should the first half of what follows disagree with the second, it is left out too.
+    state0 : array_like, shape (dim,), optional
+        Initial state. Where several attractors coexist it decides between them.
+    section : str or list of str, optional
+        A surface, or several, as in :func:`udd.poincare`, whose crossings are wanted too. The result's
+        `section` then holds the next 600 of them: those of the orbit's continuation from the run's last
+        state, `end`, which has the transient behind it.
+    rtol, atol : float
+        Tolerances of the run.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    ModelError
+        A drive or an option that cannot be used.
+    IntegrationError
+        The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up.
+
+    Warns
+    -----
+    ConvergenceWarning
+        Where the standard error does not meet `tol` after the time `t`.
+    IncompleteWarning
+        Where the orbit does not cross the `section` so often, as at rest, or on Ctrl-C meanwhile.
+
+    Notes
+    -----
+    Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
+    (G. Benettin et al., Meccanica 15 (1980) 9). Chaos is followed on, without tangents, for the time `t` in
+    all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there
+    slowly, the exponents are taken again from what it has settled on. Longer transients are not seen as such:
+    their mean is 8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
+
+    Examples
+    --------
+    >>> import udd
+    >>> found = udd.lyapunov_spectrum(1.0, tol=5e-3)
+    >>> found.verdict, round(float(found.exponents.sum()), 6)
+    ('chaos', -1.0)
+    >>> udd.lyapunov_spectrum(10.0).verdict
+    'periodic orbit'
+
+    Heights of the maxima on the attractor:
+
+    >>> maxima = udd.lyapunov_spectrum(1.0, tol=5e-3, section="maxima of z").section
+    >>> maxima.component("z").shape, maxima.residual < 1e-12
+    ((600,), True)
+    """
+    model = w if isinstance(w, Model) else DLE(number("w", w, least=0.0))
+    slow = model.slow
+    time, skipped = span(t, transient, longest=2e5 * slow, skip=400.0 * slow)
+    goal = number("tol", 1e-3 / slow if tol is None else tol, above=0.0)
+    rtol, atol = tolerances(rtol, atol)
+    start = initial_state(model, default_state(model) if state0 is None else state0)
+
+    run = _Run(model, rtol, atol)
+    if section is not None:
+        run.refuse(section, start)
+    found = run(start, time, skipped, goal)
+    fate = run.fate(found["end"][0])
+    spent, finer = float(found["time"][0]), goal
+    while not (fate.ordered or _positive(found)) and spent < time:
+        # Neither order nor chaos yet: on from here, for longer.
+        finer /= 2.0
+        found = run(found["end"][0], time - spent, 0.0, finer)
+        fate = run.fate(found["end"][0])
+        spent += float(found["time"][0])
+    if not fate.ordered:
+        # Chaos that has not ended may yet do so; without tangents the way there is short.
+        fate = run.fate(found["end"][0], time - spent)
+    other = fate.kind != "aperiodic" and (_positive(found) or fate.t > 0.0)
+    aside = spent + fate.t if other else 0.0
+    if fate.kind != "aperiodic" and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
+        # The averages are of the way there: once more, of what it leads to.
+        found = run(fate.state, time, 0.0, goal)
+        fate = run.fate(found["end"][0])
+        if fate.kind == "settling" and _positive(found):
+            # Neighbours part all the way: chaos in bands too narrow to be told from points.
+            fate = replace(fate, kind="aperiodic")
+        aside = aside if fate.kind != "aperiodic" else 0.0
+    values, errors = found["value"][0], found["standard_error"][0]
+    converged = bool(errors[0] <= goal) and fate.kind != "settling"
+    if fate.kind == "settling":
+        warnings.warn(
+            f"the motion still settles after t = {spent + fate.t:g}: these are no exponents of its end; "
+            f"a longer t (now {time:g}) would help",
+            ConvergenceWarning,
+            stacklevel=2,
+        )
+    elif not converged:
+        warnings.warn(
+            f"the largest exponent has a standard error of {errors[0]:.2g}, above tol = {goal:g}; "
+            f"a longer t (now {time:g}) would help",
+            ConvergenceWarning,
+            stacklevel=2,
+        )
+    if fate.ordered:
+        verdict = fate.kind
+    else:
+        verdict = "undecided"
+        if fate.kind == "aperiodic" and _positive(found):
+            verdict = "chaos"
+        elif fate.kind == "aperiodic" and _on_torus(model, found):
+            verdict = "torus"
+    order = np.argsort(-values, kind="stable")
+    values, errors = values[order], errors[order]
+    # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
+    dimension = {"equilibrium": 0.0, "periodic orbit": 1.0}.get(verdict) or kaplan_yorke(values)
+    if verdict == "torus":
+        dimension = kaplan_yorke(np.where(np.abs(values) < _STAYS / slow, 0.0, values))
+    return Spectrum(
+        values,
+        errors,
+        0.0 if verdict == "equilibrium" else dimension,
+        verdict,
+        fate.period,
+        _invariants(model, values, found["mean"][0], found["product"][0]),
+        float(found["time"][0]),
+        aside,
+        found["end"][0],
+        converged,
+        model,
+        None if section is None else run.points(found["end"][0], section),
+    )
+
+
+def _positive(found: _core._Orbits) -> bool:
+    """Whether neighbouring orbits part."""
+    return bool(found["value"][0, 0] > _SIGMAS * found["standard_error"][0, 0])
+
+
+def _on_torus(model: Model, found: _core._Orbits) -> bool:
+    """Whether distances stay as they are in two directions, and grow in none."""
+    from udd.models.state_scaling import coordinates_of
+
+    # Angles that nothing depends on neither grow nor shrink on any motion.
+    free = int((~np.isfinite(coordinates_of(model, found["end"]).size)).sum())
+    value, zero = found["value"][0], _STAYS / model.slow
+    return bool(value.max() < zero and (np.abs(value) < zero).sum() - free >= 2)
+
+
+@dataclass(frozen=True)
+class _Fate:
+    """What an orbit is on: a verdict, "settling" or "aperiodic".
+
+    From `state` on, after the time `t`, if it is ordered.
+    """
+
+    kind: str
+    period: float
+    state: _Floats
+    t: float
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the orbit comes back, or rests."""
+        return self.kind in ("equilibrium", "periodic orbit")
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One orbit's exponents and fate."""
+
+    model: Model
+    rtol: float
+    atol: float
+
+    def __call__(self, start: _Floats, time: float, skipped: float, goal: float) -> _core._Orbits:
+        row = np.array([list(self.model.parameters.values())])
+        found = _core.lyapunov(
+            self.model, row, start[None, :], True, time, skipped, goal, self.rtol, self.atol, 1, None
+        )
+        outcome = int(found["outcome"][0])
+        if outcome != FINISHED:
+            raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome])}")
+        return found
+
+    def points(self, start: _Floats, section: str | Sequence[str] | None = None, **few: Any) -> Section:
+        """Where the orbit crosses a surface from here on."""
+        from .poincare_sections import poincare
+
+        options = {"n": _POINTS, "transient": 0, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
+        return poincare(self.model, section, state0=start, **options)
+
+    def refuse(self, section: str | Sequence[str], start: _Floats) -> None:
+        """Refuse a surface that cannot be used, before the long run."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IncompleteWarning)
+            self.points(start, section, n=1, t_max=1e-9)
+
+    def fate(self, start: _Floats, longest: float = 0.0) -> _Fate:
+        """What the orbit does from here on: 600 section points, and more for the time `longest`."""
+        from udd.models.state_scaling import coordinates_of
+
+        from .recurrence import SETTLING, periods, tightness
+
+        tight = tightness(self.rtol)
+        coordinates = coordinates_of(self.model, start[None])
+
+        def rests(state: _Floats, within: float) -> bool:
+            return bool(coordinates.speed(self.model, state[None])[0] < within)
+
+        if rests(start, tight.settled):
+            return _Fate("equilibrium", np.nan, start, 0.0)
+        state, spent, seen, skip, late = start, 0.0, 0, 0, 0
+        while True:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", IncompleteWarning)
+                points = self.points(state, transient=skip)
+            state, spent = points.end, spent + float(points.t_end)
+            if points.outcome != "finished":
+                kind = "equilibrium" if rests(state, 20.0 * tight.settled) else "aperiodic"
+                return _Fate(kind, np.nan, state, spent)
+            places = coordinates(points.state)
+            period = int(periods(places[None], tight)[0])
+            if period > 0:
+                # An equilibrium on the section, and the slow spiral into it, have the period 1.
+                if period == 1 and rests(state, 20.0 * tight.settled):
+                    return _Fate("equilibrium", np.nan, state, spent)
+                time = float(points.t[-1] - points.t[-1 - period])
+                last = period * (len(places) // period - 1)
+                moved = np.abs(places[last : last + period] - places[:period]).max()
+                there = skip == 0 and moved < tight.same
+                return _Fate("periodic orbit", time, *((start, 0.0) if there else (state, spent)))
+            seen += skip + _POINTS
+            enough = spent >= longest or seen >= _FOLLOWED
+            if enough and (period != SETTLING or late == _LATE):
+                return _Fate("settling" if period == SETTLING else "aperiodic", np.nan, state, spent)
+            # Intermittent chaos nearly comes back for a while: it is looked at again, a little later.
+            late += enough
+            skip = _POINTS if late else 2 * skip + _POINTS
+
+
+def kaplan_yorke(exponents: ArrayLike) -> float:
+    """The Kaplan-Yorke dimension of exponents in falling order.
+
+    Parameters
+    ----------
+    exponents : array_like, shape (dim,)
+
+    Returns
+    -------
+    float
+        The number k of leading exponents whose sum is not negative, and the part of the next one that brings
+        it to zero: ``k + sum / |next|`` (J. L. Kaplan and J. A. Yorke, Lecture Notes in Mathematics 730
+        (1979) 204).
+
+    Examples
+    --------
+    >>> from udd.chaos.spectrum import kaplan_yorke
+    >>> round(kaplan_yorke([0.21016, 0.0, -1.21016]), 5)
+    2.17366
+    """
+    values = np.asarray(exponents, dtype=np.float64)
+    sums = np.cumsum(values)
+    leading = int(np.argmax(sums < 0.0)) if (sums < 0.0).any() else len(values)
+    if leading in (0, len(values)):
+        return float(leading)
+    return float(leading + sums[leading - 1] / abs(values[leading]))
+
+
+def _invariants(model: Model, exponents: _Floats, mean: _Floats, product: _Floats) -> dict[str, float]:
+    """How far exact averages are from what they must be.
+
+    They follow from the rates of functions of the state, which average to zero on bounded orbits.
+    """
+    p = model.parameters
+    if isinstance(model, DLE):
+        w, B = p["w"], p["B"]
+        z, zz = mean[2], product[2, 2]
+        return {
+            "sum of exponents + 1 + B w": float(exponents.sum() + 1.0 + B * w),
+            "<omega y> - w (1 - B <z>)": float(product[0, 1] - w * (1.0 - B * z)),
+            "<omega^2> - <omega y>": float(product[0, 0] - product[0, 1]),
+            "<omega z>": float(product[0, 2]),
+            "<z> - B <z^2>": float(z - B * zz),
+        }
+    if isinstance(model, Disk) and not model.effects:
+        return {"<Y Omega> - W": float(product[1, 0] - p["W"]), "<Z Omega>": float(product[2, 0])}
+    return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Covariant:
+    """The covariant Lyapunov vectors along an orbit, and the exponents of finite times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n + 1,)
+        Times.
+    state : ndarray, shape (n + 1, dim)
+        States.
+    vectors : ndarray, shape (n + 1, dim, dim)
+        ``vectors[k, i]`` is the unit vector i at time k: it grows at the rate of exponent i, forwards and
+        backwards in time.
+    local_exponents : ndarray, shape (n, dim)
+        The mean growth rates of the orthonormal frame in each interval: the exponents of finite time,
+        whose mean over all intervals is the spectrum.
+    """
+
+    t: _Floats
+    state: _Floats
+    vectors: _Floats
+    local_exponents: _Floats
+
+    @property
+    def angles(self) -> _Floats:
+        """The angles in rad between the first vector and the others, shape (n + 1, dim - 1)."""
+        along = np.einsum("kn,kin->ki", self.vectors[:, 0], self.vectors[:, 1:])
+        angles: _Floats = np.arccos(np.clip(np.abs(along), 0.0, 1.0))
+        return angles
+
+
+def covariant_vectors(
+    model: Model,
+    n: int = 1000,
+    *,
+    dt: float | None = None,
+    state0: ArrayLike | None = None,
+    transient: float | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+) -> Covariant:
+    """Covariant Lyapunov vectors and finite-time exponents along an orbit.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+    n : int
+        How many intervals are wanted.
+    dt : float, optional
+        Their length, by default 0.5, or 0.125 s.
+    state0 : array_like, shape (dim,), optional
+        Initial state.
+    transient : float, optional
+        Time run before the first and after the last interval, in which the frame and the vectors converge, by
+        default 200, or 50 s.
+    rtol, atol : float
+        Tolerances of the run.
+
+    Returns
+    -------
+    Covariant
+
+    Raises
+    ------
+    ModelError
+        Options that cannot be used.
+    IntegrationError
+        The disk leaves the wheels, the solution blows up, or a direction dies out where a contact sticks.
+
+    Notes
+    -----
+    The method is that of F. Ginelli et al., Physical Review Letters 99 (2007) 130601: forwards the frame is
+    made orthonormal after each interval, backwards vectors inside it converge to the covariant ones.
+
+    Examples
+    --------
+    The vector of the zero exponent is the direction of the flow:
+
+    >>> import numpy as np
+    >>> import udd
+    >>> found = udd.covariant_vectors(udd.DLE(1.0), 100)
+    >>> flow = udd.DLE(1.0).rates(found.t, found.state)
+    >>> flow /= np.linalg.norm(flow, axis=1, keepdims=True)
+    >>> bool(abs(np.einsum("kn,kn->k", flow, found.vectors[:, 1])).min() > 1 - 1e-6)
+    True
+    """
+    require_model(model)
+    n = whole("n", n, 1)
+    slow = model.slow
+    step = number("dt", 0.5 * slow if dt is None else dt, above=0.0)
+    aside = number("transient", 200.0 * slow if transient is None else transient, least=0.0)
+    rtol, atol = tolerances(rtol, atol)
+    start = initial_state(model, default_state(model) if state0 is None else state0)
+    extra = int(np.ceil(aside / step))
+    found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol)
+    kept = slice(extra, extra + n + 1)
+    times: _Floats = step * np.arange(extra, extra + n + 1, dtype=np.float64)
+    return Covariant(
+        times,
+        found["states"][kept],
+        found["covariant"][kept],
+        found["growth"][extra : extra + n] / step,
+    )

@@ -1,0 +1,109 @@
+"""A labelled result as files: NetCDF, Zarr, or a picture."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from udd._util.atomic_files import require_writable
+from udd.errors import UddError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Endings of a labelled result's own files, and of pictures.
+DATA = (".nc", ".zarr")
+PICTURES = (".png", ".svg", ".pdf")
+
+
+class OutputFile(argparse.Action):
+    """The name of a file to write; one that cannot be written is refused before the work."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Check it and keep it."""
+        require_writable(values)
+        setattr(namespace, self.dest, values)
+
+
+def add_out(parser: argparse.ArgumentParser, data: tuple[str, ...] = DATA) -> None:
+    """Where to write."""
+    kinds = ", ".join((*data, *PICTURES))
+    parser.add_argument(
+        "--out",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help=f"file to write, by its ending: {kinds}; repeatable",
+    )
+
+
+def checked(paths: list[Path], data: tuple[str, ...] = DATA) -> None:
+    """Refuse what cannot be written, before the work."""
+    for path in paths:
+        if path.suffix not in (*data, *PICTURES):
+            raise UddError(f"{path}: the name must end in {', '.join((*data, *PICTURES))}")
+        if path.suffix != ".zarr":
+            require_writable(path)
+        elif not path.parent.is_dir():
+            raise UddError(f"{path}: there is no folder {path.parent}")
+        if path.suffix == ".zarr" and path.exists():
+            raise UddError(f"{path} exists already: Zarr needs a new folder")
+
+
+def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -> None:
+    """Write what is asked for; a file is there whole or not at all."""
+    from udd._util.atomic_files import write_whole
+
+    for path in paths:
+        if path.suffix == ".nc":
+            write_whole(path, bytes(found.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+        elif path.suffix == ".zarr":
+            _zarr(path, found)
+        else:
+            save_picture(path, draw)
+
+
+def save_picture(path: Path, draw: Callable[[Axes], object]) -> None:
+    """Write a picture of one pair of axes, of the kind that the name's ending says."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+    draw(figure.add_subplot())
+    save_figure(path, figure)
+
+
+def save_figure(path: Path, figure: Figure) -> None:
+    """Write a figure, of the kind that the name's ending says."""
+    from udd._util.atomic_files import write_whole
+
+    picture = BytesIO()
+    figure.savefig(picture, format=path.suffix[1:], dpi=150)
+    write_whole(path, picture.getvalue())
+
+
+def _zarr(path: Path, found: xr.Dataset) -> None:
+    folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+    try:
+        # Zarr 3 has no arrays of strings of one length.
+        words = {name: found[name].astype(object) for name in found.coords if found[name].dtype.kind == "U"}
+        found.assign_coords(words).to_zarr(folder / "made", zarr_format=3, consolidated=False)
+        os.replace(folder / "made", path)
+    except OSError as error:
+        raise UddError(f"{path} cannot be written: {error.strerror or error}") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,70 @@
+"""The whole way, from the sample film to the page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from udd._util.atomic_files import made_folder
+from udd.discovery import Discovery, discover
+from udd.models import Disk
+from udd.tracking import track
+
+#: What the user of the device knows: the speed at which the wheels run, and the size of the disk.
+W = 0.042
+R = 0.08
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What the demonstration made."""
+
+    discovery: Discovery
+    measurement: Path
+    report: Path
+
+
+def demo(
+    out: str | os.PathLike[str],
+    *,
+    null: bool = False,
+    progress: Callable[[str], None] | None = None,
+    bar: bool = False,
+) -> Demo:
+    """Track the sample film, find what the model lacks, write the measurement and the page.
+
+    Parameters
+    ----------
+    out : path
+        Folder to write to; made if it is not there.
+    null : bool
+        Take the film of a disk that lacks nothing.
+    progress : callable, optional
+        Told in a few words what is being done.
+    bar : bool
+        Show a progress bar while tracking.
+
+    Returns
+    -------
+    Demo
+
+    Raises
+    ------
+    UddError
+        The folder cannot be written to.
+    """
+    tell = progress or (lambda _text: None)
+    folder, name = made_folder(out), "sample_null" if null else "sample"
+    stem = "_null" if null else ""
+    table, page = folder / f"measurement{stem}.csv", folder / f"report{stem}.html"
+    with as_file(files("udd") / "demo" / f"{name}.mp4") as film:
+        tell("tracking the film")
+        measurement = track(film, disk_radius=R, progress=bar).with_meta(W=W)
+        measurement.to_csv(table)
+        found = discover(measurement, Disk(W, R=R), progress=tell)
+        tell("writing the page")
+        found.report(page, film=film, command="udd demo" + (" --null" if null else ""))
+    return Demo(found, table, page)

@@ -1,0 +1,157 @@
+"""Fits in full of a located curve, or of a formula for it, with everything else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from udd import effects
+from udd.discovery.nonparametric.confounding import distinct
+from udd.discovery.nonparametric.curve_scan import Curve, refined, rescored
+from udd.discovery.symbolic.expressions import softened, write
+from udd.discovery.symbolic.formulas import Formula
+from udd.effects import Effect
+from udd.fitting import Fit, widened
+from udd.fitting.model_error_schedule import FEW, reduce_model_error
+from udd.fitting.parameters import Free
+
+_ROUNDS = 6
+_SOFT = 1e-3
+_STILL = 0.05  # nats that another round would bring
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A model with a curve, fitted.
+
+    Attributes
+    ----------
+    fit : Fit
+        Its model holds the curve as its last effect.
+    curve : Curve
+        As it came out, its band less what the model's other parameters can do.
+    price : float
+        What the curve's freedom costs, nats: as half a parameter's logarithm of the numbers in the record is
+        by the Bayesian information criterion.
+    """
+
+    fit: Fit
+    curve: Curve
+    price: float
+
+    @property
+    def effect(self) -> Effect:
+        """The curve as an effect."""
+        return self.fit.model.effects[-1]
+
+
+def curve_effect(curve: Curve, name: str = "curve") -> Effect:
+    """A curve, or a surface, as an effect that a model can have.
+
+    Parameters
+    ----------
+    curve : Curve
+    name : str
+        What its parameters are called after.
+    """
+    spline, last = curve.splines[0], curve.splines[-1]
+    if len(curve.coordinates) == 2:
+        return effects.surface(
+            curve.slot.name,
+            (curve.coordinates[0].text, curve.coordinates[1].text),
+            (spline.low, last.low),
+            (spline.high, last.high),
+            curve.coefficients.reshape(spline.size, last.size),
+            periodic=last.periodic,
+            momentum=curve.slot.momentum,
+            name=name,
+        )
+    return effects.curve(
+        curve.slot.name,
+        curve.coordinates[0].text,
+        spline.low,
+        spline.high,
+        curve.coefficients,
+        periodic=spline.periodic,
+        momentum=curve.slot.momentum,
+        name=name,
+    )
+
+
+def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
+    """Add a curve to a fitted model and refit everything.
+
+    In turns the model's parameters and states are fitted with the curve held, and the curve is moved to where
+    it is most likely, everything else following; each turn takes nearly all of what is left.
+
+    Parameters
+    ----------
+    fit : Fit
+        Around which the curve was found, or a looser one of the same data.
+    curve : Curve
+    name : str
+        What the effect's parameters are called after.
+
+    Raises
+    ------
+    FitError
+        The curve cannot be added to a model, or the fit does not converge with it.
+    """
+    curve, start, settled = refined(curve, fit), fit, False
+    for _ in range(_ROUNDS):
+        effect, at = curve_effect(curve, name), curve.coefficients
+        problem, point = widened(fit, [effect], start)
+        current = reduce_model_error(fit.measurements, problem, point, problem.schedule[1:])
+        curve, start = rescored(curve, current, at), current
+        moved = curve.coefficients - at
+        settled = bool(moved @ curve.score.information @ moved / 2 < _STILL)
+        if settled:
+            break
+    # What the model holds; the next move would be within the last one.
+    curve, score = replace(curve, coefficients=at), curve.score
+    gain = float(score.gradient @ at - at @ score.information @ at / 2)
+    price = gain - curve.evidence
+    if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
+        price = max(price, curve.df * math.log(fit.observations) / 2)
+    return CurveFit(current, distinct(curve, current), price)
+
+
+def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:
+    """A formula for a curve as an effect that a model can have.
+
+    Broken powers, whose slope at zero has no end, are rounded off within a thousandth of the curve's range.
+    """
+    variable = curve.coordinates[0].text
+    values: dict[str, Any] = dict(formula.parameters)
+    node = softened(formula.node, _SOFT * float(np.ptp(curve.places[0])))
+    return effects.formula(
+        curve.slot.name,
+        write(node, variable, dict(enumerate(values))),
+        momentum=curve.slot.momentum,
+        name=name,
+        title=f"{curve.slot.title} = {formula.text}",
+        amplitudes=formula.amplitudes,
+        **values,
+    )
+
+
+def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula") -> Fit:
+    """Add a formula for a curve to a fitted model and refit everything, all of its constants free.
+
+    The noise stays as it was estimated, so that chi2 compares with that of the curve.
+
+    Raises
+    ------
+    FitError
+        The formula cannot be added to the model, or the fit fails.
+    """
+    problem, point = widened(fit, [formula_effect(curve, formula, name)])
+    order = list(problem.models[0].parameters)
+    names = [f"{name}.{p}" for p in formula.parameters]
+    more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
+    problem = replace(problem, free=problem.free + more)
+    # Where its constants run away, or trade for each other, there is no end to come to.
+    return reduce_model_error(fit.measurements, problem, point, problem.schedule[1:], steps=FEW)

@@ -1,0 +1,333 @@
+"""Experiment design: what to film next where the data cannot decide between forms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd._util.parallel import parallel_map
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.candidates import renamed
+from udd.effects import Effect
+from udd.errors import UddError
+from udd.fitting import Fit, Record
+from udd.fitting.parameters import Free
+from udd.fitting.problem import Point, Problem
+from udd.models import Disk, Model, Pendulum
+from udd.simulation.trajectory import integrated
+
+if TYPE_CHECKING:
+    from .results import Alternative, Discovery
+
+Array = NDArray[np.float64]
+
+#: Forms part where their fits differ by as many units of log-likelihood, as in the search.
+PARTED = 10.0
+_DRIVES = (0.5, 0.7, 1.4, 2.0)  # times the present drive
+_SWINGS = (0.5, 1.5, 2.0)  # times the present start of a pendulum
+_UPRIGHT = 2.8  # rad; a pendulum is not started farther out
+_STARTS = 6  # places of the record that a further film may start from, tried in turn
+_SHORTEST = 0.5  # of the film's length: a disk that leaves sooner makes no film
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What to film, and what that is expected to tell.
+
+    Attributes
+    ----------
+    design : str
+        What to film; empty where no feasible film would part any of the forms.
+    nats : float
+        By how many units of log-likelihood the forms are expected to differ then: the least of those that
+        part, or the most where none does.
+    each : dict of str to float
+        The same for each alternative, by its title.
+    text : str
+        The advice in a sentence.
+    """
+
+    design: str
+    nats: float
+    each: dict[str, float]
+    text: str
+
+    @property
+    def parts(self) -> list[str]:
+        """Titles of the alternatives that part from what was chosen."""
+        return [title for title, nats in self.each.items() if nats >= PARTED]
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {"design": self.design, "nats": self.nats, "each": self.each, "text": self.text}
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film that could be made.
+
+    Attributes
+    ----------
+    design : str
+    model : Model
+    start : ndarray (k, d)
+        States that it may start from, tried in turn.
+    again : bool
+        Whether it goes on where the first ended, with its camera and drive.
+    """
+
+    design: str
+    model: Model
+    start: Array
+    again: bool = False
+
+
+def hints(found: Discovery) -> list[NextExperiment]:
+    """What could be filmed to part the forms that the data cannot tell apart, the best first.
+
+    Each film is simulated with the model as found and added to the part of the record that the forms were
+    compared on; drive and camera of a new film are as unknown as those of the first. Where a form with the
+    amplitudes ``a`` is true and another is fitted, chi2 rises by ``a (S - C T^-1 C') a``: ``S`` and ``T`` are
+    the information on the amplitudes of the two with everything else refitted, ``C`` what they share. Half
+    the rise, of the two forms the lesser, is what the data are expected to tell; to what the present data
+    say already the film adds by how much that grows.
+
+    Parameters
+    ----------
+    found : Discovery
+
+    Returns
+    -------
+    list of NextExperiment
+        One for every film that parts any; if there is none, one that says so; empty where nothing is in
+        doubt.
+
+    Examples
+    --------
+    >>> import numpy as np, udd
+    >>> t = np.arange(0, 30, 0.05)
+    >>> noise = 2e-3 * np.random.default_rng(0).standard_normal(len(t))
+    >>> theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 1.0]).state[:, 1] + noise
+    >>> found = udd.discover(udd.Measurement(t, {"theta": theta}), udd.Pendulum(1.0, k0=0.03))
+    >>> found.hints
+    []
+    """
+    if not found.alternatives:
+        return []
+    pairs = [pair for other in found.alternatives if (pair := _Pair.of(found, other))]
+    if not pairs:
+        return []
+    now = [pair.nats(None) for pair in pairs]
+
+    def told(film: Film) -> tuple[str, dict[str, float]] | None:
+        filmed = _filmed(found.trained, film)
+        if filmed is None:
+            return None
+        each: dict[str, float] = {}
+        for pair, before in zip(pairs, now, strict=True):
+            nats = pair.other.nats + max(pair.nats((film, filmed)) - before, 0.0)
+            each[pair.other.title] = float(min(nats, each.get(pair.other.title, np.inf)))
+        return film.design, each
+
+    designs = [design for design in parallel_map(told, _films(found.trained)) if design]
+    return _ranked(designs)
+
+
+def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperiment]:
+    """The designs in words: those that part most forms first."""
+    result = []
+    for design, each in designs:
+        parts = [nats for nats in each.values() if nats >= PARTED]
+        if parts:
+            apart = ", ".join(f"{t} by {n:.0f} nats" for t, n in each.items() if n >= PARTED)
+            left = ", ".join(t for t, n in each.items() if n < PARTED)
+            text = f"film {design}: what was found is then expected to part from {apart}"
+            text += f"; not from {left}" if left else ""
+            result.append(NextExperiment(design, min(parts), each, text))
+    if result:
+        return sorted(result, key=lambda hint: (-len(hint.parts), -hint.nats))
+    if not designs:
+        return [NextExperiment("", 0.0, {}, "no film that could be made here keeps the disk for long enough")]
+    design, each = max(designs, key=lambda d: max(d[1].values()))
+    most = max(each.values())
+    text = f"no feasible film would part them: {design} would tell most, {most:.1f} nats of the {PARTED:.0f}"
+    return [NextExperiment("", most, each, f"{text} that it takes")]
+
+
+def _films(fit: Fit) -> Iterator[Film]:
+    """What could be filmed of the device."""
+    model, states, own = fit.models[0], fit.states, fit.record.film == 0
+    ends = fit.states[own][-1:]
+    places = states[own][np.linspace(0, own.sum() - 1, _STARTS).astype(int)]
+    if isinstance(model, Disk):
+        if model.W:
+            for times in _DRIVES:
+                drive = times * model.W
+                text = f"the disk again with {times:g} times the drive (W = {drive:.3g} m/s)"
+                yield Film(text, model.with_parameters({"W": drive}), places)
+        yield Film("the disk again, from another start", model, places[1:])
+    elif isinstance(model, Pendulum):
+        for times in _SWINGS:
+            start = states[own][:1] * times
+            if abs(start[0, 1]) < _UPRIGHT:
+                yield Film(f"the pendulum again, from {start[0, 1]:.2g} rad", model, start)
+    yield Film("on for as long again", model, ends, again=True)
+
+
+def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
+    """Times and states of a film, as many frames as the first; None where the disk leaves too soon."""
+    own = fit.record.film == 0
+    frames = int(own.sum())
+    times = fit.record.t[own]
+    t = np.median(np.diff(times)) * np.arange(frames)
+    longest: Array = np.zeros((0, fit.states.shape[1]))
+    for start in film.start:
+        try:
+            run = integrated(film.model, t + (times[-1] if film.again else 0.0), start, rtol=1e-7, atol=1e-9)
+        except UddError:
+            continue
+        # What leaves is cut at the edge, where the last time is no frame's.
+        states = run.state if run.outcome == "finished" else run.state[:-1]
+        longest = max(longest, states, key=len)
+        if len(longest) == frames:
+            break
+    return (t[: len(longest)], longest) if len(longest) >= _SHORTEST * frames else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """A form that was chosen and one that could be it, around the fit that they were compared on."""
+
+    fit: Fit
+    chosen: Candidate
+    other: Alternative
+
+    @classmethod
+    def of(cls, found: Discovery, other: Alternative) -> _Pair | None:
+        """None where the model has the alternative already, beside what was chosen."""
+        model = found.trained.model
+        effect = next((e for e in model.effects if e.name == other.instead_of), None)
+        if effect is None:
+            return None
+        rest = model.with_effects([e for e in model.effects if e.name != effect.name])
+        named = renamed(other.effect, rest)
+        if named is None:
+            return None
+        return cls(found.trained, Candidate(effect, effect.title), replace(other, effect=named))
+
+    @cached_property
+    def free(self) -> tuple[Free, ...]:
+        """All that is free but the chosen form."""
+        name = self.chosen.effect.name
+        order = list(self._without(self.fit.models[0]).parameters)
+        kept = (f for f in self.fit.problem.free if not f.name.startswith(f"{name}."))
+        return tuple(
+            replace(f, index=order.index(f.name.split("[")[0])) if f.role == "model" else f for f in kept
+        )
+
+    def _without(self, model: Model) -> Model:
+        return model.with_effects([e for e in model.effects if e.name != self.chosen.effect.name])
+
+    def nats(self, more: tuple[Film, tuple[Array, Array]] | None) -> float:
+        """How far the two are expected to be apart with one more film, or with none."""
+        problem, point = self._with(more)
+        model = problem.models[0]
+        forms = [_still(self.chosen), _still(Candidate(self.other.effect, self.other.title))]
+        _gradient, information, _alone = _core.score(
+            *problem.arguments(point), [(c.added_to(model), c.amplitude_indices(model)) for c in forms]
+        )
+        k = len(self.chosen.amplitude_names)
+        mine, others = np.arange(k), np.arange(k, len(information))
+        a = _amplitudes(self.chosen.effect)
+        b = _amplitudes(self.other.effect)
+        rises = _rise(information, mine, others, a), _rise(information, others, mine, b)
+        return 0.5 * min(rises) / max(self.fit.scatter, 1.0)
+
+    def _with(self, more: tuple[Film, tuple[Array, Array]] | None) -> tuple[Problem, Point]:
+        """The problem without the chosen form and with a further film, at what would be found."""
+        fit, problem = self.fit, self.fit.problem
+        models = tuple(self._without(m) for m in fit.models)
+        sets = [
+            (list(m.parameters.values()), camera, clock)
+            for m, (_values, camera, clock) in zip(models, fit.point.sets, strict=True)
+        ]
+        if more is None:
+            alone = replace(problem, models=models, free=self.free)
+            return alone, Point(fit.states, tuple(sets))
+        film, (t, states) = more
+        number = 0 if film.again else len(models)
+        record = _longer(fit.record, t, states, number)
+        weight = np.concatenate([problem.noise.weight, np.ones(len(t))])
+        free = self.free
+        if not film.again:
+            own = self._without(film.model)
+            free = _for_films(free, models, own)
+            models = (*models, own)
+            sets.append((list(own.parameters.values()), list(sets[0][1]), sets[0][2]))
+        noise = replace(problem.noise, weight=weight)
+        longer = replace(problem, models=models, record=record, free=free, noise=noise)
+        return longer, Point(np.concatenate([fit.states, states]), tuple(sets))
+
+
+def _still(candidate: Candidate) -> Candidate:
+    """The candidate with its amplitudes at zero."""
+    effect = candidate.effect
+    return replace(candidate, effect=effect.replace(**dict.fromkeys(effect.amplitudes, 0.0)))
+
+
+def _amplitudes(effect: Effect) -> Array:
+    return np.array([effect.parameters[name] for name in effect.amplitudes])
+
+
+def _rise(information: Array, true: NDArray[np.int64], fitted: NDArray[np.int64], amplitudes: Array) -> float:
+    """By how much chi2 is larger where one form is true and the other is fitted."""
+    shared = information[np.ix_(true, fitted)]
+    taken = shared @ np.linalg.pinv(information[np.ix_(fitted, fitted)], hermitian=True) @ shared.T
+    return max(float(amplitudes @ (information[np.ix_(true, true)] - taken) @ amplitudes), 0.0)
+
+
+def _longer(record: Record, t: Array, states: Array, film: int) -> Record:
+    """A record with a further film's frames at its end, as well seen as the others are on average."""
+    n, channels = len(t), record.seen.shape[1]
+    typical = [np.median(s[np.isfinite(s)]) if np.isfinite(s).any() else np.inf for s in record.sigma.T]
+    times = t if film else t + record.t[record.film == 0][-1]
+    origins = record.origins if film < len(record.origins) else (*record.origins, record.origins[0])
+    return Record(
+        t=np.concatenate([record.t, times]),
+        seen=np.concatenate([record.seen, np.zeros((n, channels))]),
+        sigma=np.concatenate([record.sigma, np.tile(typical, (n, 1))]),
+        rho=np.concatenate([record.rho, np.tile(record.rho.mean(axis=0), (n, 1, 1))]),
+        linked=np.concatenate([record.linked, [False], np.ones(n - 1, dtype=bool)]),
+        states=np.concatenate([record.states, states]),
+        odd=np.concatenate([record.odd, np.zeros(n, dtype=bool)]),
+        row=np.concatenate([record.row, np.full(n, -1)]),
+        film=np.concatenate([record.film, np.full(n, film)]),
+        origins=origins,
+    )
+
+
+def _for_films(free: Sequence[Free], models: Sequence[Model], more: Model) -> tuple[Free, ...]:
+    """What is free with one film more, whose drive and camera are its own."""
+    if len(models) == 1:
+        free = [replace(f, film=0, name=f"{f.name}[0]") if _own(f) else f for f in free]
+    first = [f for f in free if f.film == 0]
+    added = []
+    for f in first:
+        name = f.name.split("[")[0]
+        other = replace(f, film=len(models), name=f"{name}[{len(models)}]")
+        if f.role == "model" and models[0].parameters[name]:
+            times = more.parameters[name] / models[0].parameters[name]
+            other = replace(other, mean=f.mean * times, sd=f.sd * abs(times))
+        added.append(other)
+    return (*free, *added)
+
+
+def _own(free: Free) -> bool:
+    """Whether every film has its own."""
+    return free.role != "model" or free.name == "W"

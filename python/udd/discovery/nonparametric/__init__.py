@@ -1,0 +1,1 @@
+"""Effects of unknown form: penalised splines of the state."""

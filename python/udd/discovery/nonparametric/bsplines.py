@@ -1,0 +1,108 @@
+"""Cubic B-splines on evenly spaced knots, with a roughness penalty (P-splines)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spline:
+    """The basis along one coordinate.
+
+    Attributes
+    ----------
+    low, high : float
+        Where the knots begin and end; beyond, a curve keeps its end value.
+    intervals : int
+        Between knots.
+    periodic : bool
+        Whether `high` is `low` again.
+    """
+
+    low: float
+    high: float
+    intervals: int
+    periodic: bool
+
+    @property
+    def size(self) -> int:
+        """The number of basis functions."""
+        return self.intervals if self.periodic else self.intervals + 3
+
+    @property
+    def step(self) -> float:
+        """The distance of knots."""
+        return (self.high - self.low) / self.intervals
+
+    def design(self, x: Array, derivative: int = 0) -> Array:
+        """The basis functions, or their derivatives, at places; one more axis, of length `size`."""
+        knots = self.low + self.step * np.arange(-3, self.intervals + 4)
+        inside = self._inside(x)
+        functions = BSpline(knots, np.eye(self.intervals + 3), 3)
+        if derivative:
+            functions = functions.derivative(derivative)
+        result: Array = functions(inside.ravel()).reshape(*x.shape, self.intervals + 3)
+        if derivative and not self.periodic:
+            result = np.where(((x < self.low) | (x > self.high))[..., None], 0.0, result)
+        if self.periodic:
+            result, beyond = result[..., : self.intervals].copy(), result[..., self.intervals :]
+            result[..., :3] += beyond
+        return result
+
+    def _inside(self, x: Array) -> Array:
+        if self.periodic:
+            return self.low + np.mod(x - self.low, self.high - self.low)
+        return np.clip(x, self.low, self.high)
+
+    @property
+    def roughness(self) -> Array:
+        """The matrix whose quadratic form sums the squared second differences of the coefficients."""
+        if self.periodic:
+            one = np.eye(self.size)
+            second = np.roll(one, 1, axis=1) - 2 * one + np.roll(one, -1, axis=1)
+        else:
+            second = np.diff(np.eye(self.size), 2, axis=0)
+        result: Array = second.T @ second
+        return result
+
+    def values(self, coefficients: Array, x: Array) -> Array:
+        """The curve of these coefficients at places."""
+        result: Array = self.design(x) @ coefficients
+        return result
+
+    def full(self, coefficients: Array) -> Array:
+        """The coefficients as a spline that knows no period takes them, `intervals + 3` of them."""
+        return np.concatenate([coefficients, coefficients[:3]]) if self.periodic else coefficients
+
+
+def along(x: Array, angle: bool, intervals: int) -> Spline:
+    """The basis for the places that a record visits.
+
+    An angle is periodic where the places go all the way round.
+    """
+    if angle:
+        turned = np.sort(np.mod(x, 2 * np.pi).ravel())
+        widest = np.diff(turned, append=turned[0] + 2 * np.pi).max()
+        if widest < 2 * np.pi / intervals:
+            return Spline(0.0, 2 * np.pi, intervals, True)
+    low, high = float(x.min()), float(x.max())
+    margin = 0.02 * (high - low)
+    return Spline(low - margin, high + margin, intervals, False)
+
+
+def product(a: Array, b: Array) -> Array:
+    """Every product of a column of one design with a column of another."""
+    result: Array = (a[..., :, None] * b[..., None, :]).reshape(*a.shape[:-1], -1)
+    return result
+
+
+def rough_product(a: Spline, b: Spline) -> Array:
+    """The roughness of a surface: of both directions."""
+    result: Array = np.kron(a.roughness, np.eye(b.size)) + np.kron(np.eye(a.size), b.roughness)
+    return result

@@ -1,0 +1,118 @@
+"""One round of score tests around a fit: of the library, and of curves of any coordinate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from udd._util.parallel import parallel_map
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_curves
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.candidates import library
+from udd.discovery.scoring.coordinates import Coordinate
+from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
+from udd.discovery.thresholds import ALPHA
+from udd.fitting import Fit, with_larger_model_error
+
+from .trial_fits import price_of
+
+_LEADS = 2.0  # times the gain of the library's best
+_SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
+
+
+@dataclass(frozen=True)
+class ScoreRound:
+    """What the scores around one fit say.
+
+    Attributes
+    ----------
+    fit : Fit
+    library : Scan
+    curves : list of Curve
+        The likeliest first.
+    looks : int
+        How many scores could have been the best, around all fits that were tried.
+    """
+
+    fit: Fit
+    library: Scan
+    curves: list[Curve]
+    looks: int
+
+    def usable(self) -> list[Scored]:
+        """The candidates with physical numbers whose work no free parameter does, the strongest first."""
+        found = [s for s in self.library.scored if s.physical and not s.absorbed]
+        return sorted(found, key=lambda s: -round(s.chi2, 3))
+
+    def passing(self) -> list[Scored]:
+        """Those of them that neither chance nor a film's faults explain."""
+        faults = self.fit.faults
+        return [s for s in self.usable() if s.p * self.looks < ALPHA and s.chi2 > faults]
+
+    def nats(self, scored: Scored) -> float:
+        """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
+        return (scored.chi2 - scored.candidate.parameters * price_of(self.fit)) / 2
+
+    def strongest(self) -> float:
+        """The gain of the best explanation."""
+        return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
+
+    def curve_leads(self) -> bool:
+        """Whether a curve over one coordinate gains far more than every effect of the library."""
+        best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
+        return best > _LEADS * max(self._known(), 0.0) + 3 * EVIDENCE_MARGIN
+
+    def _known(self) -> float:
+        """The gain of the library's best."""
+        return max((self.nats(s) for s in self.library.scored if s.physical), default=-math.inf)
+
+
+def score_round(
+    fitted: Fit,
+    given: Sequence[Candidate] = (),
+    watched: Callable[[Callable[[Fit], ScoreRound]], Callable[[Fit], ScoreRound]] = lambda work: work,
+) -> ScoreRound:
+    """Score every candidate and curve around the fit and, where it explains little, around a looser one.
+
+    A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
+    where it is held tightly. The scores with the stronger explanation count. `given` are the user's own
+    candidates; `watched` makes work that does not begin once a search's time is up.
+    """
+
+    def look(current: Fit) -> ScoreRound:
+        ripple, frequencies = strongest_ripple(current)
+        best = [ripple.candidate] if ripple else []
+        scanned = scan(current, [*library(current.model, given, current.states), *best])
+        curves = scan_curves(current)
+        looks = len(scanned.scored) + frequencies + curves.looks
+        return ScoreRound(current, scanned, curves.curves, looks)
+
+    found = parallel_map(watched(look), dict.fromkeys((fitted, with_larger_model_error(fitted, _SCATTER))))
+    return replace(max(found, key=ScoreRound.strongest), looks=sum(look.looks for look in found))
+
+
+def with_surfaces(look: ScoreRound) -> ScoreRound:
+    """With the surfaces over two coordinates."""
+    found = scan_curves(look.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
+    curves = sorted(look.curves + found.curves, key=lambda c: -c.evidence)
+    return replace(look, curves=curves, looks=look.looks + found.looks)
+
+
+def states_first(curves: list[Curve]) -> list[Curve]:
+    """The likeliest first, but after those as likely what stands for states in a roundabout way.
+
+    Curves over time take up anything slow, and curves over the direction can do much of what those over Y
+    and Z do.
+    """
+
+    def handicap(own: Coordinate) -> float:
+        return (
+            2 * EVIDENCE_MARGIN
+            if own.name == "t"
+            else EVIDENCE_MARGIN
+            if own.angle and own.text != own.name
+            else 0.0
+        )
+
+    return sorted(curves, key=lambda c: -c.evidence + handicap(c.coordinates[0]))

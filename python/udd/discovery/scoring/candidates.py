@@ -1,0 +1,83 @@
+"""The effects that a model may lack, as the library offers them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import effects
+from udd.discovery.scoring.candidate import Candidate
+from udd.models import Disk, Model
+from udd.models.formula_model import FormulaModel
+
+
+def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
+    """The effect under a name that the model has not given yet; None where it is the library's.
+
+    A model has an effect of the library but once, and its name is the library's own.
+    """
+    taken = {one.name for one in model.effects}
+    if effect.name not in taken:
+        return effect
+    if effect.made is None:
+        return None
+    name = next(n for n in (f"{effect.name}_{k}" for k in itertools.count(2)) if n not in taken)
+    return replace(effect, name=name, made=replace(effect.made, name=name))
+
+
+def library(
+    model: Model, given: Sequence[Candidate] = (), states: NDArray[np.float64] | None = None
+) -> list[Candidate]:
+    """Every effect that can be added to a model, in each of its variants, but for scanned frequencies.
+
+    Those of a user's own model are made of its states (:mod:`udd.discovery.scoring.term_library`), and dry
+    friction where a motion, (n, d), says how wide its turn may be; those given come first. Terms that the
+    free parameters absorb are not sorted out here: that shows in the data.
+    """
+    if isinstance(model, FormulaModel):
+        from .term_library import dry, terms
+
+        there = {effect.name for effect in model.effects}
+        sticking = [] if states is None else dry(model, states)
+        listed = [c for c in (*given, *terms(model), *sticking) if c.effect.name not in there]
+        return list({(c.effect.name, c.effect.values): c for c in listed}.values())
+    result = []
+    for spec in effects.library():
+        if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:
+            continue
+        if any(p.role == "frequency" for p in spec.parameters):
+            continue
+        shapes = [p for p in spec.parameters if p.role == "shape"]
+        for momentum in spec.momenta or (None,):
+            for values in itertools.product(*(p.grid for p in shapes)):
+                chosen = dict(zip((p.name for p in shapes), values, strict=True))
+                effect = spec.make(momentum=momentum, treatment=None, **chosen)
+                notes = [str(momentum)] if len(spec.momenta) > 1 else []
+                notes += [f"{p.name} = {chosen[p.name]:g}" for p in shapes if len(p.grid) > 1]
+                title = spec.title + (f" ({', '.join(notes)})" if notes else "")
+                result.append(Candidate(effect, title))
+    return result
+
+
+def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
+    """A drive ripple at every frequency that a record can tell apart.
+
+    From two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart, within the
+    effect's own range.
+
+    Parameters
+    ----------
+    model : Model
+    t : ndarray (n,)
+        Times of the record's frames, s.
+    """
+    if not isinstance(model, Disk) or model.W == 0 or "drive_ripple" in {e.name for e in model.effects}:
+        return []
+    duration, step = t[-1] - t[0], np.median(np.diff(t))
+    low, high = next(p.range for p in effects.drive_ripple().spec.parameters if p.role == "frequency")
+    frequencies = np.arange(max(2.0 / duration, low), min(0.25 / step, 6.0, high), 0.5 / duration)
+    return [Candidate(effects.drive_ripple(f=float(f)), f"drive ripple at {f:.3g} Hz") for f in frequencies]

@@ -1,0 +1,280 @@
+"""The terms that a user's own model may lack, made of its states."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import effects
+from udd._util.expressions import Expression, text_of
+from udd.discovery.scoring.candidate import Candidate
+from udd.effects.user_defined import along_of, written
+from udd.errors import ModelError
+from udd.models.formula_model import FormulaModel
+
+from .coordinates import slots
+
+_DEGREE = 3
+_FEW = 4  # states of which all products up to that degree are tried; of more, up to the second
+#: Widths over which dry friction turns, in units of the speed's root mean square. As narrow as the last it
+#: holds a body at rest for hundreds of swings.
+_WIDTHS = (0.3, 0.03, 0.002)
+
+
+def terms(model: FormulaModel) -> list[Candidate]:
+    """Every term that is tried in the equations of a user's own model, but for dry friction.
+
+    Of the states that are no angles: a constant, all products up to the third degree, and each times its own
+    size; of each angle and of every two angles' difference sine and cosine, also times each other state; of
+    every angle the rate, where that is no state itself. An equation that only says that one state is the rate
+    of another gets none. Of a mechanical model, where a state is another one's rate, those come first by a
+    handicap that are forces as machines have them: springs, drags, gravity. Where it has a mass matrix, all
+    are forces along its coordinates, and those of machines act between two of them too.
+    """
+    plain = [(text, _name(text), text) for text in _of_states(model)]
+    rates = {name: model.equations[name] for name in model.angles}
+    rates = {name: text for name, text in rates.items() if name not in model.kinematic}
+    result = [force for along in _ways(model) for force in _machines(model, along)]
+    for slot in slots(model):
+        state, along = slot.equation, along_of(slot.name)
+        usual = _own_forces(model, along) if along else _forces(model, state)
+        moving = [(f"({text})", f"rate_of_{k}", f"{k}'") for k, text in rates.items() if k != state]
+        for one in plain + moving:
+            machine = not usual or one[2] in usual or one in moving
+            if not (along and one[2] in usual):  # there already
+                result.append(replace(_candidate(model, slot.name, *one), usual=machine))
+    return result
+
+
+def _ways(model: FormulaModel) -> list[str]:
+    """What the forces of a model with a mass matrix act along: its coordinates, and between two of a kind."""
+    pairs = itertools.combinations(model.speeds, 2)
+    between = [f"{b} - {a}" for a, b in pairs if (a in model.angles) == (b in model.angles)]
+    return [*model.speeds, *between] if model.mass else []
+
+
+def _along(model: FormulaModel, along: str) -> tuple[str, str]:
+    """The rate of what a force acts along, and what a reader calls that."""
+    first, *other = along.split(" - ")
+    if not other:
+        return model.speeds[first], f"along {first}"
+    return f"({model.speeds[first]} - {model.speeds[other[0]]})", f"between {other[0]} and {first}"
+
+
+def _own_forces(model: FormulaModel, x: str) -> set[str]:
+    """What :func:`_machines` has along a coordinate, as :func:`_of_states` writes it."""
+    v = model.speeds[x]
+    own = {f"sin({x})", f"cos({x})"} if x in model.angles else {x, f"{x}^3"}
+    return {"1", v, f"abs({v})*{v}", f"{v}^3", *own}
+
+
+def _machines(model: FormulaModel, along: str) -> list[Candidate]:
+    """Forces as machines have them, but for dry friction, along a coordinate or between two."""
+    v, where = _along(model, along)
+    (c,) = _unused(model, "c")
+    brake, either = (0.0, np.inf), (-np.inf, np.inf)
+    listed = [
+        ("viscous friction", f"-{c}*{v}", brake),
+        ("quadratic drag", f"-{c}*abs({v.strip('()')})*{v}", brake),
+        ("cubic drag", f"-{c}*{v}^3", brake),
+    ]
+    if along.split(" - ")[0] in model.angles:
+        listed += [(f"{wave}({along})", f"{c}*{wave}({along})", either) for wave in ("sin", "cos")]
+    else:
+        listed += [("spring", f"-{c}*({along})", either), ("cubic spring", f"-{c}*({along})^3", either)]
+    if along in model.speeds:
+        listed.append(("constant force", c, either))
+    result = []
+    for kind, text, limits in listed:
+        title = f"{kind} {where}"
+        name = _name(title)
+        spec = written(f"force({along})", text, name, title, [c], {c: limits}, (c,))
+        form = kind if limits is brake else ""
+        result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title, form=form))
+    return result
+
+
+def _forces(model: FormulaModel, state: str) -> set[str]:
+    """The terms of an equation that are forces as machines have them; none where it is of no speed."""
+    rates = _speeds(model)
+    if state not in rates.values():
+        return set()
+    speeds = list(dict.fromkeys(rates.values()))
+    places = [name for name in rates if name not in model.angles]
+    turning = [*model.angles, *(f"{a} - {b}" for a, b in itertools.combinations(model.angles, 2))]
+    drags = [text for v in speeds for text in (v, f"abs({v})*{v}", f"{v}^3")]
+    springs = [text for x in places for text in (x, f"{x}^3")]
+    return {"1", *drags, *springs, *(f"{wave}({a})" for a in turning for wave in ("sin", "cos"))}
+
+
+def _speeds(model: FormulaModel) -> dict[str, str]:
+    """The states whose rate is a state, with that one."""
+    return {name: model.equations[name].strip() for name in model.kinematic}
+
+
+def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
+    """Dry friction of every speed and of every two bodies' relative speed, in every equation of a speed.
+
+    Where an angle's rate is no state, of that rate in every equation that there is. Of a model with a mass
+    matrix, along each coordinate and between two. The sign is smoothed over a width, of which a few are
+    tried.
+
+    Parameters
+    ----------
+    model : FormulaModel
+    states : ndarray (n, d)
+        A motion, which says how wide.
+    """
+    if model.mass:
+        return _dry_forces(model, states)
+    own = _speeds(model)
+    moving = {name: text for name, text in model.equations.items() if name in own or name in model.angles}
+    size = model.rates(0.0, states) if moving else states
+    columns = {name: size[:, model.state_names.index(name)] for name in moving}
+    speeds = [
+        (text, _said(own, name), values)
+        for (name, text), values in zip(moving.items(), columns.values(), strict=True)
+    ]
+    for a, b in itertools.combinations(own, 2):
+        if (a in model.angles) == (b in model.angles):
+            text = f"{own[a]} - {own[b]}"
+            speeds.append((text, text, columns[a] - columns[b]))
+    result = []
+    for state in model.state_names:
+        if state in model.kinematic:
+            continue
+        for text, said, values in speeds:
+            typical = float(np.sqrt((values**2).mean()))
+            # What is another body's may drive this one.
+            low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
+            name, title = f"dry_{_name(said)}_in_{state}", f"dry friction of {said} in {state}'"
+            inner = text if text.isidentifier() else f"({text})"
+            made = (model, f"{state}'", inner, name, title, typical, low_high)
+            result += _dry(*made) if typical > 0 else []
+    return result
+
+
+def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
+    result = []
+    for along in _ways(model):
+        v, where = _along(model, along)
+        columns = [states[:, model.state_names.index(model.speeds[x])] for x in along.split(" - ")]
+        typical = float(np.sqrt((reduce(np.subtract, columns) ** 2).mean()))
+        name, title = _name(f"dry {where}"), f"dry friction {where}"
+        made = (model, f"force({along})", v, name, title, typical, (-np.inf, 0.0))
+        result += [replace(c, form="dry") for c in _dry(*made)] if typical > 0 else []
+    return result
+
+
+def _said(own: dict[str, str], name: str) -> str:
+    """What a reader calls a state's rate."""
+    return own.get(name, f"{name}'")
+
+
+def _dry(
+    model: FormulaModel, slot: str, v: str, name: str, title: str, typical: float, limits: tuple[float, float]
+) -> list[Candidate]:
+    """Dry friction of a speed, with each of the widths in units of what that speed typically is."""
+    c, eps = _unused(model, "c", "eps")
+    ranges = {c: limits, eps: (0.0, np.inf)}
+    spec = written(slot, f"{c}*tanh({v}/{eps})", name, title, [c], ranges, (c, eps))
+    listed = tuple(replace(p, role="width") if p.name == eps else p for p in spec.parameters)
+    spec = replace(spec, parameters=listed)
+    return [Candidate(effects.Effect(name, (0.0, w * typical), made=spec), title) for w in _WIDTHS]
+
+
+def given_terms(model: FormulaModel, given: Iterable[tuple[str, Expression]]) -> list[Candidate]:
+    """The terms that a user asks for, each an equation's state and a formula.
+
+    Raises
+    ------
+    ModelError
+        One that the model cannot have.
+    """
+    result = []
+    for one in given:
+        if isinstance(one, str) or not isinstance(one, (tuple, list)) or len(one) != 2:
+            raise ModelError(f"a candidate is a state and a term, as in ('v', 'abs(v)*v'), not {one!r}")
+        state, term = str(one[0]).removesuffix("'"), text_of("a candidate", one[1])
+        slot = state if along_of(state) else f"{state}'"
+        if slot != state and state not in model.state_names:
+            raise ModelError(
+                f"there is no equation of {state!r} for the candidate {term!r}; there are "
+                f"{', '.join(model.state_names)}"
+            )
+        candidate = _candidate(model, slot, f"({term})", _name(term), term)
+        candidate.added_to(model)  # which parses it
+        result.append(candidate)
+    return result
+
+
+def _candidate(model: FormulaModel, slot: str, text: str, name: str, said: str) -> Candidate:
+    (amplitude,) = _unused(model, "c")
+    term = amplitude if text == "1" else f"{amplitude}*{text}"
+    title = f"{said} in {slot}"
+    values: dict[str, Any] = {amplitude: 0.0}
+    effect = effects.formula(slot, term, name=f"{name}_in_{_place(slot)}", title=title, **values)
+    return Candidate(effect, title)
+
+
+def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
+    """A drive of each frequency in each equation that says more than what another state's rate is."""
+    a, b, f = _unused(model, "a", "b", "f")
+    text = f"{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
+    result = []
+    for slot in slots(model):
+        spec = written(slot.name, text, f"wave_in_{_place(slot.name)}", None, [a, b], None, (a, b, f))
+        # The fit may move it within its line.
+        listed = tuple(replace(p, role="frequency") if p.name == f else p for p in spec.parameters)
+        spec = replace(spec, title=f"a wave in {slot.name}", parameters=listed)
+        for value in frequencies:
+            effect = effects.Effect(spec.name, (0.0, 0.0, float(value)), made=spec)
+            result.append(Candidate(effect, f"a wave of frequency {value:.4g} in {slot.name}"))
+    return result
+
+
+def _place(slot: str) -> str:
+    """A slot as a part of a name."""
+    return _name(slot.removesuffix("'"))
+
+
+def _unused(model: FormulaModel, *wanted: str) -> list[str]:
+    """Names for a term's parameters that mean nothing in the model."""
+    taken = {*model.state_names, *dict(model.values), "t", "pi"}
+    return [
+        next(n for n in (name, *(f"{name}{k}" for k in range(1, 99))) if n not in taken) for name in wanted
+    ]
+
+
+def _of_states(model: FormulaModel) -> list[str]:
+    plain = [name for name in model.state_names if name not in model.angles]
+    degree = _DEGREE if len(plain) <= _FEW else 2
+    powers = [p for d in range(degree + 1) for p in itertools.combinations_with_replacement(plain, d)]
+    result = [_product(p) for p in powers] + [f"abs({name})*{name}" for name in plain]
+    turning = list(model.angles) + [f"{a} - {b}" for a, b in itertools.combinations(model.angles, 2)]
+    for angle in turning:
+        for wave in ("sin", "cos"):
+            result += [f"{wave}({angle})"] + [f"{name}*{wave}({angle})" for name in plain]
+        result.append(f"sin(2*({angle}))" if " " in angle else f"sin(2*{angle})")
+    return result
+
+
+def _product(names: tuple[str, ...]) -> str:
+    counted = {name: names.count(name) for name in names}
+    return "*".join(name if k == 1 else f"{name}^{k}" for name, k in counted.items()) or "1"
+
+
+def _name(text: str) -> str:
+    """A word that says what a term is."""
+    if text == "1":
+        return "constant"
+    said = text.replace("^", "").replace(" - ", "_less_").replace("-", "_less_").replace("/", "_over_")
+    word = re.sub(r"\W+", "_", said).strip("_")
+    return word if word.isidentifier() else f"term_{word}"

@@ -1,0 +1,1 @@
+"""Short formulas for located curves."""

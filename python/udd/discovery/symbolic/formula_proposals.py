@@ -1,0 +1,109 @@
+"""Proposals of formulas for a curve: common forms, and symbolic regression."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.discovery.nonparametric.curve_scan import Curve
+
+from .expressions import Node, constants, read, scaled, simplify
+
+Array = NDArray[np.float64]
+
+_PLACES = 160  # of the curve, that the regression is given
+_SURE = 1e-3  # of the largest error: no place is taken for better known
+
+
+def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
+    """Forms that are often met, each from a few starts, with a constant beside them and without."""
+    spline, x = curve.splines[0], curve.places[0]
+    size = float(np.abs(curve.values(np.quantile(x, np.linspace(0.02, 0.98, 50)))).max()) or 1.0
+    low, high = (0.0, 2 * np.pi) if spline.periodic else np.quantile(x, (0.01, 0.99))
+    span, most = float(high - low), float(np.abs((low, high)).max())
+    texts: list[str] = []
+    if spline.periodic:
+        for n in range(1, 11):
+            texts += [f"{size} * sin({n}@ * x) + {size} * cos({n}@ * x)"]
+        centres = [low + span * k / 6 for k in range(6)]
+        texts += [f"{size} * exp(2.0 * cos(x - {c}))" for c in centres]
+    else:
+        powers = [f"{size / most**n} * x^{n}" for n in (1, 2, 3)]
+        texts += [*powers, f"{powers[0]} + {powers[1]}", f"{powers[0]} + {powers[2]}", " + ".join(powers)]
+        texts += [f"{size / most} * abs(x)", f"{size / most**2} * x * abs(x)"]
+        texts += [f"{size / most**p} * abs(x)^{p}" for p in (0.5, 1.5, 2.5)]
+        texts += [f"{size / most ** (1 + p)} * x * abs(x)^{p}" for p in (0.5, 1.5)]
+        texts += [f"{size} * exp({b / span} * x)" for b in (-2.0, 2.0)]
+        for share, width in itertools.product((0.2, 0.5, 0.8), (0.05, 0.15)):
+            centre, w = low + share * span, width * span
+            texts += [
+                f"{size} * tanh((x - {centre}) * {1 / w})",
+                f"{size} * exp(-1@ * ((x - {centre}) * {1 / w})^2)",
+            ]
+        if curve.coordinates[0].angle:
+            texts += [f"{size} * sin({b} * x)" for b in (1.0, 2.0, 3.0)]
+    for text, beside in itertools.product(texts, ("", f" + {size}")):
+        yield _read_fixed(text + beside)
+
+
+def _read_fixed(text: str) -> tuple[Node, list[float]]:
+    """Read a form in which a number with @ behind it stays as it is."""
+    fixed: dict[str, Node] = {"x": ("x",)}
+    for k in range(-1, 11):
+        fixed[f"fixed_{k + 1}"] = ("n", float(k))
+        text = text.replace(f"({k}@", f"(fixed_{k + 1}")
+    return read(text, fixed)
+
+
+def regression(curve: Curve, most: int, seed: int) -> tuple[list[tuple[Node, list[float]]], str]:
+    """What symbolic regression comes upon, of at most so many constants; or why it could not be run."""
+    if curve.splines[0].periodic:
+        return [], ""  # a formula of an angle has to close: waves and bumps do
+    try:
+        from pyoperon.sklearn import SymbolicRegressor
+    except ImportError:
+        return [], "symbolic regression was not tried: it needs pip install udd[formula]"
+    x = _sample(curve)
+    y = curve.values(x)
+    wide, size = float(np.abs(x).max()), float(y.std())
+    if size == 0.0:
+        return [], ""
+    regressor = SymbolicRegressor(
+        allowed_symbols="add,sub,mul,div,exp,tanh,sin,abs,square,constant,variable",
+        objectives=["mse", "length"],
+        optimizer_iterations=10,
+        max_length=16,
+        population_size=300,
+        generations=100,
+        max_evaluations=60_000,
+        uncertainty=[float(curve.errors(x).mean()) / size],
+        n_threads=1,
+        random_state=seed,
+    )
+    regressor.fit((x / wide)[:, None], y / size)
+    found = []
+    for one in regressor.pareto_front_:
+        text = regressor.get_model_string(one["tree"], 8)
+        try:
+            node, values = read(text, {"X1": ("x",)})
+        except ValueError:
+            continue
+        values.append(size)
+        node = simplify(scaled(("*", ("c", len(values) - 1), node), wide, values), values)
+        if 0 < len(constants(node)) <= most:
+            found.append((node, values))
+    return found, ""
+
+
+def _sample(curve: Curve) -> Array:
+    """Places as dense as the curve is well known, where there are data."""
+    low, high = np.quantile(curve.places[0], (0.002, 0.998))
+    grid = np.linspace(low, high, 600)
+    errors = curve.errors(grid)
+    # Where the known model can do all that the curve does, it is known without error.
+    weight = np.cumsum(1.0 / np.maximum(errors, (_SURE * errors.max()) or 1.0) ** 2)
+    result: Array = np.interp((np.arange(_PLACES) + 0.5) / _PLACES, weight / weight[-1], grid)
+    return result

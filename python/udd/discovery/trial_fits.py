@@ -1,0 +1,204 @@
+"""Full fits of proposals: effects of the library, a located curve, or a formula for one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from udd._util import chi_squared
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.score_scan import physical
+from udd.discovery.symbolic.formulas import Formula
+from udd.discovery.thresholds import ALPHA
+from udd.effects.user_defined import along_of
+from udd.errors import FitError
+from udd.fitting import Fit, extend
+from udd.models.formula_model import FormulaModel
+
+from .curve_effects import fit_curve, fit_formula
+
+_DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
+
+
+def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
+    """Whether the amplitudes of an effect are beyond chance beside all else that is free (Wald's test)."""
+    order = list(fitted.parameters)
+    own = [order.index(name) for name in names]
+    a = np.array([fitted.parameters[name] for name in names])
+    block = fitted.covariance[np.ix_(own, own)] * fitted.shown
+    if np.linalg.matrix_rank(block) < len(own):
+        return False  # its amplitudes trade for each other: it says less than it has numbers
+    return bool(a @ np.linalg.solve(block, a) >= chi_squared.isf(ALPHA, len(own)))
+
+
+def price_of(fitted: Fit) -> float:
+    """What a parameter costs, in chi2 (BIC)."""
+    return math.log(fitted.observations)
+
+
+@dataclass(frozen=True)
+class TrialFit:
+    """A proposal fitted in full: candidates with free amplitudes, a located curve, or a formula for one.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        The effects, as they were proposed.
+    fit, compared : Fit
+        The fit, and the same held as tightly as those that it is compared with.
+    names : list of str
+        The parameters that came in with it.
+    price : float
+        What its freedom costs, in chi2 (BIC).
+    freedom : float
+        How many numbers were found for it.
+    curve : Curve or None
+        What was located.
+    formula : Formula or None
+        What the curve is written as.
+    """
+
+    candidates: list[Candidate]
+    fit: Fit
+    compared: Fit
+    names: list[str]
+    price: float
+    freedom: float
+    curve: Curve | None = None
+    formula: Formula | None = None
+
+    @property
+    def amplitudes(self) -> list[float]:
+        """The fitted values of these parameters."""
+        return [self.fit.parameters[name] for name in self.names]
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether it is a curve without a formula."""
+        return self.curve is not None and self.formula is None
+
+    def criterion(self, unit: float) -> float:
+        """chi2 in a common unit with the price of the freedom: the smaller the better."""
+        return self.compared.chi2 / unit + self.price
+
+    @property
+    def handicap(self) -> float:
+        """By how much chi2 must be better than that of an effect of the library.
+
+        Of several at once as much as a further one has to bring beyond its price.
+        """
+        if self.curve is None:
+            return EVIDENCE_MARGIN * (
+                sum(not c.usual for c in self.candidates) + 2 * (len(self.candidates) - 1)
+            )
+        return 3 * EVIDENCE_MARGIN if self.formula is None else 2 * EVIDENCE_MARGIN
+
+    @property
+    def needed(self) -> bool:
+        """Whether each of several candidates is needed beside the others."""
+        return len(self.candidates) < 2 or all(
+            needed_in(self.fit, c.amplitude_names) for c in self.candidates
+        )
+
+    @property
+    def physical(self) -> bool:
+        """Whether all amplitudes lie in their ranges, and a pendulum's own friction still brakes."""
+        values, errors = self.fit.parameters, self.fit.errors
+        if self.fit.model.kind == "pendulum" and "k0" in values and values["k0"] < -2 * errors["k0"]:
+            return False  # two forms that take from each other what a third would do alone
+        if self.curve is not None:
+            return True
+        return all(
+            physical(c, [values[n] for n in c.amplitude_names], [errors[n] for n in c.amplitude_names])
+            for c in self.candidates
+        )
+
+
+def of_library(current: Fit, candidates: list[Candidate], start: list[float]) -> TrialFit | None:
+    """Effects of the library with free amplitudes."""
+    try:
+        fitted = extend(current, [c.effect for c in candidates], start)
+    except FitError:
+        return None
+    names = [name for c in candidates for name in c.amplitude_names]
+    price = price_of(fitted) * sum(c.parameters for c in candidates)
+    trial = TrialFit(candidates, fitted, fitted, names, price, len(names))
+    return trial if trial.physical and fitted.converged else None
+
+
+def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
+    """A curve, located in full."""
+    try:
+        kind = "curve" if len(curve.coordinates) == 1 else "surface"
+        located = fit_curve(current, curve, _unused(current, kind))
+    except FitError:
+        return None
+    if not located.fit.converged:
+        return None
+    candidate = Candidate(located.effect, curve.title)
+    price = 2 * located.price + _excess(current, located.curve)
+    return TrialFit([candidate], located.fit, located.fit, [], price, located.curve.df, located.curve)
+
+
+def _excess(current: Fit, curve: Curve) -> float:
+    """What a curve pays, in chi2, for values beyond what the motion can show: all rates there are.
+
+    Its prior is as wide as these; wider by a factor costs that factor's logarithm for each number found.
+    """
+    if not isinstance(current.model, FormulaModel):
+        return 0.0  # whose curves the disk's own tests keep within bounds
+    model, linked = current.model, current.record.linked
+    rates = np.diff(current.states, axis=0)[linked] / np.diff(current.record.t)[linked, None]
+    shown = rates[:, model.state_names.index(curve.slot.equation)]
+    if along_of(curve.slot.name):
+        speeds = list(model.speeds.values())
+        forces = model.mass_matrix(current.states[:-1][linked])[:, speeds.index(curve.slot.equation)]
+        shown = (forces * rates[:, [model.state_names.index(name) for name in speeds]]).sum(axis=1)
+    most = float(np.abs(curve.values(*curve.places)).max())
+    ratio = most / max(float(np.abs(shown).max()), 1e-300)
+    return 2 * curve.df * math.log(max(ratio, 1.0))
+
+
+def of_formula(current: Fit, curve: Curve, written: Formula) -> TrialFit | None:
+    """A formula for a curve, all its constants free."""
+    name = _unused(current, "formula")
+    try:
+        fitted = fit_formula(current, curve, written, name)
+    except FitError:
+        return None
+    effect = fitted.model.effects[-1]
+    names = [f"{name}.{p}" for p in effect.parameters]
+    price, free = price_of(fitted) * len(names), len(names)
+    trial = TrialFit([Candidate(effect, effect.title)], fitted, fitted, names, price, free, curve, written)
+    return trial if trial.physical and fitted.converged else None
+
+
+def fitted_ones(trials: list[TrialFit | None]) -> list[TrialFit]:
+    """Those that could be fitted."""
+    return [t for t in trials if t]
+
+
+def one_of_each(trials: list[TrialFit]) -> list[TrialFit]:
+    """The best of those that tried one effect with several values of a shape that a fit then found."""
+    found: dict[object, TrialFit] = {}
+    for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
+        effect = trial.candidates[0].effect
+        fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
+        found.setdefault((effect.name, effect.momentum, *fixed), trial)
+    return [trial for trial in trials if trial in found.values()]
+
+
+def same_law(one: Fit, other: Fit) -> bool:
+    """Whether two models make the same motion: one law in other words."""
+    sd = one.noise.sd(one.record, one.states[:, 0])
+    return bool(np.nanmax(np.abs(one.misfit - other.misfit) / sd) < _DIFFERENT)
+
+
+def _unused(current: Fit, name: str) -> str:
+    """A name that no effect of the model has yet."""
+    taken = {effect.name for effect in current.model.effects}
+    return next(n for n in (name, *(f"{name}{k}" for k in range(2, 9))) if n not in taken)

@@ -1,0 +1,437 @@
+"""Held-out errors: how far a model's free runs are from data that it was not fitted to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import FitError
+from udd.fitting import UNEXPLAINED, Fit, Record, filtered, predicted
+from udd.fitting.sensor import reads
+
+Array = NDArray[np.float64]
+#: A ratio and its 95 % interval.
+Ratio = tuple[float, float, float]
+
+#: Horizons of the free runs, s; those longer than a third of the held-out part are left out. Of a user's own
+#: model all times here count in units of its motion's pace, see :func:`pace`.
+HORIZONS = {
+    "disk": (0.2, 0.4, 1.0, 2.0, 4.0),
+    "pendulum": (0.5, 1.0, 4.0, 10.0, 20.0),
+    "own": (0.2, 0.4, 1.0, 2.0, 4.0),
+}
+# s of data before each start, from which its state is filtered
+_FILTER = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
+_FILTER_LEVEL = {"disk": 1, "pendulum": 3, "own": 2}  # how tightly, by the place in the schedule
+_AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
+_EVERY = 0.2  # s between starts
+_BLOCK = 4.0  # s; starts within a block are resampled together
+_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record's frames are cut into
+_FLOOR = 1.5  # times the noise floor that an error may be and still be noise
+_LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
+_COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of free runs on held-out data.
+
+    Attributes
+    ----------
+    unit : str
+        ``"m"`` of the disk's centre, ``"rad"`` of a pendulum's angle, ``"spread"`` of a user's own model: the
+        root mean square over the states that are seen, each in units of its standard deviation.
+    horizons : tuple of float
+        Length of the free runs, s.
+    median : ndarray (h,)
+        Median error over the starts.
+    low, high : ndarray (h,)
+        95 % interval of the median, from a bootstrap over blocks.
+    floor : ndarray (h,)
+        What a model without fault would score: the noise of the data and of the filtered start alone.
+    samples : ndarray (starts, h)
+        The errors; NaN where the frame was not seen.
+    blocks : ndarray of int (starts,)
+        Starts with the same number are resampled together.
+    run : ndarray (n,)
+        Error of one free run over all held-out frames, from where the fit ended; NaN where a frame was not
+        seen.
+    run_blocks : ndarray of int (n,)
+        Frames with the same number are resampled together.
+    """
+
+    unit: str
+    horizons: tuple[float, ...]
+    median: Array
+    low: Array
+    high: Array
+    floor: Array
+    samples: Array
+    blocks: NDArray[np.int64]
+    run: Array
+    run_blocks: NDArray[np.int64]
+
+    @property
+    def whole(self) -> float:
+        """Root mean square error of the free run over all held-out frames."""
+        return float(_rms(self.run))
+
+    def at(self, horizon: float) -> tuple[float, float, float, float]:
+        """``(median, low, high, floor)`` at one of the horizons."""
+        k = self.horizons.index(horizon)
+        return float(self.median[k]), float(self.low[k]), float(self.high[k]), float(self.floor[k])
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        keys = ("median", "low", "high", "floor")
+        rows = [
+            {"horizon_s": h, **{key: float(getattr(self, key)[k]) for key in keys}}
+            for k, h in enumerate(self.horizons)
+        ]
+        return {"unit": self.unit, "starts": len(self.samples), "errors": rows, "whole_run_rms": self.whole}
+
+
+def held_out_errors(
+    fit: Fit, record: Record, held: NDArray[np.bool_], seed: int = 0, unit: float = 1.0
+) -> Errors:
+    """Errors of a fitted model on the frames of `record` that are held out.
+
+    Each free run starts from a state that is filtered from the second of data before it; absolute time is
+    kept.
+
+    Parameters
+    ----------
+    fit : Fit
+        Made without those frames.
+    record : Record
+        The whole measurement's frames.
+    held : ndarray of bool (n,)
+        Which frames are held out: the last ones of each measurement.
+    unit : float
+        See :func:`pace`.
+    """
+    kind = fit.model.kind
+    wanted = tuple(h * unit for h in HORIZONS[kind])
+    windows, ends, horizons = _windows(record, held, wanted, _FILTER[kind] * unit, _EVERY * unit)
+    firsts, states = _filtered(fit, record, windows)
+    starts = windows[:, 1]
+    times = record.t[ends]
+    seen = record.seen[ends]
+    there = _there(record)[ends]
+    found = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
+    samples = np.where(there, _distance(fit, record, found, seen), np.nan)
+
+    floor = _floor(fit, record, windows, ends, firsts, seed)
+    rng = np.random.default_rng(seed)
+
+    own_blocks = _blocks(record, held, _BLOCK * unit)
+    blocks = own_blocks[starts]
+    low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
+    return Errors(
+        unit={"disk": "m", "pendulum": "rad", "own": "spread"}[kind],
+        horizons=horizons,
+        median=np.nanmedian(samples, axis=0),
+        low=low,
+        high=high,
+        floor=floor,
+        samples=samples,
+        blocks=blocks,
+        run=_run(fit, record, held),
+        run_blocks=own_blocks[held],
+    )
+
+
+def stretches(record: Record, length: float) -> NDArray[np.int64]:
+    """The number of the stretch of `length` s that each frame lies in, of each measurement its own."""
+    own = ((record.t - record.t.min()) // length).astype(np.int64)
+    result: NDArray[np.int64] = own + record.film * (int(own.max()) + 1)
+    return result
+
+
+def _blocks(record: Record, held: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
+    """Stretches to resample; shorter ones where the frames held out would be too few stretches for it."""
+    result = stretches(record, length)
+    if len(np.unique(result[held])) >= _FEWEST:
+        return result
+    spans = [np.ptp(record.t[held & (record.film == film)]) for film in range(len(record.origins))]
+    return stretches(record, float(max(spans)) / _SHORT)
+
+
+def comparison_horizon(errors: Errors) -> float:
+    """The horizon at which models are compared: a second of the disk, or the nearest below that there is, s.
+
+    Of a user's own model it is the third that there is.
+    """
+    if errors.unit == "spread":
+        return errors.horizons[:3][-1]
+    return max((h for h in errors.horizons if h <= 1.0), default=errors.horizons[0])
+
+
+def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> Ratio:
+    """The ratio of the median errors at a horizon, after over before, with its 95 % interval."""
+    k = before.horizons.index(horizon)
+    both = np.column_stack([after.samples[:, k], before.samples[:, k]])
+    return _ratio(before.blocks, both, _median, seed)
+
+
+def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> Ratio:
+    """The ratio of the errors of the free run over all held-out frames, with its 95 % interval."""
+    return _ratio(before.run_blocks, np.column_stack([after.run, before.run]), _rms, seed)
+
+
+def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0) -> Ratio:
+    """The ratio of two fits' costs on a record that neither saw, with its 95 % interval from paired blocks.
+
+    The costs are those of :func:`udd.fitting.frame_costs`. They tell two models apart where
+    their forecasts are still equally good.
+    """
+    costs = np.column_stack([after, before])
+    return _ratio(stretches(record, _COST_BLOCK * unit), costs, _sum, seed)
+
+
+def confirmed(before: Errors, ratio: Ratio) -> bool:
+    """Whether free runs on held-out data confirm a claim: their errors' ratio is below 1 with 95 %.
+
+    Where the known model's runs are no worse than noise makes them they cannot show a small effect, and must
+    but not contradict it; over a pendulum's whole run it adds up. No interval confirms nothing.
+    """
+    _value, low, high = ratio
+    if not np.isfinite(high) or low > 1.0:
+        return False
+    return high < 1.0 or (before.unit != "rad" and at_the_floor(before, comparison_horizon(before)))
+
+
+def at_the_floor(errors: Errors, horizon: float) -> bool:
+    """Whether errors are no larger than noise makes them, give or take a half."""
+    median, low, _high, floor = errors.at(horizon)
+    return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
+
+
+def lacks_more(fit: Fit, errors: Errors) -> bool:
+    """Whether something is missing beside the effects that were found.
+
+    They leave more than noise; or, of a user's own model, whose terms may together pass for what is none of
+    them, innovations are not white and free runs not as good as noise allows.
+    """
+    if fit.scatter > UNEXPLAINED:
+        return True
+    own = fit.model.kind == "own"
+    return own and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
+
+
+def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -> bool:
+    """Whether free runs miss by the size of the motion, where noise does not: no such model is complete.
+
+    Of a pendulum over the whole held-out part, else at the horizon of comparison.
+    """
+    if errors.unit == "rad":
+        error, floor = errors.whole, float(errors.floor[-1])
+    else:
+        error, _low, _high, floor = errors.at(comparison_horizon(errors))
+    size = 1.0
+    if errors.unit != "spread":
+        places = record.seen[held & _there(record)][:, : 2 if errors.unit == "m" else 1]
+        size = float(np.sqrt(places.var(axis=0).sum()))
+    return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
+
+
+def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:
+    def ratio(one: Array, other: Array) -> Array:
+        return measure(one) / measure(other)
+
+    return (float(ratio(*both.T)), *_interval(blocks, both, ratio, np.random.default_rng(seed)))
+
+
+def _windows(
+    record: Record, held: NDArray[np.bool_], wanted: tuple[float, ...], window: float, often: float = _EVERY
+) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
+    """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
+    spans = [np.flatnonzero(held & (record.film == film)) for film in range(len(record.origins))]
+    longest = max(float(np.ptp(record.t[own])) for own in spans)
+    step = float(np.median(np.diff(record.t)))
+    horizons = tuple(h for h in wanted if h <= longest / 3 and h >= step)
+    if not horizons:
+        raise FitError(f"the held-out {longest:.2g} s are too short for a forecast: film for longer")
+    windows, ends = [], []
+    run = np.concatenate([[0], np.cumsum(~record.linked)])
+    for own in spans:
+        # Every measurement has a frame rate of its own.
+        step = float(np.median(np.diff(record.t[own])))
+        back, every = max(round(window / step), 6), max(round(often / step), 1)
+        ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
+        for start in range(int(own[0]) + back, int(own[-1]) + 1 - int(ahead[-1]), every):
+            if run[start - back] == run[start + ahead[-1]]:
+                windows.append((start - back, start))
+                ends.append(start + ahead)
+    if not windows:
+        raise FitError(
+            f"the held-out {longest:.2g} s hold no {window + horizons[-1]:.2g} s "
+            "without a gap, which a forecast takes: film for longer"
+        )
+    return np.array(windows, dtype=np.int64), np.array(ends, dtype=np.int64), horizons
+
+
+def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
+    """States at the windows' first and last frames."""
+    diffusion = fit.problem.schedule[_FILTER_LEVEL[fit.model.kind]]
+    first, last, _covariance = filtered(fit, record, windows, diffusion)
+    return first, last
+
+
+def _run(fit: Fit, record: Record, held: NDArray[np.bool_]) -> Array:
+    """Error of free runs from the last fitted frame of each measurement to its end, frame by frame."""
+    errors = np.full(len(record.t), np.nan)
+    for film in range(len(record.origins)):
+        own = np.flatnonzero(held & (record.film == film))
+        start = fit.states[fit.record.film == film][-1:]
+        times = record.t[own][None, :]
+        found = predicted(
+            fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
+        )[0]
+        errors[own] = _distance(fit, record, found, record.seen[own])
+    result: Array = np.where(_there(record), errors, np.nan)[held]
+    return result
+
+
+def _floor(
+    fit: Fit, record: Record, windows: NDArray[np.int64], ends: NDArray[np.int64], first: Array, seed: int
+) -> Array:
+    """Median errors of the same free runs on data that the model made itself, with the noise found.
+
+    ``first`` holds the states at the windows' first frames, where the made runs start.
+    """
+    rng = np.random.default_rng(seed)
+    # All windows as long as the shortest: measurements may differ in their frame rates.
+    length = int((windows[:, 1] - windows[:, 0]).min()) + 1
+    n, begins = len(windows), windows[:, 1] - length + 1
+    first = np.where((begins == windows[:, 0])[:, None], first, record.states[begins])
+    film = record.film[windows[:, 1]]
+    frames = np.hstack([begins[:, None] + np.arange(length), ends])
+    made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
+    # In a search the noise stays what the first model's misfits made it; where less remains it is less.
+    sd = fit.noise.sd(record, record.states[:, 0]) * math.sqrt(min(fit.scatter, 1.0))
+    sd = np.minimum(sd, _shown(fit, record))[frames]
+    made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
+
+    # Windows overlap: each is laid out as frames of its own, linked to no other.
+    inside = frames[:, :length].ravel()
+    own = replace(
+        record,
+        t=record.t[inside],
+        seen=made[:, :length].reshape(n * length, -1),
+        sigma=record.sigma[inside],
+        rho=record.rho[inside],
+        linked=np.tile(np.arange(length) < length - 1, n)[:-1],
+        states=record.states[inside],
+        odd=record.odd[inside],
+        row=record.row[inside],
+        film=record.film[inside],
+    )
+    starts = length * np.arange(n)
+    _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
+    runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
+    there = _there(record)[ends]
+    errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
+    result: Array = np.nanmedian(errors, axis=0)
+    return result
+
+
+def _shown(fit: Fit, record: Record) -> Array | float:
+    """The noise of a record's frames as they show it themselves, (n, m): a search may assume more.
+
+    Of a disk's film the search's is the frames' own.
+    """
+    if fit.model.kind == "disk":
+        return np.inf
+    result = np.full(record.seen.shape, np.inf)
+    for film in range(len(record.origins)):
+        own = record.film == film
+        for channel, there in enumerate(record.observed.T):
+            if (own & there).any():
+                result[own, channel] = reads(record.seen[own & there, channel])[0]
+    return result
+
+
+def _there(record: Record) -> NDArray[np.bool_]:
+    """The frames in which everything was seen that the record sees at all, (n,)."""
+    result: NDArray[np.bool_] = np.asarray(record.observed[:, record.observed.any(axis=0)].all(axis=1))
+    return result
+
+
+def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
+    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread."""
+    difference = a - b
+    result: Array
+    if fit.model.kind == "disk":
+        return np.hypot(difference[..., 0], difference[..., 1])
+    if fit.model.kind == "pendulum":
+        result = np.abs(_turned(difference[..., 0]))
+        return result
+    squares = []
+    for k in np.flatnonzero(record.observed.any(axis=0)):
+        spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
+        angle = fit.model.state_names[k] in fit.model.angles
+        own = _turned(difference[..., k]) if angle else difference[..., k]
+        squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
+    result = np.sqrt(np.mean(squares, axis=0))
+    return result
+
+
+def _turned(angle: Array) -> Array:
+    """The same angle within half a turn of zero."""
+    result: Array = (angle + np.pi) % (2 * np.pi) - np.pi
+    return result
+
+
+def _median(rows: Array) -> Array:
+    """Along the last axis, NaN left out; `nanmedian` takes longer, and this is taken of thousands of rows."""
+    ordered = np.sort(rows, axis=-1)  # NaN comes last
+    known = np.count_nonzero(~np.isnan(rows), axis=-1)[..., None]
+    lower, upper = (np.take_along_axis(ordered, at, axis=-1) for at in ((known - 1) // 2, known // 2))
+    result: Array = (lower + upper)[..., 0] / 2
+    return result
+
+
+def _sum(rows: Array) -> Array:
+    result: Array = np.nansum(rows, axis=-1)
+    return result
+
+
+def _rms(rows: Array) -> Array:
+    result: Array = np.sqrt(np.nanmean(rows**2, axis=-1))
+    return result
+
+
+def _interval(
+    blocks: NDArray[np.int64], columns: Array, measure: Callable[..., Array], rng: np.random.Generator
+) -> tuple[float, float]:
+    """95 % interval of a statistic of columns (n, c), over resampled blocks of them."""
+    numbers, counts = np.unique(blocks, return_counts=True)
+    if len(numbers) < _FEWEST:
+        return float("nan"), float("nan")
+
+    from scipy.stats import bootstrap  # takes half a second to import
+
+    # Blocks of one length, for many resamplings at once: what they lack is as if it had not been seen.
+    groups = np.full((columns.shape[1], len(numbers), counts.max()), np.nan)
+    for k, (number, count) in enumerate(zip(numbers, counts, strict=True)):
+        groups[:, k, :count] = columns[blocks == number].T
+
+    def statistic(chosen: NDArray[np.int64], axis: int) -> Array:  # of resamplings along the last axis
+        return measure(*(own[chosen].reshape(*chosen.shape[:-1], -1) for own in groups))
+
+    interval = bootstrap(
+        (np.arange(len(numbers)),),
+        statistic,
+        vectorized=True,
+        n_resamples=999,
+        batch=max(_AT_ONCE // groups.size, 1),
+        method="percentile",
+        rng=rng,
+    ).confidence_interval
+    return float(interval.low), float(interval.high)

@@ -1,0 +1,93 @@
+"""Prequential comparison of two forms: which predicts a record better, over several splits of time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd._util.parallel import parallel_map
+from udd.discovery.trial_fits import TrialFit
+from udd.errors import FitError
+from udd.fitting import Fit, Record, frame_costs, held, within
+
+from .acceptance_tests import same_level
+from .held_out_errors import Ratio, cost_improvement
+
+Array = NDArray[np.float64]
+
+#: Shares of a record that forms are fitted to, to foretell the rest of it. From less than what effects are
+#: sought in, a law of two terms is known worse than a wrong one of one term.
+SPLITS = (0.6, 0.7, 0.8)
+_FEWEST = 20  # frames that a form is fitted to
+
+
+class Foretelling:
+    """What forms foretell of what follows each of several first parts of a record.
+
+    Each form is fitted to each first part alone and then held. Where forms differ by how they carry on, as
+    drags do once a motion has died down, one split may favour either by chance; over several this averages
+    out.
+
+    Parameters
+    ----------
+    record : Record
+    wholes : mapping of int to Trial
+        The forms fitted to all data, by the identity of the trial that they belong to.
+    unit : float
+        See :func:`udd.discovery.validation.held_out_errors.pace`.
+    """
+
+    def __init__(self, record: Record, wholes: Mapping[int, TrialFit], unit: float) -> None:
+        self.record, self.wholes, self.unit = record, wholes, unit
+        firsts = [record.first(share) for share in SPLITS]
+        self.firsts = [first for first in firsts if first.sum() >= _FEWEST]
+        self._fitted: dict[int, list[Fit | None]] = {}
+        self._held: dict[tuple[int, int, int], Fit] = {}
+
+    def ratio(self, one: TrialFit, other: TrialFit) -> Ratio:
+        """Cost of the frames that follow by another form over that by one, all splits together.
+
+        NaN where none can be told.
+        """
+        sums = np.zeros((2, len(self.record.t)))
+        pairs = zip(self._fits(one), self._fits(other), strict=True)
+        for k, (before, after) in enumerate(pairs):
+            if before is None or after is None:
+                continue
+            rest = ~self.firsts[k]
+            level = min(before.level, after.level)
+            try:
+                both = same_level(self._rest(one, k, before, level), self._rest(other, k, after, level))
+            except FitError:
+                continue
+            sums[:, rest] += [frame_costs(fitted) for fitted in both]
+        counted = np.asarray(sums.any(axis=0))
+        if not counted.any():
+            return math.nan, math.nan, math.nan
+        seen = self.record.part(counted)
+        return cost_improvement(sums[0, counted], sums[1, counted], seen, unit=self.unit)
+
+    def _fits(self, trial: TrialFit) -> list[Fit | None]:
+        """A form fitted to each first part; None where it cannot be."""
+        whole = self.wholes[id(trial)].fit
+
+        def fitted(first: NDArray[np.bool_]) -> Fit | None:
+            try:
+                result = within(whole, first)
+            except FitError:
+                return None
+            return result if result.converged else None
+
+        if id(trial) not in self._fitted:
+            self._fitted[id(trial)] = parallel_map(fitted, self.firsts)
+        return self._fitted[id(trial)]
+
+    def _rest(self, trial: TrialFit, split: int, fitted: Fit, level: int) -> Fit:
+        """The frames after a split, all parameters held."""
+        key = id(trial), split, level
+        if key not in self._held:
+            self._held[key] = held(fitted, self.record.part(~self.firsts[split]), level)
+        return self._held[key]

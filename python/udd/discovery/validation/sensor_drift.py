@@ -1,0 +1,88 @@
+"""What a drifting sensor, or a support that moves, would explain of a model's misfit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.trial_fits import price_of
+from udd.fitting import Fit, eased
+
+Array = NDArray[np.float64]
+
+_INTERVALS = 28  # of the drift's cubic spline over a record, as many as a curve over time has
+_SLOW = 12.0  # times what the motion takes to change, that each of them lasts at least: two of its turns
+_FEWEST = 3
+
+
+def drift_gain(fit: Fit) -> float:
+    """The fall of chi2, in units of the fit's scatter, by a slow drift of what each channel calls zero.
+
+    A lower bound, for the motion is held; zero where it is not worth the drift's freedom, or where the record
+    is too short to tell a drift from its motion.
+    """
+    sd = fit.noise.sd(fit.record, fit.blurring) / np.sqrt(np.maximum(fit.noise.weight, 1e-12))[:, None]
+    change, total = _change(fit), 0.0
+    for film in range(len(fit.models)):
+        own = fit.record.film == film
+        t = fit.record.t[own]
+        span = float(np.ptp(t))
+        number = min(_INTERVALS, int(span / (_SLOW * change))) if change > 0 else 0
+        if number < _FEWEST:
+            continue
+        inner = np.linspace(t[0], t[-1], number + 1)
+        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
+        design = BSpline.design_matrix(t, knots, 3).toarray()
+        for misfit, size in zip(fit.misfit[own].T, sd[own].T, strict=True):
+            seen = np.isfinite(misfit)
+            if seen.sum() <= design.shape[1]:
+                continue
+            weighted = design[seen] / size[seen, None]
+            scaled = misfit[seen] / size[seen]
+            left = scaled - weighted @ np.linalg.lstsq(weighted, scaled, rcond=None)[0]
+            fall = float(scaled @ scaled - left @ left) / max(fit.scatter, 1.0)
+            total += fall if fall > price_of(fit) * design.shape[1] else 0.0
+    return total
+
+
+FORETELLS = 0.5
+"""The ratio of free runs' errors, at worst, from which on no random forces come into question."""
+
+
+def as_random(known: Fit, found: Fit) -> Fit | None:
+    """The likeliest fit of what was found, where forces that push at random explain the data about as well.
+
+    So does a support that moves: what it feeds into a swing that hardly loses energy lasts for many turns,
+    and looks like a law. A right law needs no such forces beside it: what was found is then likeliest where
+    it is held tightly. One that needs them still has to explain more beside them than the known model does,
+    by the evidence of fits that are each held as tightly as is likeliest. Not of a disk, whose camera sees
+    all marks move.
+
+    Parameters
+    ----------
+    known, found : Fit
+        Of all data, without and with what was found, in a search.
+
+    Returns
+    -------
+    Fit or None
+        None where they do not, or where no such forces are needed.
+    """
+    if found.model.kind == "disk":
+        return None
+    likeliest = eased(found)
+    tight = likeliest.level == len(likeliest.problem.schedule) - 1
+    if tight or likeliest.evidence - eased(known).evidence > EVIDENCE_MARGIN:
+        return None
+    return likeliest
+
+
+def _change(fit: Fit) -> float:
+    """How long the motion takes to change, s: the least over the states of spread over rate."""
+    linked, dt = fit.record.linked, np.diff(fit.record.t)
+    rates = np.diff(fit.states, axis=0)[linked] / dt[linked, None]
+    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
+    moving = (rate > 0) & (spread > 0)
+    return float((spread[moving] / rate[moving]).min()) if moving.any() else 0.0

@@ -1,0 +1,318 @@
+"""Effects with their numbers, and what is said of them."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TypeAlias
+
+from udd import _core
+from udd._util.validation import number
+from udd.errors import ModelError
+
+__all__ = ["Effect", "Parameter", "Spec", "library"]
+
+#: What the core needs to know of a user's own effect: slot, formula, parameters, amplitudes.
+Own: TypeAlias = tuple[str, str, list[str], list[str]]
+
+#: What stands in a formula for the smoothed sign of the speed.
+_SIGNS = {"set-valued": "Sgn(Omega)", "karnopp": "Karnopp(Omega, eps)", "lugre": "LuGre(Omega, eps)"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+        The unit is SI, empty where dimensionless.
+    default : float
+        The value taken where none is given.
+    range : tuple of float
+        The physically sensible range.
+    role : str
+        ``"amplitude"`` (the effect is proportional to it and absent where all amplitudes are zero),
+        ``"shape"``, ``"frequency"``, or ``"width"``: over which a smoothed jump goes, of which a search keeps
+        the best and tells none apart.
+    grid : tuple of float
+        Values that a scan of candidates tries, for a shape.
+    """
+
+    name: str
+    unit: str
+    default: float
+    range: tuple[float, float]
+    role: str
+    grid: tuple[float, ...]
+
+    @property
+    def sought(self) -> bool:
+        """Whether a fit that adds the effect finds it; not a shape that is one of a few whole numbers."""
+        if self.role == "width":
+            return False
+        if self.role == "shape":
+            return len(self.grid) > 1 and any(value % 1 for value in self.grid)
+        return True
+
+    def check(self, effect: str, value: object, *, strict: bool) -> float:
+        """The value as a float, within the range; amplitudes may leave it unless `strict`."""
+        result = number(f"{self.name} of {effect}", value)
+        low, high = self.range
+        if (strict or self.role != "amplitude") and not low <= result <= high:
+            unit = f" {self.unit}" if self.unit else ""
+            raise ModelError(
+                f"{self.name} of {effect} must lie between {low:g} and {high:g}{unit}, not at {result:g}"
+            )
+        return result
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What is said of an effect beside its formula.
+
+    Attributes
+    ----------
+    name : str
+        Its constructor's name in this module.
+    title, equation, meaning : str
+        What a reader calls it, its formula, and what it would mean physically.
+    bodies : tuple of str
+        What it can act on: ``"disk"``, ``"pendulum"``.
+    slots : tuple of str
+        Where it enters the equations: ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``.
+    momenta : tuple of str
+        How it may enter the angular momentum, the default first: ``"consistent"`` (the contact's
+        velocity and its rate of change exert a torque) or ``"constraint"`` (only the rolling constraint
+        changes, as in the paper). Empty for torque and friction.
+    treatments : tuple of str
+        What may become of dry friction's jump at rest, the default first: ``"smoothed"`` (over the width
+        `eps`; nothing sticks, but it can be fitted), ``"set-valued"`` (it sticks until the torque exceeds the
+        friction), ``"karnopp"`` (the same, and speeds below `eps` count as rest) or ``"lugre"`` (bristles
+        bend by about `eps`, in rad, before they slide; their deflection is one more state; for
+        :func:`udd.simulate` only). Empty for what is not dry friction.
+    parameters : tuple of Parameter
+        In the order of the formula.
+    """
+
+    name: str
+    title: str
+    equation: str
+    meaning: str
+    bodies: tuple[str, ...]
+    slots: tuple[str, ...]
+    momenta: tuple[str, ...]
+    treatments: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def shaped(self) -> bool:
+        """Whether a fit that adds the effect finds a shape of it too."""
+        return any(p.sought and p.role == "shape" for p in self.parameters)
+
+    def make(self, *, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
+        """The effect with these parameter values; the others take their defaults.
+
+        Raises
+        ------
+        ModelError
+            An unknown parameter, a value outside its range, or a momentum or treatment that the effect
+            does not have.
+        """
+        known = {p.name: p for p in self.parameters}
+        for name in values:
+            if name not in known:
+                raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
+        given = tuple(p.check(self.name, values.get(p.name, p.default), strict=True) for p in self.parameters)
+        return Effect(self.name, given, momentum, treatment, self if self.own else None)
+
+    @property
+    def own(self) -> Own | None:
+        """What the core needs to know of an effect that is not of the library."""
+        return None
+
+    def expression(self, values: Mapping[str, float], equation: str) -> str:
+        """The equation with these numbers put in."""
+
+        def put(match: re.Match[str]) -> str:
+            value = values[match[0]]
+            return f"({value:.4g})" if value < 0 else f"{value:.4g}"
+
+        left, equals, right = equation.partition(" = ")
+        names = "|".join(map(re.escape, values))
+        return left + equals + (re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, right) if names else right)
+
+    def call(self, effect: Effect) -> tuple[str, list[str]]:
+        """The function that makes the effect, and its arguments as text."""
+        return self.name, [f"{name}={value!r}" for name, value in effect.parameters.items()]
+
+
+@functools.cache
+def _specs() -> Mapping[str, Spec]:
+    """The core's library by name."""
+    specs = {}
+    for entry in _core.effect_library():
+        parameters = tuple(
+            Parameter(p["name"], p["unit"], p["default"], p["range"], p["role"], tuple(p["scan"]))
+            for p in entry["parameters"]
+        )
+        name = entry["name"]
+        texts = entry["title"], entry["equation"], entry["meaning"]
+        bodies, slots = tuple(entry["bodies"]), tuple(entry["slots"])
+        choices = tuple(entry["momenta"]), tuple(entry["treatments"])
+        specs[name] = Spec(name, *texts, bodies, slots, *choices, parameters)
+    return MappingProxyType(specs)
+
+
+def library() -> tuple[Spec, ...]:
+    """Every effect that there is.
+
+    Examples
+    --------
+    >>> from udd import effects
+    >>> for spec in effects.library()[:2]:
+    ...     print(f"{spec.title}: {spec.equation}")
+    quadratic drag: torque = -c |Omega| Omega
+    cubic drag: torque = -c Omega^3
+    """
+    return tuple(_specs().values())
+
+
+@dataclass(frozen=True, repr=False)
+class Effect:
+    """An effect with its numbers; made by the constructors of this module.
+
+    Parameters
+    ----------
+    name : str
+        One of the library.
+    values : tuple of float
+        Parameter values in the library's order. Amplitudes may lie outside their physical range, as on
+        the way of a fit; shapes and frequencies may not.
+    momentum : str, optional
+        ``"consistent"`` or ``"constraint"``, where the effect has the choice; by default its first.
+    treatment : str, optional
+        ``"smoothed"``, ``"set-valued"``, ``"karnopp"`` or ``"lugre"`` for dry friction; by default
+        the first. See :class:`Spec`.
+    made : Spec, optional
+        What is said of an effect that is not of the library.
+
+    Raises
+    ------
+    ModelError
+        An unknown name, a number that is not finite or out of range, a momentum or a treatment that does
+        not apply.
+
+    Examples
+    --------
+    A pendulum with dry friction comes to rest within the dead band, where friction holds it:
+
+    >>> import udd
+    >>> dry = udd.effects.coulomb(c=0.05, treatment="set-valued")
+    >>> run = udd.simulate(udd.Pendulum(0.5, effects=dry), 20.0, [0.0, 0.1])
+    >>> run.events.kind
+    ('reversal', 'reversal', 'reversal', 'reversal', 'stick')
+    >>> float(run.Omega[-1]), bool(9.81 * 0.5 * abs(run.theta[-1]) < 0.05)
+    (0.0, True)
+    """
+
+    name: str
+    values: tuple[float, ...]
+    momentum: str | None = None
+    treatment: str | None = None
+    made: Spec | None = None
+
+    def __post_init__(self) -> None:
+        if self.made is None and self.name not in _specs():
+            raise ModelError(f"no effect is called {self.name!r}; there are {', '.join(_specs())}")
+        spec = self.spec
+        if len(self.values) != len(spec.parameters):
+            raise ModelError(f"{self.name} takes {len(spec.parameters)} numbers, not {len(self.values)}")
+        checked = (
+            p.check(self.name, v, strict=False) for p, v in zip(spec.parameters, self.values, strict=True)
+        )
+        object.__setattr__(self, "values", tuple(checked))
+        if self.momentum is None and spec.momenta:
+            object.__setattr__(self, "momentum", spec.momenta[0])
+        if self.momentum is not None and self.momentum not in spec.momenta:
+            allowed = " or ".join(map(repr, spec.momenta)) or "left out: it enters no velocity"
+            raise ModelError(f"momentum of {self.name} must be {allowed}, not {self.momentum!r}")
+        if self.treatment is None and spec.treatments:
+            object.__setattr__(self, "treatment", spec.treatments[0])
+        if self.treatment is not None and self.treatment not in spec.treatments:
+            allowed = " or ".join(map(repr, spec.treatments)) or "left out: it is not dry friction"
+            raise ModelError(f"treatment of {self.name} must be {allowed}, not {self.treatment!r}")
+
+    @property
+    def spec(self) -> Spec:
+        """What is said of it."""
+        return self.made or _specs()[self.name]
+
+    @property
+    def title(self) -> str:
+        """What a reader calls it."""
+        return self.spec.title
+
+    @property
+    def equation(self) -> str:
+        """Its formula."""
+        sign = _SIGNS.get(self.treatment or "", "tanh(Omega/eps)")
+        return self.spec.equation.replace("tanh(Omega/eps)", sign)
+
+    @property
+    def meaning(self) -> str:
+        """What it means physically."""
+        return self.spec.meaning
+
+    @property
+    def slots(self) -> tuple[str, ...]:
+        """Where it enters the equations."""
+        return self.spec.slots
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Its parameters' values by name."""
+        return dict(zip((p.name for p in self.spec.parameters), self.values, strict=True))
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        """The names of the parameters to which it is proportional."""
+        return tuple(p.name for p in self.spec.parameters if p.role == "amplitude")
+
+    @property
+    def expression(self) -> str:
+        """Its formula with the numbers put in.
+
+        Examples
+        --------
+        >>> from udd import effects
+        >>> effects.quadratic_drag(c=1.5e-4).expression
+        'torque = -0.00015 |Omega| Omega'
+        """
+        return self.spec.expression(self.parameters, self.equation)
+
+    def replace(self, **values: float) -> Effect:
+        """The effect with other values of some parameters.
+
+        Raises
+        ------
+        ModelError
+            An unknown parameter or a value that is not usable.
+        """
+        new = self.parameters
+        for name, value in values.items():
+            if name not in new:
+                raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(new)}")
+            new[name] = value
+        return Effect(self.name, tuple(new.values()), self.momentum, self.treatment, self.made)
+
+    def __repr__(self) -> str:
+        function, items = self.spec.call(self)
+        if self.momentum is not None:
+            items.append(f"momentum={self.momentum!r}")
+        if self.treatment not in (None, "smoothed"):
+            items.append(f"treatment={self.treatment!r}")
+        return f"{function}({', '.join(items)})"

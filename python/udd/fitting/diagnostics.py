@@ -1,0 +1,295 @@
+"""Diagnostics of a fit: needed model error, coloured innovations, runaway parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd import _core
+from udd.models.formula_model import FormulaModel
+
+from .parameters import Free
+from .sensor import is_film, lattice, moving
+
+if TYPE_CHECKING:
+    from .problem import Fit
+
+_LAGS = 20  # of the innovations' autocorrelation
+#: Probability for white noise below which innovations are not white. Lenses and outliers bring those of right
+#: models to 1e-6; what is missing brings 1e-8 and far less, or a model error.
+_COLOURED = 1e-8
+#: Levels from the last one at which a right model may be held: of 50 films without an effect all came to the
+#: last itself.
+_NEARLY = 1
+_OFF = 3.0  # standard deviations from what was stated
+_LEAST = 30  # frames of which innovations tell anything
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """How far the model is assumed to miss the rate of a state, r.m.s. over a frame, to follow its data.
+
+    Attributes
+    ----------
+    state, unit : str
+    needed : float
+        As the record makes it likeliest.
+    right : float
+        What a right model is held to.
+    """
+
+    state: str
+    unit: str
+    needed: float
+    right: float
+
+
+@dataclass(frozen=True)
+class RunawayParameter:
+    """A parameter that left what was stated of it by more than that is good to, or that no device has."""
+
+    name: str
+    unit: str
+    value: float
+    stated: float
+    sd: float
+
+    @property
+    def text(self) -> str:
+        """In a sentence."""
+        unit = f" {self.unit}" if self.unit else ""
+        if not np.isfinite(self.sd):
+            return f"{self.name} = {self.value:.4g}{unit}, which should be positive"
+        return (
+            f"{self.name} = {self.value:.4g}{unit}, {abs(self.value - self.stated) / self.sd:.1f} times the "
+            f"{self.sd:.2g}{unit} from the {self.stated:.4g}{unit} that it was taken to be good to"
+        )
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a channel's frames are good to.
+
+    Attributes
+    ----------
+    name, unit : str
+    noise : float
+        Standard deviation that the fit assumed of a typical frame.
+    step : float
+        That the channel was read in; 0 where its values lie on no lattice.
+    memory : float
+        How much of the noise is still there in the next frame.
+    """
+
+    name: str
+    unit: str
+    noise: float
+    step: float
+    memory: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        unit = f" {self.unit}" if self.unit else ""
+        said = f"{self.name} {self.noise:.3g}{unit}"
+        if self.step:
+            said += f", read in steps of {self.step:.3g}{unit}"
+        if self.memory:
+            said += f", of which {self.memory:.2f} is still there in the next frame"
+        return said
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """What a fit shows of its own faults.
+
+    Attributes
+    ----------
+    missed : list of ModelError
+        One for every equation that says more than that one state is the rate of another.
+    tight : bool
+        Whether the model could be held as tightly as a right one can.
+    white : dict of str to float
+        Probability that the innovations of each channel are white noise (Ljung and Box); empty where the
+        record is too short.
+    ran_off : list of RunawayParameter
+    factor : float
+        By what the standard errors are multiplied: 1 where nothing is missing.
+    sensor : list of Reading
+        The noise of each channel and the steps that it was read in.
+    rests : float or None
+        Time from which a film shows its disk at rest, which is left out, s.
+    filmed : bool
+        Whether it is a film, whose own faults leave a right model's innovations coloured.
+    """
+
+    missed: list[ModelError]
+    tight: bool
+    white: dict[str, float]
+    ran_off: list[RunawayParameter]
+    factor: float
+    sensor: list[Reading]
+    rests: float | None = None
+    filmed: bool = False
+
+    @property
+    def coloured(self) -> list[str]:
+        """The channels whose innovations are not white."""
+        return [name for name, p in self.white.items() if p < _COLOURED]
+
+    @property
+    def missing(self) -> bool:
+        """Whether the model lacks something.
+
+        Of a film colour alone does not tell: its faults, like those of a lens, make some.
+        """
+        return not self.tight or (bool(self.coloured) and not self.filmed)
+
+    @property
+    def verdict(self) -> str:
+        """In a sentence."""
+        if self.missing:
+            return "something is missing: run udd discover"
+        if self.coloured:
+            return "what is left is not white, by a fault of the film or something small: run udd discover"
+        return "nothing shows that something is missing"
+
+    @property
+    def sentences(self) -> list[str]:
+        """All of it in words, the verdict first."""
+        said = [self.verdict]
+        rates = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.missed)
+        right = ", ".join(f"{m.right:.2g} {m.unit}".rstrip() for m in self.missed)
+        if not self.tight:
+            said.append(
+                f"the model misses {rates}, r.m.s. over a frame; a right one would miss less than {right}"
+            )
+        elif self.missed:
+            said.append(f"the model misses {rates} at most, r.m.s. over a frame, as a right one does")
+        if self.white:
+            least = min(self.white, key=lambda name: self.white[name])
+            state = f"not white in {', '.join(self.coloured)}" if self.coloured else "white"
+            said.append(
+                f"with that, innovations are {state} (probability of so much colour by chance: "
+                f"{self.white[least]:.1g} in {least})"
+            )
+        said += [f"warning: {one.text}" for one in self.ran_off]
+        if self.sensor:
+            said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
+        if self.rests is not None:
+            said.append(
+                f"from {self.rests:.4g} s on the disk rests and the film repeats its picture: left out"
+            )
+        if self.factor > 1:
+            said.append(
+                f"standard errors are {self.factor:.0f} times those of a right model: what is missing may "
+                "lean on any number for the whole record"
+            )
+        return said
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        return {
+            "missing": self.missing,
+            "sentences": self.sentences,
+            "model_error": [vars(one) for one in self.missed],
+            "white": dict(self.white),
+            "ran_off": [vars(one) for one in self.ran_off],
+            "noise": [vars(one) for one in self.sensor],
+            "errors_times": self.factor,
+        }
+
+
+def doubts(fit: Fit) -> Diagnostics:
+    """What a fit shows of its own faults."""
+    last = len(fit.problem.schedule) - 1
+    tight = fit.level >= last - _NEARLY
+    white = _white(fit)
+    # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
+    # standard errors as the square root of the number of independent ones that were assumed.
+    factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if not tight else 1.0
+    return Diagnostics(
+        _missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit), is_film(fit.measurement)
+    )
+
+
+def _rests(fit: Fit) -> float | None:
+    end = moving(fit.measurement)
+    return float(fit.measurement.t[end - 1]) if end < len(fit.measurement) else None
+
+
+def readings(fit: Fit) -> list[Reading]:
+    """The noise of each channel that was seen, and the steps that it was read in."""
+    known = {"disk": ("m", "m", "rad"), "pendulum": ("rad",)}.get(fit.model.kind)
+    sd = fit.noise.sd(fit.record, fit.blurring)
+    result = []
+    for k, name in enumerate(fit.channels):
+        own = fit.record.observed[:, k]
+        if own.any():
+            first = own & (fit.record.film == 0)
+            step = lattice(fit.record.seen[first, k])
+            noise, memory = float(np.median(sd[own, k])), float(fit.noise.memory[k])
+            result.append(Reading(name, known[k] if known else "", noise, step, memory))
+    return result
+
+
+def units(fit: Fit) -> dict[str, str]:
+    """The SI unit of every free parameter; a share is told in %."""
+    kind = fit.model.kind
+    known = dict(fit.model.units)
+    if kind != "own":
+        known |= dict(_core.camera_parameters(kind))
+    return {name: known.get(name.partition("[")[0], "") for name in fit.parameters}
+
+
+def rate_of(state: str) -> str:
+    """What an error of an equation is called."""
+    return {"Omega": "angular accelerations", "Y": "velocities of Y", "Z": "velocities of Z"}.get(
+        state, f"{state}'"
+    )
+
+
+def _missed(fit: Fit) -> list[ModelError]:
+    step = float(np.median(np.diff(fit.record.t)))
+    model = fit.model
+    if isinstance(model, FormulaModel):
+        names = {name: "" for name in model.state_names if name not in model.kinematic}
+        order = list(model.state_names)
+    else:
+        order = {"disk": ["Omega", "Y", "Z", "beta"], "pendulum": ["Omega", "theta"]}[model.kind]
+        names = {"Omega": "rad/s^2", "Y": "m/s", "Z": "m/s"} if model.kind == "disk" else {"Omega": "rad/s^2"}
+    now, best = fit.problem.diffusion, fit.problem.schedule[-1]
+    root = np.sqrt(step)
+    return [
+        ModelError(name, unit, now[order.index(name)] / root, best[order.index(name)] / root)
+        for name, unit in names.items()
+    ]
+
+
+def _white(fit: Fit) -> dict[str, float]:
+    from .innovations import innovations
+
+    if len(fit.record.t) < _LEAST:
+        return {}
+    found = innovations(fit)
+    _statistic, p = found.ljung_box(min(_LAGS, len(found.values) // 5))
+    return {name: float(value) for name, value in zip(found.names, p, strict=True) if np.isfinite(value)}
+
+
+def ran_off(fit: Fit) -> list[RunawayParameter]:
+    """The parameters that left what was stated of them, and frictions that drive."""
+    result, known = [], units(fit)
+    for free in fit.problem.free:
+        value = fit.parameters[free.name]
+        unit = known[free.name]
+        if np.isfinite(free.sd) and abs(value - free.mean) > _OFF * free.sd:
+            result.append(RunawayParameter(free.name, unit, value, free.mean, free.sd))
+        elif _is_friction(free) and value < -_OFF * fit.errors[free.name]:
+            result.append(RunawayParameter(free.name, unit, value, free.mean, np.inf))
+    return result
+
+
+def _is_friction(free: Free) -> bool:
+    return free.role == "model" and free.name.partition("[")[0] in ("k0", "k1")

@@ -1,0 +1,507 @@
+"""Forecasts of a fitted model with a predictability horizon."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.progress import thread_count
+from udd._util.validation import array, number
+from udd.chaos.largest_exponent import lyapunov
+from udd.errors import FitError, IntegrationError, ModelError
+from udd.fitting.time_scale import motion_time_scale
+from udd.measurement import Measurement
+from udd.models import Disk, Model
+from udd.simulation.outcomes import FINISHED
+from udd.simulation.trajectory import method_for
+
+from . import Fit, Record, data_of, predicted, record_of
+from .fit import fit
+
+__all__ = ["Forecast", "forecast"]
+
+Array = NDArray[np.float64]
+
+# Times in s; of a user's own model in units of its `pace`.
+_STEP = 0.01  # between the times that a forecast is given at
+_KICK = 0.1  # between the kicks that stand for the model's assumed error
+_AHEAD = {"disk": 10.0, "pendulum": 60.0, "own": 10.0}
+_WINDOW = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
+#: The error at which a forecast is no longer valid: m, rad, and of each state in units of its spread.
+_LARGE = {"disk": 5e-3, "pendulum": 0.05, "own": 0.2}
+_FEWEST = 6  # frames that determine a state
+_RTOL, _ATOL = 1e-9, 1e-12
+_GROWTH_TIME = 4000.0  # over which the exponent is averaged; its error is then a percent or two
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What is expected to be seen, with the fan of an ensemble.
+
+    Attributes
+    ----------
+    t : ndarray (k,)
+        Times on the measurement's clock, s; the first is where the model was let go.
+    median, low, high : ndarray (k, m)
+        Of the members, for every channel of the measurement and in its units; `low` and `high` enclose the
+        share `level` of them. NaN where more than half of the disks have left the wheels.
+    members : ndarray (n, k, m)
+        The ensemble; NaN after a disk has left the wheels.
+    names : tuple of str
+        The channels.
+    level : float
+        Share of the members between `low` and `high`.
+    error : float
+        What counts as parted, m of the disk's centre or rad of a pendulum; of a user's own model the root
+        mean square over the columns, in units of the motion's spread.
+    valid_time : float
+        Time after the start until half of the members have parted from the median by `error`, s; inf where
+        that lies beyond the forecast.
+    valid_low, valid_high : float
+        The times until that share of the members have parted which `level` leaves below and above.
+    lyapunov_time : float
+        Time in which errors grow e-fold in the long run, 1/lambda_1 of the fitted equations (with no edge of
+        the disk), s; inf where they do not grow, NaN where there is no exponent.
+    measured_valid_time : float
+        Time until the measurement itself parts from the median by `error`; NaN where it ends before.
+    fit : Fit
+        What was forecast with.
+    measurement : Measurement
+        What the state was filtered from, and what there is of it afterwards.
+    """
+
+    t: Array
+    median: Array
+    low: Array
+    high: Array
+    members: Array
+    names: tuple[str, ...]
+    level: float
+    error: float
+    valid_time: float
+    valid_low: float
+    valid_high: float
+    lyapunov_time: float
+    measured_valid_time: float
+    fit: Fit
+    measurement: Measurement
+
+    @property
+    def start(self) -> float:
+        """Time from which the model runs free, s."""
+        return float(self.t[0])
+
+    @property
+    def lyapunov_times(self) -> float:
+        """The valid time in Lyapunov times; NaN where there are none."""
+        return self.valid_time / self.lyapunov_time if math.isfinite(self.lyapunov_time) else math.nan
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a machine reads."""
+        curves = {key: getattr(self, key) for key in ("median", "low", "high")}
+        return {
+            "start_s": self.start,
+            "t": self.t,
+            **{
+                name: {key: curve[:, k] for key, curve in curves.items()} for k, name in enumerate(self.names)
+            },
+            "level": self.level,
+            "members": len(self.members),
+            "error": self.error,
+            "valid_time_s": self.valid_time,
+            "valid_time_low_s": self.valid_low,
+            "valid_time_high_s": self.valid_high,
+            "lyapunov_time_s": self.lyapunov_time,
+            "valid_time_lyapunov_times": self.lyapunov_times,
+            "measured_valid_time_s": self.measured_valid_time,
+        }
+
+    def __repr__(self) -> str:
+        return (
+            f"<Forecast from {self.start:.4g} to {self.t[-1]:.4g} s, {len(self.members)} members, "
+            f"valid for {self.valid_time:.3g} s>"
+        )
+
+
+def forecast(
+    measurement: Measurement,
+    model: Model | Fit,
+    t: ArrayLike | None = None,
+    *,
+    start: float | None = None,
+    window: float | None = None,
+    members: int = 200,
+    level: float = 0.95,
+    error: float | None = None,
+    film: int | None = None,
+    process: bool = True,
+    seed: int = 0,
+) -> Forecast:
+    """Forecast the motion from the last second of a measurement, with the fan of an ensemble.
+
+    Every member draws the model's and the camera's parameters from the fit's covariance, filters its own
+    state from the window with them, draws from that state's covariance, and runs free, kicked by the model's
+    error that the fit assumed.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Its frames in the window before `start` are used; later ones are only compared.
+    model : Disk, Pendulum, a user's own Model, or Fit
+        A model is fitted first, to all frames up to `start` (:func:`udd.fit`); a fit is taken as it is.
+    t : float or array_like, shape (k,), optional
+        How far to look ahead, s after the start; or the times after it that are wanted, increasing. By
+        default 10 s for a disk, 60 s for a pendulum; of a user's own model ten times the time in which its
+        motion changes, four times over.
+    start : float, optional
+        Time on the measurement's clock from which the model runs free, s: its last frame up to then starts.
+        By default the last frame of all.
+    window : float, optional
+        Time before the start from which the state is filtered, s; by default 1 s, or 4 s for a pendulum; of a
+        user's own model a tenth of the default for `t`.
+    members : int
+        Size of the ensemble.
+    level : float
+        Share of the members between `low` and `high`.
+    error : float, optional
+        The error until which the forecast counts as valid: by default 5 mm of the disk's centre, 0.05 rad of
+        a pendulum, 0.2 of the spread of a user's own motion.
+    film : int, optional
+        For a fit of several measurements: which of them has the camera and the drive of this one. By default
+        the one that it is.
+    process : bool
+        Whether the members are kicked. Without, the model's equations are taken as exact.
+    seed : int
+        The same seed gives the same ensemble.
+
+    Returns
+    -------
+    Forecast
+
+    Raises
+    ------
+    FitError
+        The fit fails, or the window holds fewer than six frames without a gap.
+    ModelError
+        An option that cannot be used.
+
+    Notes
+    -----
+    The fan is that of the motion as the camera would see it; the noise of single frames comes on top. Where
+    the fit does not explain its data (chi2 per degree of freedom above 1), all spreads are widened by the
+    root of that. The clock's error is held at its fitted value.
+
+    Examples
+    --------
+    A pendulum whose last swing is known to a milliradian:
+
+    >>> import numpy as np, udd
+    >>> t = np.arange(0, 30, 0.05)
+    >>> theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.5]).state[:, 1]
+    >>> noise = 2e-3 * np.random.default_rng(1).standard_normal(len(t))
+    >>> seen = udd.Measurement(t, {"theta": theta + noise})
+    >>> ahead = udd.forecast(seen, udd.Pendulum(1.0, k0=0.03), start=20.0, t=[0.0, 1.0, 9.0])
+    >>> bool(np.all(np.abs(ahead.median[:, 0] - theta[[400, 420, 580]]) < 5e-3))
+    True
+    >>> ahead.lyapunov_time  # errors of a damped pendulum do not grow
+    inf
+    """
+    if not isinstance(measurement, Measurement):
+        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+    asked = _options(members, level)
+    if t is not None:
+        _times(t, _STEP)
+    known = measurement
+    if start is not None:
+        known = measurement.rows(measurement.t <= number("start", start))
+        if start > measurement.t[-1] + np.median(np.diff(measurement.t)):
+            raise FitError(
+                f"a forecast cannot start at {start:g} s: the record ends at {measurement.t[-1]:g} s"
+            )
+    if window is not None:
+        number("window", window, above=0.0)
+    if error is not None:
+        number("error", error, above=0.0)
+    if isinstance(model, Fit):
+        fitted = model
+        if fitted.measurement.kind != measurement.kind:
+            raise FitError(
+                f"the fit is that of a {fitted.measurement.kind}, the measurement of a {measurement.kind}"
+            )
+    else:
+        fitted = fit(known, model)
+    # What a user's own model is of its measurement's columns do not tell.
+    kind, unit = fitted.model.kind, motion_time_scale(fitted)
+    large = _LARGE[kind] if error is None else float(error)
+    times = _times(_AHEAD[kind] * unit if t is None else t, _STEP * unit)
+    length = float(_WINDOW[kind] * unit if window is None else window)
+    record = record_of(known, fitted.model if kind == "own" else None)
+    film = _film(fitted, measurement, film)
+    part, origin = _window(fitted, film, record, length)
+    rng = np.random.default_rng(seed)
+
+    scale = max(fitted.scatter, 1.0) ** 0.5
+    models, cameras, states = _starts(fitted, film, part, asked, scale, rng)
+    kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
+    clock_error = fitted.point.sets[film][2]
+    t_model = part.t[-1] + times
+    runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, rng)
+    shown = [fitted.channels.index(name) for name in measurement.names]
+    seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
+    spread = np.nanstd(known.values, axis=0)
+
+    low, median, high = _quantiles(seen, asked[1])
+    valid = [_parted(times, _size(member - median, kind, spread), large) for member in seen]
+    tail = (1.0 - asked[1]) / 2.0
+    # A member that never parts counts as later than all that do.
+    shortest, valid_time, longest = np.quantile(valid, [tail, 0.5, 1.0 - tail], method="higher")
+    clock = t_model + origin
+    return Forecast(
+        t=clock,
+        median=median,
+        low=low,
+        high=high,
+        members=seen,
+        names=measurement.names,
+        level=asked[1],
+        error=large,
+        valid_time=float(valid_time),
+        valid_low=float(shortest),
+        valid_high=float(longest),
+        lyapunov_time=_growth(fitted.models[film], states, _GROWTH_TIME * unit),
+        measured_valid_time=_compared(measurement, kind, (clock, median), spread, large),
+        fit=fitted,
+        measurement=measurement,
+    )
+
+
+def _times(t: ArrayLike, step: float) -> Array:
+    """Times after the start, s, of which the first is 0."""
+    wanted = array("t", t)
+    if wanted.ndim == 0:
+        end = number("t", float(wanted), above=0.0)
+        return np.linspace(0.0, end, max(round(end / step), 1) + 1)
+    if wanted.ndim != 1 or not wanted.size or wanted[0] < 0 or not (np.diff(wanted) > 0).all():
+        raise ModelError("t must be a time ahead in s, or a list of such times that increases from 0 on")
+    return wanted if wanted[0] == 0 else np.concatenate([[0.0], wanted])
+
+
+def _options(members: int, level: float) -> tuple[int, float]:
+    share = number("level", level, above=0.0)
+    if share >= 1:
+        raise ModelError(f"level must be below 1, not {share:g}")
+    if isinstance(members, bool) or not isinstance(members, (int, np.integer)) or members < 2:
+        raise ModelError(f"members must be a whole number from 2 on, not {members!r}")
+    return int(members), share
+
+
+def _film(fitted: Fit, measurement: Measurement, film: int | None) -> int:
+    """The number of the measurement whose camera and drive count."""
+    several = len(fitted.measurements)
+    if film is not None:
+        if isinstance(film, bool) or not isinstance(film, (int, np.integer)) or not 0 <= film < several:
+            raise ModelError(f"film must be a whole number from 0 to {several - 1}, not {film!r}")
+        return int(film)
+    own = [k for k, each in enumerate(fitted.measurements) if each is measurement]
+    if several > 1 and not own:
+        raise FitError(f"the fit is that of {several} measurements: say by film= which of them this one is")
+    return own[0] if own else 0
+
+
+def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Record, float]:
+    """The last frames, from which the state is filtered, on the fit's clock, and that clock's zero."""
+    t, last = record.t, len(record.t) - 1
+    breaks = np.flatnonzero(~record.linked)
+    run = int(breaks[-1]) + 1 if breaks.size else 0
+    part = record.part(slice(max(run, int(np.searchsorted(t, t[last] - length - 1e-9))), last + 1))
+    count = int(part.observed.any(axis=1).sum())
+    if count < _FEWEST:
+        raise FitError(
+            f"the {length:g} s before the start hold {count} frames in a row; "
+            f"a state takes at least {_FEWEST}"
+        )
+    # The model's time counts from the first row that was fitted.
+    origin = fitted.record.origins[film]
+    return replace(part, t=part.t + (record.origin - origin)), origin
+
+
+def _starts(
+    fitted: Fit, film: int, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
+) -> tuple[list[Model], list[list[float]], Array]:
+    """Every member's model, camera and state at the window's end."""
+    data = data_of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
+    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], list(fitted.problem.diffusion)
+    own = fitted.models[film]
+    order = list(own.parameters)
+    window = [(0, len(part.t) - 1)]
+    models, cameras, states = [], [], []
+    for draw in _draws(fitted, asked[0], scale, rng):
+        camera = list(camera_of_fit)
+        values: dict[str, float] = {}
+        for free in fitted.problem.free:
+            if free.film not in (None, film):
+                continue
+            if free.role == "model":
+                values[order[free.index]] = draw[free.name]
+            elif free.role == "camera":
+                camera[free.index] = draw[free.name]
+        model = own.with_parameters(values)
+        try:
+            sets = [(list(model.parameters.values()), camera, clock)]
+            _first, last, spread = _core.filter(model, data, (part.states, sets, None), diffusion, window)
+        except ValueError as error:
+            raise FitError(f"the state cannot be filtered from the window: {error}") from error
+        models.append(model)
+        cameras.append(camera)
+        states.append(last[0] + scale * _normal(spread[0], rng))
+    return models, cameras, np.array(states)
+
+
+def _draws(fitted: Fit, members: int, scale: float, rng: np.random.Generator) -> list[Mapping[str, float]]:
+    """Parameters from the fit's covariance; the clock's error is held."""
+    names = list(fitted.parameters)
+    mean = np.array([fitted.parameters[name] for name in names])
+    covariance = fitted.covariance
+    held = [k for k, free in enumerate(fitted.problem.free) if free.role == "clock"]
+    for k in held:
+        column = covariance[:, k]
+        covariance = covariance - np.outer(column, column) / column[k]
+        covariance[k, :] = covariance[:, k] = 0.0
+    return [
+        dict(zip(names, (mean + scale * _normal(covariance, rng)).tolist(), strict=True))
+        for _ in range(members)
+    ]
+
+
+def _normal(covariance: Array, rng: np.random.Generator) -> Array:
+    """A draw with this covariance, whatever the units of its rows."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    unit = np.where(sd > 0, sd, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
+    result: Array = sd * (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(sd))))
+    return result
+
+
+def _runs(
+    models: list[Model], states: Array, t: Array, kicks: Array, every: float, rng: np.random.Generator
+) -> Array:
+    """The members' states at the model's times `t`, (n, k, d); NaN once a disk has left the wheels."""
+    n, d = states.shape
+    rows = np.array([list(model.parameters.values()) for model in models])
+    method = method_for(models[0], "auto", _RTOL)
+    result = np.full((n, len(t), d), np.nan)
+    result[:, 0] = states
+    alive = _between_wheels(models[0], states)
+    kicked = np.any(kicks > 0)
+    pieces = max(round((t[-1] - t[0]) / every), 1) if kicked else 1
+    edges = np.linspace(t[0], t[-1], pieces + 1)
+    current = states.copy()
+    for a, b in pairwise(edges.tolist()):
+        inside = np.flatnonzero((t > a) & (t <= b))
+        # Half of a piece's kick before it and half after it.
+        current += np.sqrt((b - a) / 2) * kicks * rng.standard_normal((n, d))
+        alive &= _between_wheels(models[0], current)
+        who = np.flatnonzero(alive)
+        if not who.size:
+            break
+        times = np.unique(np.concatenate([[a], t[inside], [b]]))
+        found = _core.ensemble(
+            models[0], rows[who], current[who], times, _RTOL, _ATOL, method, thread_count(None)
+        )
+        result[np.ix_(who, inside)] = found["states"][:, np.searchsorted(times, t[inside])]
+        current[who] = found["states"][:, -1]
+        alive[who] = found["outcome"] == FINISHED
+        current += np.sqrt((b - a) / 2) * kicks * rng.standard_normal((n, d))
+    return result
+
+
+def _between_wheels(model: Model, states: Array) -> NDArray[np.bool_]:
+    """Which disks have not left the wheels, where that ends a run."""
+    if not isinstance(model, Disk) or model.edge != "stop":
+        return np.ones(len(states), dtype=bool)
+    result: NDArray[np.bool_] = np.hypot(states[:, 1], states[:, 2]) < model.R
+    return result
+
+
+def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: Array, runs: Array) -> Array:
+    """What each member's camera sees of its states, (n, k, m)."""
+    seen = []
+    for model, camera, run in zip(models, cameras, runs, strict=True):
+        there = np.isfinite(run).all(axis=1)
+        sets = [(list(model.parameters.values()), camera, clock)]
+        film = np.zeros(int(there.sum()), dtype=np.int64)
+        shown = predicted([model], sets, film, t[there], run[there], t[there, None])[:, 0]
+        full = np.full((len(t), shown.shape[1]), np.nan)
+        full[there] = shown
+        seen.append(full)
+    return np.array(seen)
+
+
+def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
+    """The band's lower edge, the median and the upper edge, where half of the members are still there."""
+    tail = (1.0 - level) / 2.0
+    there = np.isfinite(seen).all(axis=2).mean(axis=0) > 0.5
+    result = np.full((3, *seen.shape[1:]), np.nan)
+    if there.any():
+        result[:, there] = np.nanquantile(seen[:, there], [tail, 0.5, 1.0 - tail], axis=0)
+    return result[0], result[1], result[2]
+
+
+def _size(difference: Array, kind: str, spread: Array) -> Array:
+    """How far two motions are apart: a disk's centre, m; a pendulum's angle; else in units of the spread."""
+    if kind == "disk":
+        result: Array = np.hypot(difference[:, 0], difference[:, 1])
+        return result
+    if kind == "own":
+        difference = np.sqrt(np.mean((difference / spread) ** 2, axis=1, keepdims=True))
+    result = np.abs(difference[:, 0])
+    return result
+
+
+def _parted(t: Array, size: Array, error: float) -> float:
+    """When a difference first exceeds the error, or the disk is gone; inf if never."""
+    beyond = np.flatnonzero(~(size <= error))
+    if not beyond.size:
+        return math.inf
+    k = int(beyond[0])
+    if k == 0 or not np.isfinite(size[k]):
+        return float(t[k])
+    share = (error - size[k - 1]) / (size[k] - size[k - 1])
+    return float(t[k - 1] + share * (t[k] - t[k - 1]))
+
+
+def _compared(
+    measurement: Measurement, kind: str, expectation: tuple[Array, Array], spread: Array, error: float
+) -> float:
+    """When what was measured after the start first parts from the median, s after it; NaN if it does not."""
+    clock, median = expectation
+    after = measurement.slice(float(np.nextafter(clock[0], np.inf)), float(clock[-1]))
+    t = after.t
+    expected = np.column_stack([np.interp(t, clock, column) for column in median.T])
+    difference = np.where(after.seen[:, None], after.values - expected, np.nan)
+    if kind == "pendulum":
+        difference = (difference + np.pi) % (2 * np.pi) - np.pi
+    there = np.isfinite(difference).all(axis=1)
+    when = _parted(t[there] - clock[0], _size(difference[there], kind, spread), error)
+    return when if np.isfinite(when) else math.nan
+
+
+def _growth(model: Model, states: Array, long: float) -> float:
+    """The Lyapunov time of the fitted model, s; of its equations, wherever their attractor goes."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a percent is enough for a unit of time
+        try:
+            if isinstance(model, Disk):
+                model = model.replace(edge="ignore")
+            value, spread = lyapunov(model, with_error=True, t=long, state0=np.median(states, axis=0))
+        except (IntegrationError, ModelError):
+            return math.nan
+    return 1.0 / value if value > 2 * spread else math.inf

@@ -1,0 +1,135 @@
+"""What a fit needs to know of a user's own model: first guesses, and sizes taken from the record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import FitError
+from udd.models.formula_model import FormulaModel
+
+from .sensor import roughness
+
+Array = NDArray[np.float64]
+
+#: The model's assumed error over a frame, from loose to tight, in units of the loosest. That is, as for disk
+#: and pendulum, a share of the noise of a state that is seen, but not less than a small share of what it
+#: changes by from frame to frame; of a state that is not seen it is a larger share of that.
+_LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
+_OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
+
+
+def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
+    """The rate of what was seen, from neighbouring frames; zero where a frame has none."""
+    rate = np.zeros(len(t))
+    for run in np.split(np.arange(len(t)), np.flatnonzero(~linked) + 1):
+        if len(run) > 1:
+            rate[run] = np.gradient(x[run], t[run])
+    return rate
+
+
+def guessed(
+    model: FormulaModel,
+    t: Array,
+    seen: Mapping[str, Array],
+    linked: NDArray[np.bool_],
+    state0: Mapping[str, float] | None = None,
+) -> Array:
+    """A first guess of all states: as seen, or the rate of one that is seen, or else zero.
+
+    Of hidden states that a start is given of, their own equations are followed from there, driven by what was
+    seen.
+    """
+    rates = {text.strip(): name for name, text in model.equations.items() if name in seen}
+    columns = []
+    for name in model.state_names:
+        if name in seen:
+            columns.append(seen[name])
+        elif name in rates:
+            columns.append(slope(t, seen[rates[name]], linked))
+        else:
+            columns.append(np.zeros(len(t)))
+    states = np.column_stack(columns)
+    given = {name: value for name, value in (state0 or {}).items() if name not in seen}
+    return _followed(model, t, states, given) if given else states
+
+
+def _followed(model: FormulaModel, t: Array, states: Array, start: Mapping[str, float]) -> Array:
+    """States of which some follow their own equations from a start, by Heun's method from frame to frame.
+
+    Where that runs away they stay as they were last.
+    """
+    places = [model.state_names.index(name) for name in start]
+    result = states.copy()
+    now = result[0]
+    now[places] = list(start.values())
+    for k in range(len(t) - 1):
+        dt, following = t[k + 1] - t[k], result[k + 1]
+        rate = model.rates(t[k], now)[places]
+        following[places] = now[places] + dt * rate
+        moved = now[places] + 0.5 * dt * (rate + model.rates(t[k + 1], following)[places])
+        following[places] = moved if np.isfinite(moved).all() else now[places]
+        now = following
+    return result
+
+
+def checked_start(model: FormulaModel | None, state0: object) -> dict[str, float]:
+    """The starts of states that a user gave, by the states' names.
+
+    Raises
+    ------
+    FitError
+        They are no numbers of states of a model of the user's own.
+    """
+    if model is None:
+        raise FitError(
+            "starts can be given for a model of your own; a disk's and a pendulum's show themselves"
+        )
+    if not isinstance(state0, Mapping):
+        raise FitError(f"state0 must be a table of states and their starts, not {state0!r}")
+    result = {}
+    for name, value in state0.items():
+        if name not in model.state_names:
+            raise FitError(
+                f"a start is given for {name!r}, but the states are {', '.join(model.state_names)}"
+            )
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+            raise FitError(f"the start of {name} must be a finite number, not {value!r}")
+        result[str(name)] = float(value)
+    return result
+
+
+def typical_noise(values: Array) -> Array:
+    """A measurement's noise as its roughness shows it, where it does not say."""
+    result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + 1e-300)
+    return result
+
+
+def levels_of(
+    model: FormulaModel, t: Array, states: Array, sigma: Array, linked: NDArray[np.bool_]
+) -> tuple[tuple[float, ...], ...]:
+    """The model's assumed error, loose to tight, per square root of the unit of time.
+
+    Parameters
+    ----------
+    model : FormulaModel
+    t, states : ndarray (n,), (n, d)
+        A first guess.
+    sigma : ndarray (n, d)
+        The noise of what was seen; infinite where it was not.
+    linked : ndarray of bool (n - 1,)
+    """
+    dt = np.diff(t)[linked]
+    step = float(np.median(dt)) if len(dt) else 1.0
+    change = np.sqrt((np.diff(states, axis=0)[linked] ** 2).sum(axis=0) / max(len(dt), 1))
+    # What is unknown altogether moves as the model says.
+    rates = np.median(np.abs(model.rates(t, states)), axis=0) * step
+    change = np.where(change > 0, change, rates)
+    change = np.where(change > 0, change, float(change.max()) or 1.0)
+    seen = np.isfinite(sigma).any(axis=0)
+    noise = np.median(np.where(seen, sigma, 0.0), axis=0)
+    # Held by less than its noise a state that is seen would follow every frame.
+    loosest = np.where(seen, np.clip(_OF_NOISE * noise, _OF_CHANGE * change, change), _UNSEEN * change)
+    return tuple(tuple((level * loosest / np.sqrt(step)).tolist()) for level in _LEVELS)

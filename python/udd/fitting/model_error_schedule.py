@@ -1,0 +1,192 @@
+"""Homotopy in the model-error variance: minimise, reduce it, repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from udd.errors import FitError
+from udd.measurement import Measurement
+
+from .noise import estimated, remembered
+from .problem import Fit, Point, Problem
+from .record import Record
+from .solve import DONE, solve
+
+#: Most steps at one level: a right model takes three to seven, but for kinks of its law.
+STEPS = 30
+#: Steps in which a right model gets from one level to any other.
+FEW = 12
+_LEAP = 3  # levels that it takes at once
+#: Fall of chi2 below which a fit no longer changes what it says of the noise; its likelihood counts it.
+ROUGH = 10.0
+#: Nats by which the evidence may fall when the model is held more tightly.
+LESS = 3.0
+_LITTLE = 3  # steps more, of a fit that may be near its minimum
+_LOOSE = 0.3  # leverage from which on misfits are not the noise
+_SAME = 0.03  # autocorrelations that differ by less need no other fit
+
+
+def reduce_model_error(
+    measurements: tuple[Measurement, ...],
+    problem: Problem,
+    point: Point,
+    schedule: Sequence[tuple[float, ...]],
+    best: Fit | None = None,
+    steps: int = STEPS,
+) -> Fit:
+    """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
+
+    Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
+    `best` is a fit that was held more loosely, and stands where nothing tighter does. At each level so many
+    `steps` are taken at most.
+    """
+    levels = list(schedule)
+    if best is None:
+        if not levels:
+            raise FitError("the fit has no level to solve at")
+        best = provisional_fit(measurements, problem.held(levels.pop(0)), point, steps)
+        point = best.point
+    far = _leapt(best, point, levels) if problem.likeliest else None
+    if far:
+        best = _eased(far, levels)
+    for diffusion in () if far else levels:
+        result = provisional_fit(measurements, best.problem.held(diffusion), point, steps)
+        if not _stands(result, best):
+            break
+        best, point = result, result.point
+    return best if _is_last(best.problem) else _settled(best, schedule, steps)
+
+
+def provisional_fit(
+    measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = STEPS
+) -> Fit:
+    """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
+    result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)), iterations)
+    return remembering(result) if problem.likeliest and result.converged else result
+
+
+def _nearly(fitted: Fit, steps: int) -> Fit:
+    """A fit of a search that came near its minimum, which is enough to test it, or else as it was.
+
+    Along what the data hardly determine, like a frequency beside its phase, a law with kinks gets there in
+    ever smaller steps. To turn a right model away for it would make room for a wrong one. What is given few
+    `steps`, because it may have no end, is taken at its word.
+    """
+    if fitted.converged or fitted.problem.likeliest or steps < STEPS:
+        return fitted
+    near = solve(fitted.measurements, fitted.problem, fitted.point, _LITTLE, ROUGH)
+    return near if near.converged else fitted
+
+
+def _is_last(problem: Problem) -> bool:
+    """Whether the model is held as tightly as it can be."""
+    return problem.diffusion == problem.schedule[-1]
+
+
+def _enough(problem: Problem) -> float:
+    """How far a fit goes: to the end at the last level."""
+    return DONE if _is_last(problem) else ROUGH
+
+
+def _stands(tighter: Fit, looser: Fit) -> bool:
+    """Whether a fit that is held more tightly takes the place of a looser one."""
+    less_likely = tighter.problem.likeliest and tighter.evidence < looser.evidence - LESS
+    return tighter.converged and not less_likely
+
+
+def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit | None:
+    """The fit at the last level, over a few others: a right model gets from one to the next in few steps.
+
+    None where it does not; what it came to on the way is then no good start.
+    """
+    for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
+        try:
+            result = provisional_fit(best.measurements, best.problem.held(diffusion), point, FEW)
+        except FitError:
+            return None
+        if not _stands(result, best):
+            return None
+        best, point = result, result.point
+    return best if levels else None
+
+
+def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
+    """The fit held more loosely again, level by level, as long as that is likelier."""
+    for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
+        problem = fitted.problem.held(diffusion)
+        looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
+        if _stands(fitted, looser):
+            break
+        fitted = looser
+    return fitted
+
+
+def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fit:
+    """The end of a rough fit, or where it has none in sight that of a looser one."""
+    own = fitted.problem.diffusion
+    for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
+        problem = fitted.problem.held(diffusion)
+        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps), steps)
+        if fitted.converged:
+            break
+    return fitted
+
+
+def remembering(fitted: Fit) -> Fit:
+    """The same with noise that remembers itself, where the record makes that likelier.
+
+    Frames whose noise goes together are worth less than independent ones: without this the model would be
+    held too loosely, to follow the noise, and standard errors would be too small.
+    """
+    if fitted.leverage > _LOOSE:
+        return fitted
+    sd = fitted.noise.sd(fitted.record, fitted.blurring)
+    memory = remembered(fitted.record, fitted.misfit, sd, fitted.noise.weight)
+    if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
+        return fitted
+    noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
+    problem = replace(fitted.problem, noise=replace(noise, memory=memory))
+    result = solve(fitted.measurements, problem, fitted.point, STEPS, _enough(problem))
+    return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
+
+
+def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
+    """The tightest fit, of those that led to this one, whose scatter is below a limit; else the loosest.
+
+    A wrong model that is held tightly bends everything to obey it; where it is held less tightly it shows
+    what is missing.
+    """
+    problem, result = fitted.problem, fitted
+    for diffusion in reversed(problem.schedule[: fitted.level]):
+        if result.scatter < scatter:
+            break
+        result = solve(fitted.measurements, problem.held(diffusion), result.point)
+    return result
+
+
+def at_level(fitted: Fit, level: int) -> Fit:
+    """The same model, held as tightly as a level of the schedule says."""
+    if level == fitted.level:
+        return fitted
+    problem = fitted.problem.held(fitted.problem.schedule[level])
+    return solve(fitted.measurements, problem, fitted.point)
+
+
+def eased(fitted: Fit) -> Fit:
+    """The same model, held as loosely as is likeliest, from where a fit ended."""
+    problem = replace(fitted.problem, likeliest=True)
+    return _eased(replace(fitted, problem=problem), problem.schedule)
+
+
+def held(fitted: Fit, record: Record, level: int) -> Fit:
+    """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
+
+    A wrong model may not get that far: the level of the result says how far it got.
+    """
+    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
+    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
+    start = Point(record.states, fitted.point.sets)
+    return reduce_model_error(fitted.measurements, problem, start, problem.schedule[: level + 1])

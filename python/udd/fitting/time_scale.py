@@ -1,0 +1,27 @@
+"""The time scale of a fitted motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .problem import Fit
+
+_UNITS = 24  # that the part which is fitted should at least be long
+
+
+def motion_time_scale(fit: Fit) -> float:
+    """The unit of the times of this module: a second, or four times what a user's own motion takes to change.
+
+    As on the disk, where that is a quarter of a second. It is the least over the states of the standard
+    deviation over the root mean square rate. For a short record the unit is shorter, but not below that, so
+    that the part held out has enough blocks to resample.
+    """
+    if fit.model.kind != "own":
+        return 1.0
+    linked, dt = fit.record.linked, np.diff(fit.record.t)
+    rates = (np.diff(fit.states, axis=0)[linked]) / dt[linked, None]
+    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
+    moving = (rate > 0) & (spread > 0)
+    change = float((spread[moving] / rate[moving]).min()) if moving.any() else float(np.median(dt))
+    longest = max(float(np.ptp(fit.record.t[fit.record.film == k])) for k in range(len(fit.models)))
+    return max(change, min(4.0 * change, longest / _UNITS))

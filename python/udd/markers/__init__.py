@@ -1,0 +1,1 @@
+"""Where marks and tags sit on the disk."""

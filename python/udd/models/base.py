@@ -1,0 +1,285 @@
+"""What is integrated: the equations of the paper, of a pendulum, and of the user."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.validation import array, number
+from udd.effects import Effect
+from udd.effects.spec import Own
+from udd.errors import ModelError
+
+if TYPE_CHECKING:
+    from udd._util.expressions import Expression
+
+    from .formula_model import FormulaModel
+
+__all__ = ["Model", "require_model"]
+
+
+def require_model(given: object) -> None:
+    """Refuse what is no model.
+
+    Raises
+    ------
+    ModelError
+    """
+    if not isinstance(given, Model):
+        raise ModelError(f"a model is needed (udd.DLE, udd.Disk, udd.Pendulum or a udd.Model), not {given!r}")
+
+
+class Model:
+    """A model of the user's own; and what all models have in common.
+
+    Models are immutable: changes make a new one.
+
+    Parameters
+    ----------
+    states : sequence of str
+        The names of the state's components, 1 to 6.
+    equations : mapping of str to formula, or sequence of formula
+        The rate of each state: text or a SymPy expression of the states, the parameters, the time ``t``,
+        numbers and ``pi``, with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``,
+        ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``, ``sign``, ``min(a, b)``,
+        ``max(a, b)``, ``where(x > c, a, b)`` and ``bspline``, the cardinal cubic B-spline.
+    parameters : mapping of str to float, optional
+        The parameters' values.
+    angles : iterable of str
+        The states that are angles in rad: they may grow without end.
+    mass : sequence of sequence of formula, optional
+        The mass matrix of a mechanical model, with a row and a column for each coordinate (a state whose
+        equation is another state), in their order: formulas of the states and parameters. The equations are
+        stated in full all the same; with it, what :func:`udd.discover` finds missing is a force that enters
+        every acceleration, such as friction in a joint.
+
+    Raises
+    ------
+    ModelError
+        A name that a formula may not use, a state without an equation, a value that is not finite, a mass
+        matrix that is not symmetric and positive definite.
+
+    Notes
+    -----
+    The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
+
+    Where ``abs``, ``sign``, ``min``, ``max`` and ``where`` change, the equations have a kink or jump. Runs
+    land on up to four such surfaces, which are their events ``"kink"`` and ``"jump"``; power series start
+    anew there, and derivatives pass through, with a jump's saltation matrix. Any more are only compared:
+    runs go over them by small steps, and there is no power series.
+
+    Examples
+    --------
+    >>> import udd
+    >>> lorenz = udd.Model(
+    ...     ["x", "y", "z"],
+    ...     {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
+    ...     {"sigma": 10.0, "rho": 28.0, "beta": 8 / 3},
+    ... )
+    >>> lorenz.rates(0.0, [1.0, 2.0, 3.0])
+    array([10., 23., -6.])
+    >>> udd.simulate(lorenz, 1.0, [1.0, 1.0, 1.0], method="taylor").outcome
+    'finished'
+    """
+
+    kind: ClassVar[str]
+    """``"dle"``, ``"disk"``, ``"pendulum"`` or ``"own"``."""
+    state_names: ClassVar[tuple[str, ...]]
+    """The names of the state's components, in order."""
+    state_units: ClassVar[tuple[str, ...]]
+    """Their units, empty where dimensionless."""
+    angles: ClassVar[tuple[str, ...]] = ()
+    """The components that are angles: they may grow without end."""
+    slow: ClassVar[float] = 0.25
+    """About the unit of time in which the motion takes place, that of the disk being 0.27 s."""
+    _plain: ClassVar[tuple[str, ...]]
+    _options: ClassVar[tuple[str, ...]] = ("effects",)
+    effects: tuple[Effect, ...]
+
+    def __new__(
+        cls,
+        states: Sequence[str],
+        equations: Mapping[str, Expression] | Sequence[Expression],
+        parameters: Mapping[str, float] | None = None,
+        *,
+        angles: Iterable[str] = (),
+        mass: Sequence[Sequence[Expression]] | None = None,
+    ) -> FormulaModel:
+        """A user's own model is one of a subclass, like those that are built in."""
+        from .formula_model import FormulaModel
+
+        return FormulaModel.__new__(FormulaModel)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Name and value of every parameter, in order; an effect's are called ``effect.name``."""
+        result = {name: float(getattr(self, name)) for name in self._plain}
+        for effect in self.effects:
+            result.update({f"{effect.name}.{name}": value for name, value in effect.parameters.items()})
+        return result
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every parameter, empty where dimensionless."""
+        own = {f"{e.name}.{p.name}": p.unit for e in self.effects if e.made for p in e.spec.parameters}
+        return dict(_core.model_parameters(self)) | own
+
+    @property
+    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None, str | None, Own | None]], bool]:
+        """What the core needs to know."""
+        effects = [(e.name, e.momentum, e.treatment, e.spec.own) for e in self.effects]
+        return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """The model with other values of some parameters.
+
+        Parameters
+        ----------
+        values : mapping
+            Any of :attr:`parameters`. As on the way of a fit, friction, drive and amplitudes may leave their
+            physical ranges; sizes must stay positive and everything finite.
+
+        Raises
+        ------
+        ModelError
+            An unknown name or an unusable value.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.Disk(0.039).with_parameters({"W": 0.05}).W
+        0.05
+        """
+        known = self.parameters
+        for name in values:
+            if name not in known:
+                raise ModelError(
+                    f"{type(self).__name__} has no parameter {name!r}; it has {', '.join(known)}"
+                )
+        effects = []
+        for effect in self.effects:
+            own = {
+                name: values[key] for name in effect.parameters if (key := f"{effect.name}.{name}") in values
+            }
+            effects.append(effect.replace(**own) if own else effect)
+        return self._changed({n: values[n] for n in self._plain if n in values}, tuple(effects))
+
+    def with_effects(self, effects: Iterable[Effect]) -> Self:
+        """The model with these effects instead of its own.
+
+        Raises
+        ------
+        ModelError
+            An effect given twice, or one that the model cannot have.
+        """
+        return self._changed({}, self._effects(effects))
+
+    def _changed(self, plain: Mapping[str, float], effects: tuple[Effect, ...]) -> Self:
+        """A copy with other numbers, checked for what would break the equations only."""
+        new = object.__new__(type(self))
+        for name, value in vars(self).items():
+            object.__setattr__(new, name, value)
+        for name, value in plain.items():
+            positive = 0.0 if name in ("R", "length", "inertia") else None
+            object.__setattr__(new, name, number(name, value, above=positive))
+        object.__setattr__(new, "effects", effects)
+        new._add_bristles()
+        return new
+
+    def _add_bristles(self) -> None:
+        """Friction treated as LuGre has a state of its own, the bristles' deflection."""
+        names, units = type(self).state_names, type(self).state_units
+        if any(effect.treatment == "lugre" for effect in self.effects):
+            names, units = (*names, "bristle"), (*units, "rad")
+        object.__setattr__(self, "state_names", names)
+        object.__setattr__(self, "state_units", units)
+
+    def _effects(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+        if isinstance(effects, Effect):
+            effects = (effects,)
+        try:
+            result = tuple(effects)
+        except TypeError:
+            raise ModelError(f"effects must be a list of effects, not {effects!r}") from None
+        for effect in result:
+            if not isinstance(effect, Effect):
+                raise ModelError(f"effects must be made by udd.effects, not {effect!r}")
+            if self.kind not in effect.spec.bodies:
+                bodies = " or ".join(effect.spec.bodies)
+                raise ModelError(f"the effect {effect.name} acts on a {bodies}, not on a {self.kind}")
+        names = [effect.name for effect in result]
+        for name in names:
+            if names.count(name) > 1:
+                raise ModelError(f"the effect {name} is given twice")
+        return result
+
+    def rates(self, t: ArrayLike, state: ArrayLike) -> NDArray[np.float64]:
+        """The right-hand side of the equations of motion.
+
+        Parameters
+        ----------
+        t : array_like, shape (...)
+            Times; broadcast against the states.
+        state : array_like, shape (..., dim)
+            States.
+
+        Returns
+        -------
+        ndarray, shape (..., dim)
+            The state's time derivatives.
+
+        Raises
+        ------
+        ModelError
+            Numbers that are not finite, or shapes that do not fit.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.DLE(1.0).rates(0.0, [1.0, 1.0, 0.5])
+        array([0. , 0.5, 0. ])
+        """
+        times, states = array("t", t), array("state", state)
+        dim = len(self.state_names)
+        if states.ndim == 0 or states.shape[-1] != dim:
+            raise ModelError(
+                f"the state must have {dim} components ({', '.join(self.state_names)}), not {states.shape}"
+            )
+        try:
+            shape = np.broadcast_shapes(times.shape, states.shape[:-1])
+        except ValueError:
+            raise ModelError(f"times {times.shape} and states {states.shape} do not fit together") from None
+        flat_t = np.broadcast_to(times, shape).ravel()
+        flat_x = np.broadcast_to(states, (*shape, dim)).ravel()
+        return _core.rates(self, flat_t, flat_x).reshape(*shape, dim)
+
+    def replace(self, **changes: Any) -> Self:
+        """The model with other arguments of its constructor or other parameters.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of the constructor, or parameters of effects as in ``**{"relaxation.b": 5.0}``.
+
+        Raises
+        ------
+        ModelError
+            An unknown name or an unusable value.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.Disk(0.039).replace(edge="ignore").edge
+        'ignore'
+        """
+        dotted = {name: changes.pop(name) for name in list(changes) if "." in name}
+        arguments = {name: getattr(self, name) for name in (*self._plain, *self._options)}
+        for name in changes:
+            if name not in arguments:
+                raise ModelError(f"{type(self).__name__} has no {name!r}; it has {', '.join(arguments)}")
+        new = type(self)(**(arguments | changes))
+        return new.with_parameters(dotted) if dotted else new

@@ -1,0 +1,464 @@
+"""Models of the user's own, from text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.expressions import Expression, text_of
+from udd._util.validation import number
+from udd.effects import Effect
+from udd.effects.user_defined import along_of
+from udd.errors import ModelError
+
+from .base import Model
+
+__all__ = ["FormulaModel"]
+
+_MOST_STATES = 6
+_POINT = "__"
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class FormulaModel(Model):
+    """A user's own model, as :class:`udd.Model` makes it.
+
+    Attributes
+    ----------
+    state_names : tuple of str
+        The names of the state's components, in order.
+    texts : tuple of str
+        Their rates.
+    values : tuple of (str, float)
+        The parameters.
+    angles : tuple of str
+        The states that are angles.
+    effects : tuple of Effect
+        What was added to its equations: formulas and curves whose slot is a rate, as in ``"v'"``, or a force,
+        as in ``"force(x)"``.
+    mass : tuple of tuple of str
+        The mass matrix; empty where none was given.
+    """
+
+    kind: ClassVar[str] = "own"
+    slow: ClassVar[float] = 1.0
+    _plain: ClassVar[tuple[str, ...]] = ()
+    _options: ClassVar[tuple[str, ...]] = ("states", "equations", "parameters", "angles", "effects", "mass")
+
+    state_names: tuple[str, ...]  # type: ignore[misc]
+    texts: tuple[str, ...]
+    values: tuple[tuple[str, float], ...]
+    angles: tuple[str, ...]  # type: ignore[misc]
+    effects: tuple[Effect, ...]
+    mass: tuple[tuple[str, ...], ...]
+
+    def __new__(cls, *_arguments: Any, **_options: Any) -> FormulaModel:
+        """Leave everything to the initialisation, which a copy or a pickle does not need."""
+        return object.__new__(cls)
+
+    def __init__(
+        self,
+        states: Sequence[str],
+        equations: Mapping[str, Expression] | Sequence[Expression],
+        parameters: Mapping[str, float] | None = None,
+        *,
+        angles: Iterable[str] = (),
+        effects: Iterable[Effect] = (),
+        mass: Sequence[Sequence[Expression]] | None = None,
+    ) -> None:
+        names = _names("states", states)
+        if not 1 <= len(names) <= _MOST_STATES:
+            raise ModelError(f"a model has 1 to {_MOST_STATES} states, not {len(names)}")
+        if not isinstance(parameters, Mapping | None):
+            raise ModelError(f"parameters must be a table of names and values, not {parameters!r}")
+        given = {} if parameters is None else {str(name): value for name, value in parameters.items()}
+        values = tuple((name, number(f"the parameter {name}", value)) for name, value in given.items())
+        for name in given:
+            if not name.isidentifier():
+                raise ModelError(f"a parameter's name must be a single word, not {name!r}")
+        turning = _names("angles", angles)
+        for name in turning:
+            if name not in names:
+                raise ModelError(f"the angle {name!r} is no state; there are {', '.join(names)}")
+        self._set(names, _equations(names, equations), values, turning)
+        _core.model_parameters(self)  # which parses the equations
+        if mass:
+            object.__setattr__(self, "mass", _mass_matrix(self, mass))
+        added = self._effects(effects)
+        if added:
+            object.__setattr__(self, "effects", added)
+            _core.model_parameters(self)
+
+    def _set(
+        self,
+        names: tuple[str, ...],
+        texts: tuple[str, ...],
+        values: tuple[tuple[str, float], ...],
+        angles: tuple[str, ...],
+        effects: tuple[Effect, ...] = (),
+        mass: tuple[tuple[str, ...], ...] = (),
+    ) -> None:
+        object.__setattr__(self, "state_names", names)
+        object.__setattr__(self, "texts", texts)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "angles", angles)
+        object.__setattr__(self, "effects", effects)
+        object.__setattr__(self, "mass", mass)
+
+    @property
+    def state_units(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The states' units, which are the user's."""
+        return ("",) * len(self.state_names)
+
+    @property
+    def equations(self) -> dict[str, str]:
+        """Each state's rate as it was given, as text, without the effects that were added."""
+        return dict(zip(self.state_names, self.texts, strict=True))
+
+    @property
+    def kinematic(self) -> tuple[str, ...]:
+        """The states whose equation only says that another one is their rate, as in ``theta' = v``."""
+        pairs = zip(self.state_names, self.texts, strict=True)
+        return tuple(name for name, text in pairs if text.strip() in self.state_names)
+
+    @property
+    def speeds(self) -> dict[str, str]:
+        """The coordinates of a mechanical model, in order, each with the state that is its rate.
+
+        Those of its states whose rate is a state of which no other one is the rate. A mass matrix has a row
+        and a column for each.
+        """
+        rates = {name: self.equations[name].strip() for name in self.kinematic}
+        return {name: speed for name, speed in rates.items() if speed not in rates}
+
+    def mass_matrix(self, states: ArrayLike) -> NDArray[np.float64]:
+        """The mass matrix.
+
+        Parameters
+        ----------
+        states : array_like, shape (..., dim)
+
+        Returns
+        -------
+        ndarray, shape (..., n, n)
+            A row and a column for each of :attr:`speeds`.
+
+        Raises
+        ------
+        ModelError
+            The model has none.
+
+        Examples
+        --------
+        >>> import udd
+        >>> swing = udd.Model(["theta", "v"], ["v", "-sin(theta)"], {"m": 2.0}, mass=[["m"]])
+        >>> swing.mass_matrix([0.1, 0.0])
+        array([[2.]])
+        """
+        if not self.mass:
+            raise ModelError("the model was given no mass matrix")
+        rows = []
+        for row in self.mass:
+            rates = (*row, *["0"] * (len(self.state_names) - len(row)))
+            entries = FormulaModel(self.state_names, rates, dict(self.values))
+            rows.append(entries.rates(0.0, states)[..., : len(row)])
+        return np.stack(rows, axis=-2)
+
+    def accelerations(self, along: str) -> dict[str, str]:
+        """What a unit force along a coordinate adds to the rates of the speeds, as formulas.
+
+        Parameters
+        ----------
+        along : str
+            A coordinate, or the difference of two, between which the force then acts: ``"b - a"``.
+
+        Returns
+        -------
+        dict of str to str
+            By speed: a component of ``M^-1 e``, with the mass matrix M and the direction e.
+
+        Raises
+        ------
+        ModelError
+            No mass matrix, or a coordinate that there is not.
+        """
+        if not self.mass:
+            raise ModelError(f"a force along {along} needs the model's mass matrix: udd.Model(..., mass=...)")
+        known, (first, *rest) = list(self.speeds), (name.strip() for name in along.split(" - "))
+        for name in (first, *rest):
+            if name not in known or len(rest) > 1 or name in rest[:-1] or [first] == rest:
+                between = (
+                    f' or between two of them, as in "force({known[1]} - {known[0]})"' if known[1:] else ""
+                )
+                raise ModelError(
+                    f"a force acts along one of {', '.join(known)}{between}, not along {along!r}"
+                )
+        n, whole = len(known), _determinant(self.mass)
+        result = {}
+        for i, speed in enumerate(self.speeds.values()):
+            parts = [_cofactor(self.mass, known.index(first), i)]
+            parts += [f"({_cofactor(self.mass, known.index(name), i)})" for name in rest]
+            result[speed] = f"({' - '.join(parts)})/({whole})" if n > 1 else f"1/({whole})"
+        return result
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Name and value of every parameter, in order; an effect's are called ``effect.name``."""
+        added = {f"{e.name}.{name}": value for e in self.effects for name, value in e.parameters.items()}
+        return dict(self.values) | added
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The parameters' units, which are the user's."""
+        return dict.fromkeys(self.parameters, "")
+
+    @property
+    def _spec(self) -> tuple[str, list[float], list[Any], bool]:
+        """What the core needs to know; to it, effects are a part of the equations."""
+        return self.kind, list(self.parameters.values()), [], False
+
+    @property
+    def _own(self) -> tuple[list[str], list[str], list[str], list[str]]:
+        """What the core needs to know beside the values."""
+        texts = dict(self.equations)
+        for effect in self.effects:
+            for state, factor in self._entered(effect.slots[0]).items():
+                term = _written(effect)
+                texts[state] = f"{texts[state]} + ({term})" + (f"*({factor})" if factor else "")
+        # A point is no part of a name there.
+        names = [name.replace(".", _POINT) for name in self.parameters]
+        return list(self.state_names), list(texts.values()), names, list(self.angles)
+
+    def _entered(self, slot: str) -> dict[str, str]:
+        """The states whose rates a slot adds to, and the factor in front of each; none for a rate itself."""
+        along = along_of(slot)
+        return self.accelerations(along) if along else {slot.removesuffix("'"): ""}
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """The model with other values of some parameters.
+
+        Raises
+        ------
+        ModelError
+            An unknown name or a value that is not finite.
+        """
+        known = self.parameters
+        for name in values:
+            if name not in known:
+                raise ModelError(f"the model has no parameter {name!r}; it has {', '.join(known) or 'none'}")
+        new = [(n, number(f"the parameter {n}", values.get(n, v))) for n, v in self.values]
+        effects = []
+        for effect in self.effects:
+            own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
+            effects.append(effect.replace(**own) if own else effect)
+        changed = object.__new__(type(self))
+        changed._set(self.state_names, self.texts, tuple(new), self.angles, tuple(effects), self.mass)
+        return changed
+
+    def with_term(self, equation: str, term: Expression, **amplitude: float) -> FormulaModel:
+        """The model with a term added to one of its equations.
+
+        Parameters
+        ----------
+        equation : str
+            The state whose rate the term adds to.
+        term : str or SymPy expression
+            A formula of the states, ``t`` and the parameters.
+        **amplitude : float
+            The term's factor, a new parameter.
+
+        Returns
+        -------
+        FormulaModel
+
+        Raises
+        ------
+        ModelError
+            An equation that there is not, a formula that cannot be used, or not exactly one factor with a
+            new name.
+
+        Examples
+        --------
+        >>> import udd
+        >>> swing = udd.Model(["theta", "v"], ["v", "-sin(theta)"], angles=["theta"])
+        >>> swing.with_term("v", "abs(v)*v", drag=-0.1).equations["v"]
+        '-sin(theta) + drag*(abs(v)*v)'
+        """
+        if equation not in self.state_names:
+            raise ModelError(f"there is no equation of {equation!r}; there are {', '.join(self.state_names)}")
+        if len(amplitude) != 1:
+            raise ModelError(f"a term has one factor, as in with_term({equation!r}, ..., c=0.0)")
+        (name,) = amplitude
+        if name in self.parameters:
+            raise ModelError(f"the model has a parameter {name!r} already")
+        text = f"{self.equations[equation]} + {name}*({text_of('the term', term)})"
+        return FormulaModel(
+            self.state_names,
+            self.equations | {equation: text},
+            dict(self.values) | amplitude,
+            angles=self.angles,
+            effects=self.effects,
+            mass=self.mass,
+        )
+
+    def with_effects(self, effects: Iterable[Effect]) -> Self:
+        """The model with these effects instead of those added before.
+
+        Parameters
+        ----------
+        effects : iterable of Effect
+            Formulas and curves whose slot is the rate of a state, as in
+            ``udd.effects.formula("v'", "c*abs(v)*v", c=-0.1)``; see also :meth:`with_term`. Of a model with a
+            mass matrix also a force along a coordinate, ``"force(b)"``, or between two, ``"force(b - a)"``,
+            which enters every acceleration.
+
+        Raises
+        ------
+        ModelError
+            An effect of disk or pendulum, one given twice, or one that names what the model does not have.
+        """
+        changed = object.__new__(type(self))
+        changed._set(
+            self.state_names, self.texts, self.values, self.angles, self._effects(effects), self.mass
+        )
+        _core.model_parameters(changed)
+        return changed
+
+    def _effects(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+        given = (effects,) if isinstance(effects, Effect) else tuple(effects)
+        for effect in given:
+            if isinstance(effect, Effect) and self.kind not in effect.spec.bodies:
+                raise ModelError(
+                    f"{effect.name} acts on a udd.Disk or a udd.Pendulum; a model of your own takes a term: "
+                    "with_term, or udd.effects.formula with the rate of a state for its slot"
+                )
+        result = super()._effects(given)
+        for effect in result:
+            slot = effect.slots[0]
+            if any(state not in self.state_names for state in self._entered(slot)):
+                known = ", ".join(f"{name}'" for name in self.state_names)
+                raise ModelError(f"{effect.name} adds to {slot}, but the model's rates are {known}")
+            for name in effect.parameters:
+                if name in self.state_names:
+                    raise ModelError(f"{effect.name} has a parameter {name!r}, which is the name of a state")
+        return result
+
+    def replace(self, **changes: Any) -> FormulaModel:
+        """The model with other arguments of its constructor or other parameters.
+
+        Raises
+        ------
+        ModelError
+            An unknown name or an unusable value.
+        """
+        arguments: dict[str, Any] = {
+            "states": self.state_names,
+            "equations": self.equations,
+            "parameters": dict(self.values),
+            "angles": self.angles,
+            "effects": self.effects,
+            "mass": self.mass,
+        }
+        own = {name: changes.pop(name) for name in list(changes) if name in self.parameters}
+        for name in changes:
+            if name not in arguments:
+                known = ", ".join((*arguments, *self.parameters))
+                raise ModelError(f"the model has no {name!r}; it has {known}")
+        new = FormulaModel(**(arguments | changes))
+        return new.with_parameters(own) if own else new
+
+    def __repr__(self) -> str:
+        angles = f", angles={list(self.angles)!r}" if self.angles else ""
+        mass = f", mass={[list(row) for row in self.mass]!r}" if self.mass else ""
+        text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{angles}{mass})"
+        return f"{text}.with_effects({list(self.effects)!r})" if self.effects else text
+
+
+def _written(effect: Effect) -> str:
+    """An effect's formula with its parameters as the core calls them."""
+    assert effect.spec.own is not None
+    names = "|".join(map(re.escape, effect.parameters))
+    return re.sub(rf"(?<![\w.])(?:{names})(?!\w)", rf"{effect.name}{_POINT}\g<0>", effect.spec.own[1])
+
+
+def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> tuple[tuple[str, ...], ...]:
+    """A mass matrix as text, checked at a few states."""
+    known = list(model.speeds)
+    if not known:
+        raise ModelError("a mass matrix needs coordinates: states whose equation is another state")
+    try:
+        rows = [list(row) for row in given if not isinstance(row, str)]
+    except TypeError:
+        rows = []
+    if [len(row) for row in rows] != [len(known)] * len(known):
+        raise ModelError(f"mass must be a table with a row and a column for each of {', '.join(known)}")
+    mass = tuple(tuple(text_of("the mass matrix", one) for one in row) for row in rows)
+    held = object.__new__(FormulaModel)
+    held._set(model.state_names, model.texts, model.values, model.angles, (), mass)
+    # Numbers without a pattern, in which no formula is symmetric by accident.
+    states = np.sin(np.arange(1.0, 3 * len(model.state_names) + 1)).reshape(3, -1)
+    try:
+        at = held.mass_matrix(states)
+    except ModelError as error:
+        raise ModelError(re.sub(r"the equation of \w+", "the mass matrix", str(error))) from None
+    at = at[np.isfinite(at).all(axis=(1, 2))]
+    if not np.allclose(at, np.swapaxes(at, 1, 2), rtol=1e-9, atol=0.0):
+        raise ModelError("the mass matrix must be symmetric")
+    if len(at) and np.linalg.eigvalsh(at).min() <= 0.0:
+        raise ModelError("the mass matrix must be positive definite")
+    return mass
+
+
+def _determinant(matrix: Sequence[Sequence[str]]) -> str:
+    """The determinant of a matrix of formulas, by its first row."""
+    if len(matrix) == 1:
+        return matrix[0][0]
+    parts = (f"({one})*({_cofactor(matrix, 0, k)})" for k, one in enumerate(matrix[0]))
+    return " + ".join(parts)
+
+
+def _cofactor(matrix: Sequence[Sequence[str]], i: int, k: int) -> str:
+    """A cofactor of a matrix of formulas; the inverse of a symmetric one is these over its determinant."""
+    if len(matrix) == 1:
+        return "1"
+    rest = [[*row[:k], *row[k + 1 :]] for row in (*matrix[:i], *matrix[i + 1 :])]
+    return f"-({_determinant(rest)})" if (i + k) % 2 else f"({_determinant(rest)})"
+
+
+def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
+    try:
+        result = () if isinstance(names, str) else tuple(names)
+        fine = all(str(name).isidentifier() for name in result)
+    except TypeError:
+        fine = False
+    if isinstance(names, str) or not fine:
+        raise ModelError(f"{what} must be a list of names, each a single word, not {names!r}")
+    return tuple(str(name) for name in result)
+
+
+def _equations(
+    names: tuple[str, ...], equations: Mapping[str, Expression] | Sequence[Expression]
+) -> tuple[str, ...]:
+    """The rates in the order of the states."""
+    if isinstance(equations, Mapping):
+        given = {str(name): one for name, one in equations.items()}
+        for name in names:
+            if name not in given:
+                raise ModelError(f"the state {name} has no equation")
+        for name in given:
+            if name not in names:
+                raise ModelError(f"there is an equation of {name!r}, but the states are {', '.join(names)}")
+        listed: list[Expression] = [given[name] for name in names]
+    elif isinstance(equations, Sequence) and not isinstance(equations, str):
+        listed = list(equations)
+        if len(listed) != len(names):
+            raise ModelError(f"there are {len(names)} states but {len(listed)} equations")
+    else:
+        raise ModelError(f"equations must be a table or a list of formulas, not {equations!r}")
+    return tuple(text_of(f"the equation of {name}", one) for name, one in zip(names, listed, strict=True))

@@ -1,0 +1,113 @@
+"""Models as JSON, both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from udd.effects import Effect, library, serialization
+from udd.errors import ModelError
+
+from .base import Model
+from .builtin import DLE, Disk, Pendulum
+from .formula_model import FormulaModel
+
+_KINDS: dict[str, type[Model]] = {cls.kind: cls for cls in (DLE, Disk, Pendulum)}
+
+
+def model_to_dict(model: Model) -> dict[str, Any]:
+    """The model's kind and the arguments of its constructor, an effect as its name and parameters.
+
+    Raises
+    ------
+    ModelError
+        It would not come back the same.
+    """
+    if isinstance(model, FormulaModel):
+        own = {
+            "kind": model.kind,
+            "states": list(model.state_names),
+            "equations": model.equations,
+            "parameters": [list(pair) for pair in model.values],  # in order, which a table need not keep
+            "angles": list(model.angles),
+            "effects": [_effect_to_dict(effect) for effect in model.effects],
+        }
+        return own | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
+    cls = type(model)
+    result: dict[str, Any] = {"kind": cls.kind}
+    if _KINDS.get(cls.kind) is cls:
+        for name in (*cls._plain, *cls._options):
+            result[name] = getattr(model, name)
+        if "effects" in result:
+            result["effects"] = [_effect_to_dict(effect) for effect in model.effects]
+        if model_from_dict(result) == model:
+            return result
+    raise ModelError(f"a sweep cannot write this model down: {model!r}")
+
+
+def model_from_dict(data: object) -> Model:
+    """The model that `model_to_dict` or a person wrote down.
+
+    Raises
+    ------
+    ModelError
+        An unknown kind or argument, or one that is missing or unusable.
+    """
+    given = _mapping("the model", data)
+    kind = given.pop("kind", None)
+    if kind == FormulaModel.kind:
+        if isinstance(given.get("effects"), list):
+            given["effects"] = [_effect_from_dict(effect) for effect in given["effects"]]
+        try:
+            return FormulaModel(**given | {"parameters": dict(given.get("parameters", {}))})
+        except (TypeError, ValueError):
+            has = "states, equations, parameters, angles, effects and mass"
+            raise ModelError(f"a model of your own has {has}, not {', '.join(given)}") from None
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise ModelError(
+            f"the model's kind must be one of {', '.join((*_KINDS, FormulaModel.kind))}, not {kind!r}"
+        )
+    if "effects" in given:
+        if not isinstance(given["effects"], list):
+            raise ModelError(f"the model's effects must be a list, not {given['effects']!r}")
+        given["effects"] = [_effect_from_dict(effect) for effect in given["effects"]]
+    cls = _KINDS[kind]
+    known = (*cls._plain, *cls._options)
+    for name in given:
+        if name not in known:
+            raise ModelError(f"a {kind} has no {name!r}; it has {', '.join(known)}")
+    first = cls._plain[0]
+    if first not in given:
+        raise ModelError(f"the model {kind} needs a value of {first}")
+    return cls(**given)
+
+
+def _effect_to_dict(effect: Effect) -> dict[str, Any]:
+    if effect.made is not None:
+        return serialization.to_dict(effect)
+    choices = {"momentum": effect.momentum, "treatment": effect.treatment}
+    made = {key: choice for key, choice in choices.items() if choice is not None}
+    return {"name": effect.name, **effect.parameters, **made}
+
+
+def _effect_from_dict(data: object) -> Effect:
+    given = _mapping("an effect", data)
+    if given.keys() & {"formula", "curve", "surface"}:
+        return serialization.from_dict(given)
+    name = given.pop("name", None)
+    choices = given.pop("momentum", None), given.pop("treatment", None)
+    specs = {spec.name: spec for spec in library()}
+    if not isinstance(name, str) or name not in specs:
+        raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
+    # `Effect` rather than its constructor: fitted amplitudes may lie outside their physical ranges.
+    values = tuple(given.pop(p.name, p.default) for p in specs[name].parameters)
+    if given:
+        known = ", ".join(p.name for p in specs[name].parameters)
+        raise ModelError(f"{name} has no parameter {next(iter(given))!r}; it has {known}")
+    return Effect(name, values, *choices)
+
+
+def _mapping(what: str, data: object) -> dict[str, Any]:
+    if not isinstance(data, Mapping):
+        raise ModelError(f"{what} must be a table of names and values, not {data!r}")
+    return dict(data)

@@ -1,0 +1,100 @@
+"""The coordinates in which states are compared: without units, angles as points on a circle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .base import Model
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """How states of a model are compared.
+
+    Attributes
+    ----------
+    size : ndarray (dim,)
+        By what each component is divided; infinity takes out an angle that the rates do not depend on.
+    angle : ndarray of bool (dim,)
+        Which components count modulo 2 pi.
+    clock : float
+        A typical time of the motion, in the model's unit of time.
+    mirrors : tuple of ndarray (dim,)
+        The signs under which the equations of motion stay the same, the identity left out.
+    """
+
+    size: Floats
+    angle: NDArray[np.bool_]
+    clock: float
+    mirrors: tuple[Floats, ...]
+
+    def __call__(self, states: Floats) -> Floats:
+        """States (..., dim) as points (..., m) whose distances mean something."""
+        plain = (
+            states[..., ~self.angle & np.isfinite(self.size)]
+            / self.size[~self.angle & np.isfinite(self.size)]
+        )
+        turned = states[..., self.angle & np.isfinite(self.size)]
+        return np.concatenate([plain, np.cos(turned), np.sin(turned)], axis=-1)
+
+    def speed(self, model: Model, states: Floats) -> Floats:
+        """How far states (n, dim) move in a typical time: zero at an equilibrium."""
+        rates = model.rates(np.zeros(len(states)), states) * self.clock / self.size
+        speed: Floats = np.abs(rates).max(axis=-1, initial=0.0)
+        return speed
+
+
+def coordinates_of(model: Model, states: Floats) -> Coordinates:
+    """The coordinates for a model; `states` (n, dim) give the sizes of components that have none."""
+    sizes, clock = _sizes(model)
+    largest = np.abs(states).max(axis=0, initial=0.0)
+    size = np.array(
+        [sizes.get(name, float(top) or 1.0) for name, top in zip(model.state_names, largest, strict=True)]
+    )
+    angle = np.array([name in model.angles for name in model.state_names])
+    # At states of no particular kind; the same in every process.
+    probes = size * np.random.default_rng(1).uniform(-0.9, 0.9, (8, len(size)))
+    for k in np.flatnonzero(angle):
+        turned = probes.copy()
+        turned[:, k] += 1.0
+        if np.array_equal(_rates(model, probes), _rates(model, turned)):
+            size[k] = np.inf
+    return Coordinates(size, angle, clock, tuple(_mirrors(model, probes)))
+
+
+def _sizes(model: Model) -> tuple[dict[str, float], float]:
+    """What is large for the components that a model of ours has, and its typical time."""
+    p = model.parameters
+    if model.kind == "dle":
+        # Rotation at sqrt(w); half the figure-eight takes 5.3 / sqrt(w).
+        size = math.sqrt(p["w"]) or 1.0
+        return dict.fromkeys(("omega", "y", "z"), size), 4.0 / size
+    if model.kind == "disk":
+        swing = math.sqrt(p["g"] / p["R"]) or 1.0
+        return {"Omega": swing, "Y": p["R"], "Z": p["R"], "beta": 1.0}, 10.0 / swing
+    if model.kind == "pendulum":
+        swing = math.sqrt(p["g"] * p["length"] / p["inertia"]) or 1.0
+        return {"Omega": swing, "theta": 1.0}, 6.0 / swing
+    return {}, 1.0
+
+
+def _rates(model: Model, states: Floats) -> Floats:
+    return model.rates(np.zeros(len(states)), states)
+
+
+def _mirrors(model: Model, probes: Floats) -> list[Floats]:
+    rates = _rates(model, probes)
+    found = []
+    for signs in product((1.0, -1.0), repeat=probes.shape[1]):
+        sign = np.array(signs)
+        # To the bit: a changed sign costs no rounding.
+        if (sign < 0).any() and np.array_equal(_rates(model, sign * probes), sign * rates):
+            found.append(sign)
+    return found

@@ -1,0 +1,362 @@
+"""What the page says in words, and how it writes numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from dataclasses import dataclass, replace
+from typing import Any
+
+from markupsafe import Markup, escape
+
+from udd.discovery.thresholds import SAME as IDENTICAL
+from udd.discovery.validation.held_out_errors import at_the_floor as floor_reached
+from udd.effects.user_defined import is_spline as is_spline
+from udd.fitting.parameter_meanings import MEANINGS as MEANINGS
+
+_SYMBOLS = (
+    (r"\bOmega\b", "Ω"),
+    (r"\bomega\b", "ω"),
+    (r"\bbeta\b", "β"),
+    (r"\btheta\b", "θ"),
+    (r"\bkappa\b", "κ"),
+    (r"\bphi\b", "φ"),
+    (r"\beps\b", "ε"),
+    (r"\bpi\b", "π"),
+    (r"dOmega\b", "dΩ"),
+    (r"\^(\d)", r"<sup>\1</sup>"),
+    (r"\b([A-Za-z])_([a-z]+)\b", r"\1<sub>\2</sub>"),
+    (r"\+-", "±"),
+    (r"(?<![\w.])-(?=[\w(|.])", "−"),
+    (r" - ", " − "),
+    (r" \* ", " "),
+    (r"(?<=[\w)])\*(?=[\w(])", " "),
+)
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The numbers that stand at the top."""
+
+    span: str
+    before: str
+    after: str
+    floor: str
+    floor_at: str
+    ratio: str
+    interval: str
+
+
+def pretty(text: str) -> Markup:
+    """A formula or a unit as a reader writes it: Greek letters, powers, indices, minus signs."""
+    result = str(escape(text))
+    for pattern, symbol in _SYMBOLS:
+        result = re.sub(pattern, symbol, result)
+    return Markup(result)
+
+
+#: The equation of the known model that a slot's effect enters.
+_ENTERS = {
+    "vertical": "dZ/dT = -Y Omega + W_c",
+    "lateral": "dY/dT = Z Omega + u",
+    "torque": "I dOmega/dT = ... + torque",
+    "friction": "I dOmega/dT = ... - k Omega",
+}
+
+
+def enters(effect: Any) -> list[str]:
+    """The equations that an effect changes."""
+    return [_ENTERS[slot] for slot in effect.slots if slot in _ENTERS]
+
+
+def verdict(discovery: Any) -> str:
+    """The whole result in a sentence, and a second where the search was not finished."""
+    said = _verdict(discovery)
+    if discovery.stopped is None:
+        return said
+    return (
+        f"{said} The search ended after {discovery.budget:.3g} s, as asked, while "
+        f"{discovery.stopped}; what else may be missing was not tried."
+    )
+
+
+def _verdict(discovery: Any) -> str:
+    said = "; and ".join(_counted(["; or ".join(_meanings(f, discovery)) for f in discovery.effects]))
+    if discovery.verdict == "fits the first part, not confirmed":
+        titles = list(dict.fromkeys(near.title for near in discovery.refused if near.why == "unconfirmed"))
+        said = " and ".join(titles)
+        return (
+            f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "
+            "free runs over the part that was held back do not get better by it beyond doubt."
+        )
+    if discovery.verdict == "search not finished":
+        return "Whether something is missing is not known yet: nothing was found so far."
+    if not discovery.effects and discovery.verdict != "nothing missing" and discovery.stopped:
+        return "The model lacks something; what, was not found so far."
+    if not discovery.effects and discovery.verdict != "nothing missing":
+        return "The model lacks something, but no effect of the library explains what."
+    if discovery.verdict == "nothing missing" and not at_the_floor(discovery):
+        return (
+            "Nothing that the library holds is missing beyond doubt; yet the known model does not explain "
+            "this motion down to the noise of the measurement."
+        )
+    if discovery.verdict == "nothing missing":
+        return (
+            "Nothing is missing: the known model explains this motion down to the noise of the measurement."
+        )
+    if discovery.verdict == "effect identified":
+        return f"{said[0].upper()}{said[1:]}."
+    return f"The model lacks something. Most likely {said}; but this record does not settle its form."
+
+
+def _counted(sentences: list[str]) -> list[str]:
+    """Each sentence once; of terms that one equation has more of, how many."""
+    counts = {text: sentences.count(text) for text in sentences}
+    return [
+        text if n == 1 else text.replace(" one more term", f" {n} more terms") for text, n in counts.items()
+    ]
+
+
+def refused(discovery: Any) -> list[str]:
+    """What comes nearest where nothing passes, and why it does not."""
+    sentences = []
+    for near in discovery.refused:
+        numbers = headline(replace(discovery, error_after=near.errors, ratio=near.ratio))
+        why = {
+            "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
+            f"as by chance with a probability of {probability(near.p)}",
+            "drift": "a slow drift of the sensor's zero would explain more",
+            "part": "the part in which effects are sought does not show it beyond chance",
+            "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
+            "held": "the frames that were held back do not bear it out",
+            "form": "another form fits these data clearly better, and does not pass",
+        }[near.why]
+        sentences.append(
+            f"{near.title} ({near.effect.expression}) would bring the held-out error {numbers.span} from "
+            f"{numbers.before} to {numbers.after}, ratio {numbers.ratio} ({numbers.interval}), but {why}."
+        )
+    return sentences
+
+
+def at_the_floor(discovery: Any) -> bool:
+    """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
+    e = discovery.error_before
+    return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
+
+
+def _meanings(found: Any, discovery: Any) -> list[str]:
+    """What was found, and what acts on the disk identically."""
+    same = [
+        a.effect
+        for a in discovery.alternatives
+        if a.likeness > IDENTICAL and a.instead_of == found.effect.name
+    ]
+    sentences = [effect_sentence(e) for e in [found.effect, *same]]
+    if getattr(found, "curve", None) is not None:  # the meaning says where, the curve says with what
+        sentences[0] += f", depending on {' and '.join(along(c.name) for c in found.curve.coordinates)}"
+    return list(dict.fromkeys(sentences))
+
+
+def along(name: str) -> str:
+    """A coordinate in a sentence."""
+    return {
+        "Y": "the sideways place Y of the disk's centre",
+        "Z": "the height Z of the disk's centre",
+        "R": "the distance R of the disk's centre from the contact",
+        "theta": "the direction θ",
+        "beta": "the orientation β",
+        "Omega": "the angular velocity Ω",
+        "|Omega|": "the speed |Ω| of the rotation",
+        "t": "time",
+    }.get(name, name)
+
+
+def values_of(found: Any, units: dict[str, str]) -> Markup:
+    """An effect's numbers in a sentence."""
+    texts = []
+    for name, value in found.parameters.items():
+        unit = unit_words(units.get(f"{found.effect.name}.{name}", ""))
+        number = Markup("<b>{} = {}</b>").format(pretty(name), with_error(value, found.errors.get(name)))
+        texts.append(number + Markup(" ") + unit if unit else number)
+    return Markup(", ").join(texts)
+
+
+def effect_sentence(effect: Any) -> str:
+    """What an effect does, as a clause."""
+    meaning = str(effect.meaning).rstrip(".")
+    return f"there is {meaning}" if meaning.startswith(("a ", "an ", "dry ")) else meaning
+
+
+def headline(discovery: Any) -> Headline:
+    """The held-out errors on which the decision rests."""
+    h = discovery.horizon
+    before, after = discovery.error_before, discovery.error_after
+    unit = before.unit
+    if h is None:
+        span, values = "over all of it (r.m.s.)", (before.whole, after.whole)
+        h = before.horizons[-1]
+    else:
+        span, values = f"after {h:.4g}\u00a0s", (before.at(h)[0], after.at(h)[0])
+    value, low, high = discovery.ratio
+    return Headline(
+        span=span,
+        before=length(values[0], unit),
+        after=length(values[1], unit),
+        floor=length(after.at(h)[3], unit),
+        floor_at=f"{h:.4g}\u00a0s",
+        ratio=f"{value:.2g}",
+        interval=f"{low:.2g} to {high:.2g}" if math.isfinite(low) else "not known: too few blocks",
+    )
+
+
+def noise(discovery: Any) -> str:
+    """What the frames of each channel are good to, and the steps that they were read in."""
+    said = "; ".join(one.text for one in discovery.noise)
+    averaged = discovery.thinned and discovery.thinned[0].every > 1
+    return f"{said} (means of {discovery.thinned[0].every} frames)" if averaged else said
+
+
+def length(value: float, unit: str) -> str:
+    """An error with its unit: mm or mrad, or per cent of a motion's spread."""
+    if not math.isfinite(value):
+        return "–"
+    return _with_unit(value, unit, 3)
+
+
+def rough(value: float, unit: str) -> str:
+    """As :func:`length`, with two digits."""
+    return _with_unit(value, unit, 2)
+
+
+def _with_unit(value: float, unit: str, digits: int) -> str:
+    if unit == "spread":
+        return f"{_digits(100 * value, digits)} %"
+    return f"{_digits(1e3 * value, digits)} {'mm' if unit == 'm' else 'mrad'}"
+
+
+def _digits(value: float, n: int) -> str:
+    """So many significant digits without an exponent."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    decimals = max(0, n - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def with_error(value: float, error: float | None) -> str:
+    """A value and its standard error with two digits: ``5.03 ± 0.12``."""
+    if error is None or not math.isfinite(error) or error <= 0:
+        return f"{value:.5g}".replace("-", "−")
+    place = math.floor(math.log10(error))
+    size = math.floor(math.log10(max(abs(value), error)))
+    if size >= 5 or size <= -4:
+        digits = max(size - place + 1, 0)
+        text = f"({value / 10**size:.{digits}f} ± {error / 10**size:.{digits}f}) × 10"
+        return Markup(f"{text}<sup>{size}</sup>".replace("-", "−"))
+    digits = max(1 - place, 0)
+    return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
+
+
+def probability(p: float) -> str:
+    """A small probability as a person says it."""
+    if p < 1e-3:
+        power = math.floor(math.log10(max(p, 1e-300))) + (1 if p > 1e-300 else 0)
+        return Markup(f"below 10<sup>−{-power}</sup>")
+    return f"{min(p, 1.0):.2g}"
+
+
+def borne_out(effect: Any) -> str:
+    """What the frames that no fit saw say of an effect."""
+    value, low, high = effect.ratio
+    told = (
+        "With all numbers held, the cost of the held-back frames (their squared misfits in units of the "
+        f"noise) became {value:.3g} of what it was (95 % interval {low:.3g} to {high:.3g})"
+    )
+    if effect.witness == "held":
+        return f"{told}."
+    if effect.witness == "fitted":
+        return f"{told}; fitted too, they lowered χ² by more than chance would."
+    return (
+        f"{told}: they hardly show it. Each half of the record, in alternate stretches, lowered χ² by more "
+        "than chance would beside the other half."
+    )
+
+
+def unit_words(unit: str) -> str:
+    """A unit in a sentence: ``1/m`` becomes ``per metre``."""
+    return {"1/m": "per metre", "1/s": "per second", "": ""}.get(unit, pretty(unit))
+
+
+def title_of(discovery: Any, name: str) -> str:
+    """What a reader calls one of the effects that were found."""
+    return next((f.effect.title for f in discovery.effects if f.effect.name == name), name)
+
+
+def limit(other: Any) -> str:
+    """Why one alternative stays open."""
+    if other.likeness > IDENTICAL and other.effect.slots[0].endswith("'"):
+        return "On these data the two act identically."
+    if other.likeness > IDENTICAL:
+        return (
+            "At one drive speed the two act on the disk identically, and no longer record would tell them "
+            "apart: film a second drive and fit both together."
+        )
+    if other.nats < -0.1:
+        better = f"{abs(other.nats):.1f} units of log-likelihood"
+        return f"It fits even better (by {better}), but was not chosen: it fails another test."
+    return (
+        f"It fits worse by {abs(other.nats):.1f} units of log-likelihood; a form is excluded from 10 on. "
+        "A longer record, or one of a wider range of motion, would settle it."
+    )
+
+
+def command(discovery: Any, source: str | None) -> str | None:
+    """What `udd discover` takes to do the same; None where the file is not known."""
+    known = discovery.baseline.problem.models[0]
+    if source is None or known.effects or known.kind == "own" or len(discovery.fit.measurements) > 1:
+        return None
+    usual = type(known)(*([known.W] if discovery.measurement.kind == "disk" else [known.length]))
+    given = {"disk": ["W"], "pendulum": ["length"]}[discovery.measurement.kind]
+    given += [name for name, value in known.parameters.items() if value != usual.parameters[name]]
+    names = {"length": "pendulum"}
+    options = (f"--{names.get(name, name)} {known.parameters[name]!r}" for name in dict.fromkeys(given))
+    return f"udd discover {shlex.quote(source)} {' '.join(options)} --report report.html"
+
+
+def short_limits(discovery: Any) -> list[str]:
+    """What must stand beside the verdict, lest it says too much."""
+    same = [a for a in discovery.alternatives if a.likeness > IDENTICAL]
+    if not same:
+        return []
+    names = " or ".join(
+        dict.fromkeys(f"{a.effect.title} ({a.effect.equation})" for a in same if a.effect.title)
+    )
+    return [f"At one drive speed it cannot be told from {names}: a film at a second drive would tell."]
+
+
+def limits(discovery: Any) -> list[str]:
+    """What holds for every such page."""
+    result = []
+    if discovery.verdict == "nothing missing":
+        result.append(
+            "An effect smaller than this record can show may still be there: nothing missing means nothing "
+            "that these data demand."
+        )
+    if getattr(discovery, "curves", []):
+        result.append(
+            "Beside the effects of the library, every equation was searched for a smooth curve along each "
+            "coordinate and pair of coordinates. What depends on more at once, or on what came before, is in "
+            "neither."
+        )
+    else:
+        result.append("Only the effects of the library were tried; the table above names the best.")
+    if discovery.measurement.kind == "disk":
+        result.append(
+            "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that "
+            "all lean the same way look upright: only angles between them can be seen."
+        )
+    else:
+        result.append(
+            "Gravity was taken as known; only the ratio of the length to the inertia sets the period."
+        )
+    return result

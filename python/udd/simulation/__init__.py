@@ -1,0 +1,1 @@
+"""Trajectories: one run, many runs, and the balance of its energy."""

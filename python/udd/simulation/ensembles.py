@@ -1,0 +1,186 @@
+"""One model from many states, or with many values of its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.labelled import axes, dataset
+from udd._util.progress import progress_bar, thread_count
+from udd._util.validation import array, number
+from udd.errors import ModelError, interrupted
+from udd.models import Model, require_model
+from udd.models.parameter_batch import orbits_of
+
+from .outcomes import OUTCOMES
+from .trajectory import method_for, tolerances
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Ensemble", "ensemble"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Many runs of one model at common times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (times,)
+        Times, in s (dimensionless for the DLE).
+    state : ndarray, shape (..., times, dim)
+        States, in the order of ``model.state_names``; NaN after a run's end.
+    outcome : ndarray of str, shape (...)
+        ``"finished"``, ``"ejected"`` (the disk left the wheels), ``"failed"`` (the solution blew up),
+        ``"chattering"``, ``"interrupted"``.
+    end : ndarray, shape (..., dim)
+        Each run's last state.
+    t_end : ndarray, shape (...)
+        The time of that.
+    model : Model
+        What was run, before parameters were varied.
+    """
+
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+    outcome: NDArray[Any]
+    end: NDArray[np.float64]
+    t_end: NDArray[np.float64]
+    model: Model
+
+    def to_xarray(self) -> xr.Dataset:
+        """The runs as labelled arrays: every state over the runs' axes and ``t``, with its unit.
+
+        Returns
+        -------
+        xarray.Dataset
+            With each run's ``outcome``.
+
+        Examples
+        --------
+        >>> import udd
+        >>> many = udd.ensemble(udd.DLE(5.0), [0.0, 0.1], [[1, 1, 0], [2, 1, 0]])
+        >>> dict(many.to_xarray().sizes)
+        {'run': 2, 't': 2}
+        """
+        model, runs = self.model, axes(self.outcome.shape, "run")
+        units = dict(zip(model.state_names, model.state_units, strict=True))
+        columns = {name: self.state[..., k] for k, name in enumerate(model.state_names)}
+        found = dataset(columns, [*runs, "t"], units, {"t": self.t}, model=repr(model))
+        return found.assign(outcome=(runs, np.asarray(self.outcome)))
+
+    def __repr__(self) -> str:
+        return f"<Ensemble of {self.model!r}: runs {self.outcome.shape}, {len(self.t)} times>"
+
+
+def ensemble(
+    model: Model,
+    t: ArrayLike,
+    state0: ArrayLike | None = None,
+    *,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    method: str = "auto",
+    threads: int | None = None,
+    progress: bool | None = None,
+    partial: bool = False,
+) -> Ensemble:
+    """Run a model from many states, or with many values of its parameters, on all cores.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
+    t : array_like, shape (times,), or float
+        Times at which the states are wanted, increasing; the first is the initial time. A number stands for
+        the end of runs from 0, of which only the states there are wanted.
+    state0 : array_like, shape (..., dim), optional
+        Initial states.
+    parameters : mapping of str to array_like, optional
+        Other values of some of the model's parameters, of shapes that broadcast with one another and with
+        the leading axes of `state0`; the result has these axes.
+    rtol, atol, method
+        As for :func:`udd.simulate`.
+    threads : int, optional
+        How many threads to use, by default one per core. No bit of the result depends on it.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default for many runs, where stderr is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+
+    Returns
+    -------
+    Ensemble
+        Runs that end early say why; they raise nothing.
+
+    Raises
+    ------
+    ModelError
+        Times, states or parameters that cannot be used.
+
+    Interrupted
+        On Ctrl-C, with the ensemble as its ``partial``: the runs that are not finished are NaN.
+    MemoryError
+        There is no room for so many states.
+
+    Warns
+    -----
+    IncompleteWarning
+        Ctrl-C, where a partial result was asked for.
+
+    Examples
+    --------
+    Ten thousand orbits spread over the attractor, on which <omega^2> = w:
+
+    >>> import numpy as np
+    >>> import udd
+    >>> starts = np.random.default_rng(1).normal(size=(10_000, 3))
+    >>> end = udd.ensemble(udd.DLE(1.0), 50.0, starts, rtol=1e-6).end
+    >>> bool(abs((end[:, 0] ** 2).mean() - 1.0) < 0.03)
+    True
+    """
+    rtol, atol = tolerances(rtol, atol)
+    times = array("t", t)
+    if times.ndim == 0:
+        times = np.array([0.0, number("t", float(times), least=0.0)])
+        wanted = slice(1, 2)
+        if times[1] == 0.0:
+            times = times[:1]
+            wanted = slice(0, 1)
+    elif times.ndim == 1 and times.size:
+        wanted = slice(None)
+    else:
+        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
+    if not (np.diff(times) > 0).all():
+        raise ModelError("the times must increase, without duplicates")
+    require_model(model)
+    shape, rows, starts = orbits_of(model, parameters or {}, state0)
+    runs = max(len(rows), len(starts))
+    stepper = method_for(model, method, rtol)
+    if stepper == "rodas":
+        raise ModelError('method="rodas" is for single runs, by udd.simulate')
+    with progress_bar(runs, "run", progress) as since:
+        found = _core.ensemble(
+            model, rows, starts, times, rtol, atol, stepper, thread_count(threads), since(0)
+        )
+    names = np.array(OUTCOMES)[found["outcome"]]
+    states = found["states"][:, wanted]
+    made = Ensemble(
+        times[wanted],
+        states.reshape(*shape, *states.shape[1:]),
+        names.reshape(shape),
+        found["end"].reshape(*shape, -1),
+        found["t_end"].reshape(shape),
+        model,
+    )
+    stopped = int((names == "interrupted").sum())
+    if stopped:
+        interrupted(made, f"{stopped} of {runs} runs were interrupted and are NaN", partial)
+    return made

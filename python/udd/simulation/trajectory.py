@@ -1,0 +1,337 @@
+"""Runs of a model."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd import _core
+from udd._util.labelled import dataset
+from udd._util.validation import array, number
+from udd.errors import IncompleteWarning, ModelError
+from udd.models import Model, require_model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Event", "Events", "Stats", "Trajectory", "simulate"]
+
+
+class Event(NamedTuple):
+    """Something that happened on the way.
+
+    Attributes
+    ----------
+    kind : str
+        ``"reversal"`` (Omega = 0), ``"friction kink"`` (k reaches its floor), ``"edge"`` (the disk leaves
+        the wheels); with dry friction that is not smoothed also ``"stick"`` (it comes to rest and is held),
+        ``"slip"`` (it is let go) and ``"band"`` (the speed passes the edge of Karnopp's band).
+    t : float
+        When.
+    state : ndarray, shape (dim,)
+        The state then, on the event's surface to 1e-12 of its size.
+    """
+
+    kind: str
+    t: float
+    state: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """The events of a run, in order.
+
+    Attributes
+    ----------
+    kind : tuple of str
+        What each is.
+    t : ndarray, shape (n,)
+        When.
+    state : ndarray, shape (n, dim)
+        The states then.
+    """
+
+    kind: tuple[str, ...]
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def __getitem__(self, index: int) -> Event:
+        return Event(self.kind[index], float(self.t[index]), self.state[index])
+
+    def __iter__(self) -> Iterator[Event]:
+        return (self[index] for index in range(len(self)))
+
+    def of(self, kind: str) -> Events:
+        """The events of one kind."""
+        chosen = np.array([own == kind for own in self.kind], dtype=bool)
+        return Events(tuple(own for own in self.kind if own == kind), self.t[chosen], self.state[chosen])
+
+
+class Stats(NamedTuple):
+    """What the work was.
+
+    Attributes
+    ----------
+    accepted, rejected : int
+        Steps.
+    evaluations : int
+        Of the rates.
+    grazes : int
+        Jumps of the law that the run only just reached: beyond them its derivatives are in doubt.
+    """
+
+    accepted: int
+    rejected: int
+    evaluations: int
+    grazes: int
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A run.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times, in s (dimensionless for the DLE).
+    state : ndarray, shape (n, dim)
+        States, in the order of ``model.state_names``. The components are attributes too: ``run.Omega``.
+    events : Events
+        Crossings of the surfaces where the law changes, and of the disk's edge.
+    outcome : {"finished", "ejected", "chattering"}
+        An ejected run ends on the disk's edge, a chattering one where the law switches again and again while
+        time stands still; the last time and state are there.
+    stats : Stats
+        Accepted and rejected steps, evaluations of the rates.
+    model : Model
+        What was run.
+    dense : callable or None
+        The core's record of all steps where ``simulate(..., dense=True)`` was asked for; call the
+        trajectory instead.
+    """
+
+    t: NDArray[np.float64]
+    state: NDArray[np.float64]
+    events: Events
+    outcome: str
+    stats: Stats
+    model: Model
+    dense: _core.Dense | None = None
+
+    def to_xarray(self) -> xr.Dataset:
+        """The run as labelled arrays: every state over ``t``, with its unit.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``to_dataframe()`` of it is a table for pandas.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.simulate(udd.Disk(0.039), [0, 1], [0, 0.001, 0.04, 0]).to_xarray().Y.attrs
+        {'units': 'm'}
+        """
+        model = self.model
+        units = dict(zip(model.state_names, model.state_units, strict=True))
+        columns = {name: self.state[:, k] for k, name in enumerate(model.state_names)}
+        return dataset(columns, ["t"], units, {"t": self.t}, model=repr(model), outcome=self.outcome)
+
+    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The state at any times within the run, as accurate as the method's dense output.
+
+        Parameters
+        ----------
+        t : array_like, shape (...)
+            Times.
+
+        Returns
+        -------
+        ndarray, shape (..., dim)
+
+        Raises
+        ------
+        ModelError
+            The run kept no dense output.
+        IntegrationError
+            A time outside the run.
+        """
+        if self.dense is None:
+            raise ModelError("this run kept no dense output; use simulate(..., dense=True)")
+        times = array("t", t)
+        return self.dense(times.ravel()).reshape(*times.shape, len(self.model.state_names))
+
+    def __getattr__(self, name: str) -> NDArray[np.float64]:
+        # Only for what is not an attribute otherwise; `model` is missing while unpickling.
+        names = self.__dict__["model"].state_names if "model" in self.__dict__ else ()
+        if name in names:
+            column: NDArray[np.float64] = self.state[:, names.index(name)]
+            return column
+        raise AttributeError(f"a trajectory of this model has no {name!r}")
+
+    def __dir__(self) -> list[str]:
+        return sorted([*super().__dir__(), *self.model.state_names])
+
+    def __repr__(self) -> str:
+        return (
+            f"<Trajectory of {self.model!r}: {len(self.t)} states, t = {self.t[0]:g} to {self.t[-1]:g}, "
+            f"{len(self.events)} events, {self.outcome}>"
+        )
+
+
+METHODS = ("auto", "dopri5", "dop853", "taylor", "rodas")
+"""How steps may be taken."""
+
+
+def method_for(model: Model, method: str, rtol: float) -> str:
+    """The method that is meant: for ``"auto"`` the faster one at equal error, as measured.
+
+    The choice follows the table that `benches/python/methods.py` prints: the series wins for every law that
+    has one; the core hands runs over to others where it does not serve. Friction with modes is left to
+    Runge-Kutta methods, which know all its treatments.
+    """
+    if method not in METHODS:
+        raise ModelError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
+    if method != "auto":
+        return method
+    effects = getattr(model, "effects", ())
+    if any(getattr(effect, "treatment", "smoothed") not in (None, "smoothed") for effect in effects):
+        return "dop853" if rtol <= 1e-8 else "dopri5"
+    # A law that a user wrote may depend on comparisons.
+    written = model.kind == "own" or any(effect.made for effect in effects)
+    return "dop853" if written and not _core.has_series(model) else "auto"
+
+
+def tolerances(rtol: float, atol: float) -> tuple[float, float]:
+    """Checked tolerances."""
+    # Below rounding no step size would do.
+    rtol, atol = number("rtol", rtol, least=1e-15), number("atol", atol, above=0.0)
+    return rtol, atol
+
+
+def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
+    """A checked initial state."""
+    require_model(model)
+    state = array("state0", state0)
+    if state.shape != (len(model.state_names),):
+        raise ModelError(
+            f"state0 must have the {len(model.state_names)} components {', '.join(model.state_names)}, "
+            f"not shape {state.shape}"
+        )
+    return state
+
+
+def simulate(
+    model: Model,
+    t: ArrayLike,
+    state0: ArrayLike,
+    *,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    method: str = "dopri5",
+    dense: bool = False,
+) -> Trajectory:
+    """Run a model from an initial state.
+
+    Parameters
+    ----------
+    model : Model
+        :class:`udd.DLE`, :class:`udd.Disk`, :class:`udd.Pendulum` or a user's own :class:`udd.Model`.
+    t : array_like, shape (n,), or float
+        Times at which the state is wanted, increasing; the first is the initial time. A number is the
+        end of a run from 0, of which the states after all accepted steps are given.
+    state0 : array_like, shape (dim,)
+        The initial state.
+    rtol, atol : float
+        Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
+        in the state's units.
+    method : {"dopri5", "dop853", "taylor", "rodas", "auto"}
+        ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
+        theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
+        solution's power series to order 10 or 18, by the tolerance; its dense output is as accurate as its
+        steps. ``"rodas"`` is the Rosenbrock method Rodas5P of order 5(4), with dense output of order 4, for
+        stiff laws. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured:
+        the series where there is one, with ``"dop853"`` for a run where it does not serve, as next to a pole,
+        and ``"rodas"`` for one of a model of your own that turns out to be stiff.
+    dense : bool
+        Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
+
+    Returns
+    -------
+    Trajectory
+        A run that leaves the disk is cut at the edge and has the outcome "ejected".
+
+    Raises
+    ------
+    ModelError
+        Times, state or tolerances that cannot be used; a start outside the disk.
+    IntegrationError
+        The solution blows up.
+    KeyboardInterrupt
+        On Ctrl-C, at once.
+
+    Warns
+    -----
+    IncompleteWarning
+        The disk left the wheels.
+    StiffnessWarning
+        A model of your own that is stiff is run by a method for those that are not; the warning comes while
+        the run goes on.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import udd
+    >>> run = udd.simulate(udd.DLE(1.0), np.linspace(0, 10, 101), [1.0, 1.0, 0.01])
+    >>> run.state.shape, run.outcome
+    ((101, 3), 'finished')
+    >>> print(np.round(run.state[-1], 8))
+    [0.97664031 0.9831748  0.04343309]
+    """
+    found = integrated(model, t, state0, rtol=rtol, atol=atol, method=method, dense=dense)
+    if found.outcome == "ejected":
+        warnings.warn(
+            f"the disk left the wheels at t = {found.t[-1]:.6g} s, where the run ends; a disk with "
+            'edge="ignore" goes on by the equations alone, beyond where they hold',
+            IncompleteWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def integrated(
+    model: Model,
+    t: ArrayLike,
+    state0: ArrayLike,
+    *,
+    rtol: float = 1e-9,
+    atol: float = 1e-12,
+    method: str = "dopri5",
+    dense: bool = False,
+) -> Trajectory:
+    """The same for who looks at the outcome: a run that leaves the disk is not warned of."""
+    state = initial_state(model, state0)
+    rtol, atol = tolerances(rtol, atol)
+    stepper = method_for(model, method, rtol)
+    times = array("t", t)
+    if times.ndim > 1 or times.size == 0:
+        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
+    if times.ndim == 0:
+        end = number("t", float(times), least=0.0)
+        found = _core.simulate(model, None, end, state.tolist(), rtol, atol, stepper, dense)
+    else:
+        if not (np.diff(times) > 0).all():
+            raise ModelError("the times must increase, without duplicates")
+        found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, stepper, dense)
+    events = Events(tuple(found["event_kind"]), found["event_t"], found["event_state"])
+    stats = Stats(*found["counts"])
+    return Trajectory(found["t"], found["state"], events, found["outcome"], stats, model, found["dense"])

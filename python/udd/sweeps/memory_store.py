@@ -1,0 +1,69 @@
+"""A sweep in memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .chunks import (
+    Grid,
+    attributes,
+    compute,
+    coordinate_attributes,
+    fill_of,
+    part_of,
+    spec_attributes,
+    variables_of,
+)
+from .quantities import Found
+from .spec import SweepSpec
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Memory:
+    """The arrays of a sweep, filled as chunks come back."""
+
+    work = staticmethod(compute)
+    remedy = "the others are kept"
+
+    def __init__(self, spec: SweepSpec, grid: Grid, threads: int) -> None:
+        self._spec, self._grid, self._threads = spec, grid, threads
+        self._done = np.zeros(len(grid), dtype=bool)
+        self._arrays: Found = {
+            v.name: np.full((*grid.shape, *(n for _, n in v.more)), fill_of(v), dtype=v.dtype)
+            for v in variables_of(spec)
+        }
+
+    def arguments(self, chunk: int) -> tuple[Any, ...]:
+        """What `work` takes."""
+        return part_of(self._spec, self._grid, chunk), self._threads
+
+    def keep(self, chunk: int, found: Found) -> None:
+        """Take what `work` gave."""
+        for name, values in found.items():
+            self._arrays[name][self._grid.region(chunk)] = values
+        self._done[chunk] = True
+
+    def done(self) -> NDArray[np.bool_]:
+        """Which chunks are finished."""
+        return self._done
+
+    def tidy(self) -> None:
+        """There is nothing to clean up."""
+
+    def dataset(self) -> xr.Dataset:
+        """What is there."""
+        import xarray as xr
+
+        spec = self._spec
+        data = {
+            v.name: ((*spec.over, *(name for name, _ in v.more)), self._arrays[v.name], attributes(v))
+            for v in variables_of(spec)
+        }
+        axes = spec.axes.items()
+        coordinates = {name: (name, values, coordinate_attributes(spec, name)) for name, values in axes}
+        return xr.Dataset(data, coordinates, spec_attributes(spec))

@@ -1,0 +1,190 @@
+"""What can be swept: a table from a quantity's name to the function that computes it.
+
+Such a function takes the model, for each of n trajectories a row of all parameters and an initial state, the
+options, and how many threads it may use (0: one per core). It returns arrays whose first axis is the
+trajectory. A trajectory that fails has an outcome and NaN, and disturbs no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd._util.validation import number
+from udd.chaos.largest_exponent import span
+from udd.errors import IntegrationError, ModelError
+from udd.models import DLE, Model
+from udd.models.parameter_batch import outside_domain
+from udd.simulation.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED, OUTCOMES
+from udd.simulation.trajectory import integrated, method_for, tolerances
+
+NOT_RUN = -1
+"""In the array ``outcome`` before the work is done; the others are those of `udd.simulation.outcomes`."""
+
+Floats: TypeAlias = NDArray[np.float64]
+Options: TypeAlias = dict[str, float]
+Found: TypeAlias = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An array of the result; `more` names axes after those of the sweep, with their lengths."""
+
+    name: str
+    unit: str
+    meaning: str
+    dtype: str = "float64"
+    more: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is computed: the check of its options, its arrays (beside `outcome`), and the work."""
+
+    options: Callable[[Model, Mapping[str, Any]], Options]
+    variables: Callable[[Model], tuple[Variable, ...]]
+    run: Callable[[Model, Floats, Floats, Options, int], Found]
+
+
+def _chosen(given: Mapping[str, Any], defaults: Mapping[str, float | None]) -> dict[str, Any]:
+    for name in given:
+        if name not in defaults:
+            raise ModelError(f"there is no option {name!r}; there are {', '.join(defaults)}")
+    chosen = {**defaults, **given}
+    chosen["rtol"], chosen["atol"] = tolerances(chosen["rtol"], chosen["atol"])
+    return chosen
+
+
+def _time_unit(model: Model) -> str:
+    return "1" if isinstance(model, DLE) else "s"
+
+
+# --- Lyapunov exponents
+
+
+def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
+    slow = model.slow
+    defaults = {"t": None, "tol": 2e-3 / slow, "transient": None, "rtol": 1e-8, "atol": 1e-10}
+    chosen = _chosen(given, defaults)
+    t, skipped = span(chosen["t"], chosen["transient"], longest=1e5 * slow, skip=400.0 * slow)
+    return {**chosen, "t": t, "tol": number("tol", chosen["tol"], above=0.0), "transient": skipped}
+
+
+def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
+    unit = "1" if isinstance(model, DLE) else "1/s"
+    return (
+        Variable("value", unit, "largest Lyapunov exponent"),
+        Variable("standard_error", unit, "its standard error"),
+        Variable("converged", "1", "whether the standard error met tol", "bool"),
+    )
+
+
+def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
+    unit = "1" if isinstance(model, DLE) else "1/s"
+    numbers = (("number", len(model.state_names)),)
+    return (
+        Variable("value", unit, "Lyapunov exponents", more=numbers),
+        Variable("standard_error", unit, "their standard errors", more=numbers),
+        Variable("converged", "1", "whether the first one's standard error met tol", "bool"),
+    )
+
+
+def _lyapunov(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    found = _spectrum(model, rows, states, options, threads, all=False)
+    return {**found, **{name: found[name][:, 0] for name in ("value", "standard_error")}}
+
+
+def _spectrum(
+    model: Model, rows: Floats, states: Floats, options: Options, threads: int, all: bool = True
+) -> Found:
+    time = options["t"], options["transient"], options["tol"]
+    accuracy = options["rtol"], options["atol"]
+    found = _core.lyapunov(model, rows, states, all, *time, *accuracy, threads, None)
+    done = found["outcome"] == FINISHED
+    return {
+        "value": np.where(done[:, None], found["value"], np.nan),
+        "standard_error": np.where(done[:, None], found["standard_error"], np.nan),
+        "converged": done & (found["standard_error"][:, 0] <= options["tol"]),
+        "outcome": found["outcome"].astype(np.int8),
+    }
+
+
+# --- where a run ends, and how
+
+
+def _run_options(model: Model, given: Mapping[str, Any]) -> Options:
+    chosen = _chosen(given, {"t": None, "rtol": 1e-9, "atol": 1e-12})
+    if chosen["t"] is None:
+        raise ModelError("the option t, the length of the runs, must be given")
+    return {**chosen, "t": number("t", chosen["t"], above=0.0)}
+
+
+def _outcome_variables(model: Model) -> tuple[Variable, ...]:
+    return (Variable("t_end", _time_unit(model), "time at which the run ended"),)
+
+
+def _state_variables(model: Model) -> tuple[Variable, ...]:
+    columns = zip(model.state_names, model.state_units, strict=True)
+    ends = (Variable(f"final_{name}", unit or "1", f"{name} at the end") for name, unit in columns)
+    return (*_outcome_variables(model), *ends)
+
+
+def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    off = outside_domain(model, rows, states)
+    # What starts off the wheels has left them already.
+    t_end = np.where(off, 0.0, np.nan)
+    ends = np.where(off[:, None], states, np.nan)
+    outcome = np.full(len(states), EJECTED, dtype=np.int8)
+    if not off.all():
+        found = _ended(model, rows[~off], states[~off], options, threads)
+        failed = found["outcome"] == FAILED
+        t_end[~off] = np.where(failed, np.nan, found["t_end"])
+        ends[~off] = np.where(failed[:, None], np.nan, found["end"])
+        outcome[~off] = found["outcome"]
+    columns = {f"final_{name}": ends[:, k] for k, name in enumerate(model.state_names)}
+    return {"t_end": t_end, **columns, "outcome": outcome}
+
+
+def _ended(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    times, rtol, atol = np.array([0.0, options["t"]]), options["rtol"], options["atol"]
+    if "bristle" in model.state_names:
+        return _ended_one_by_one(model, rows, states, times, rtol, atol)
+    method = method_for(model, "auto", rtol)
+    found = _core.ensemble(model, rows, states, times, rtol, atol, method, threads)
+    if (found["outcome"] == INTERRUPTED).any():
+        raise KeyboardInterrupt
+    return {name: found[name] for name in ("t_end", "end", "outcome")}
+
+
+def _ended_one_by_one(
+    model: Model, rows: Floats, states: Floats, times: Floats, rtol: float, atol: float
+) -> Found:
+    """For friction by bristles, which ensembles do not have."""
+    t_end, ends = np.full(len(states), np.nan), np.full(states.shape, np.nan)
+    outcome = np.full(len(states), FAILED, dtype=np.int8)
+    for k, (row, state) in enumerate(zip(rows, states, strict=True)):
+        one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
+        try:
+            run = integrated(one, times, state, rtol=rtol, atol=atol, method="auto")
+        except IntegrationError:
+            continue
+        t_end[k], ends[k], outcome[k] = run.t[-1], run.state[-1], OUTCOMES.index(run.outcome)
+    return {"t_end": t_end, "end": ends, "outcome": outcome}
+
+
+def _outcomes(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
+    found = _runs(model, rows, states, options, threads)
+    return {name: found[name] for name in ("t_end", "outcome")}
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "lyapunov": Quantity(_lyapunov_options, _lyapunov_variables, _lyapunov),
+    "spectrum": Quantity(_lyapunov_options, _spectrum_variables, _spectrum),
+    "final_state": Quantity(_run_options, _state_variables, _runs),
+    "outcome": Quantity(_run_options, _outcome_variables, _outcomes),
+}

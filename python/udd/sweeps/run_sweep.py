@@ -1,0 +1,143 @@
+"""Sweeps."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from udd.errors import IncompleteWarning, ModelError, interrupted
+
+from .chunks import grid_of
+from .executors import ChunksLost, Executor, here, spread
+from .memory_store import Memory
+from .spec import SweepSpec
+from .zarr_store import SweepStore
+
+if TYPE_CHECKING:
+    import xarray as xr
+    import zarr
+
+
+def sweep(
+    spec: SweepSpec,
+    executor: Executor | None = None,
+    store: str | os.PathLike[str] | zarr.Group | None = None,
+    *,
+    progress: bool | None = None,
+    partial: bool = False,
+) -> xr.Dataset:
+    """Compute a quantity over a grid of parameters and initial states, chunk by chunk.
+
+    Parameters
+    ----------
+    spec : SweepSpec
+        What is computed, and over which values.
+    executor : object with ``submit``, optional
+        Who does the work: a `concurrent.futures` executor of threads or of processes, Dask's
+        ``Client.get_executor()``. By default this process, chunk after chunk, on all cores.
+    store : path or zarr.Group, optional
+        Where the result is written, chunk by chunk as it is found; the workers must reach it. A sweep that
+        stopped goes on from there. Without one the result is held in memory.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+
+    Returns
+    -------
+    xarray.Dataset
+        The quantity's arrays over the axes of the sweep, with units, and the array ``outcome``. The spec is
+        among the attributes. With a store it is read when it is looked at.
+
+    Raises
+    ------
+    UddError
+        The store holds another sweep or other things, or cannot be written.
+
+    Interrupted
+        On Ctrl-C, with the dataset as its ``partial``: what is not finished is NaN with the outcome -1,
+        "not_run". The store keeps what is finished.
+
+    Warns
+    -----
+    IncompleteWarning
+        Where a chunk's workers died again and again: what is finished is returned. After Ctrl-C, where a
+        partial result was asked for.
+
+    Notes
+    -----
+    The values do not depend on the executor, the store, the chunks or the number of threads, to the last
+    bit. A chunk is a pure function of its part of the spec. It is written to its own region of the store,
+    which no other chunk shares, and then its flag in the array ``done``; so a sweep that is killed at any
+    moment and run again gives the same files.
+
+    A trajectory that fails is no error: it has an outcome other than "finished", and NaN.
+
+    A worker of an executor takes one core, so there should be as many as cores.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import udd
+    >>> spec = udd.SweepSpec("lyapunov", udd.DLE(1.0), {"w": np.linspace(0.5, 2, 4)}, options={"tol": 0.02})
+    >>> found = udd.sweep(spec)
+    >>> found["value"].sizes["w"], bool((found["standard_error"] <= 0.02).all())
+    (4, True)
+
+    Two axes, in threads, into a store; the second call finds all done.
+
+    >>> import tempfile
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> over = {"W": [0.03, 0.039], "Z": np.linspace(-0.06, 0.06, 4)}
+    >>> spec = udd.SweepSpec("outcome", udd.Disk(0.039), over, [0, 1e-3, 0, 0], {"t": 10.0}, chunk=4)
+    >>> with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as threads:
+    ...     first = udd.sweep(spec, threads, store=f"{folder}/disk.zarr").load()
+    ...     again = udd.sweep(spec, store=f"{folder}/disk.zarr").load()
+    >>> first.identical(again), dict(first.sizes)
+    (True, {'W': 2, 'Z': 4})
+    """
+    if not isinstance(spec, SweepSpec):
+        raise ModelError(f"a sweep needs a udd.SweepSpec, not {spec!r}")
+    if executor is not None and not hasattr(executor, "submit"):
+        raise ModelError(f"an executor needs a method submit, which {executor!r} lacks")
+    from tqdm import tqdm
+
+    grid = grid_of(spec)
+    # An executor has a worker for every core; alone, this process has them all.
+    threads = 0 if executor is None else 1
+    result = Memory(spec, grid, threads) if store is None else SweepStore(store, spec, grid, threads)
+    done = result.done()
+    sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
+    shown = sys.stderr.isatty() if progress is None else progress
+    why, stopped = "some of the workers do not reach the store", False
+    with tqdm(total=sum(sizes), initial=int(done @ sizes), unit="run", disable=not shown, leave=False) as bar:
+
+        def keep(chunk: int, found: Any) -> None:
+            result.keep(chunk, found)
+            bar.update(sizes[chunk])
+
+        chunks = np.flatnonzero(~done).tolist()
+        try:
+            if executor is None:
+                here(result.work, chunks, result.arguments, keep)
+            else:
+                spread(executor, result.work, chunks, result.arguments, keep)
+        except KeyboardInterrupt:
+            why, stopped = "stopped by Ctrl-C", True
+        except ChunksLost as error:
+            why = str(error)
+    missing = int((~result.done()).sum())
+    if missing:
+        message = f"{missing} of {len(grid)} chunks are not finished: {why}; {result.remedy}"
+        if stopped:
+            interrupted(result.dataset(), message, partial)
+        else:
+            warnings.warn(IncompleteWarning(message), stacklevel=2)
+    else:
+        result.tidy()
+    return result.dataset()

@@ -1,0 +1,238 @@
+"""What a sweep is: all that decides its numbers, as a value."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd._util.validation import array, number, whole
+from udd.errors import ModelError, UddError
+from udd.models import Model, require_model
+from udd.models.parameter_batch import default_state
+from udd.models.serialization import model_from_dict, model_to_dict
+from udd.simulation.trajectory import initial_state
+
+from .quantities import QUANTITIES
+
+RESULT_FORMAT = 3
+"""To be raised with every change that gives other numbers or other arrays for the same spec."""
+
+_LONGEST = 10**8  # values of an axis
+_KEYS = ("quantity", "model", "over", "state0", "options", "chunk")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepSpec:
+    """What is computed, of which model, and over which values: all that decides a sweep's numbers.
+
+    Specs are equal where their hashes are.
+
+    Parameters
+    ----------
+    quantity : {"lyapunov", "spectrum", "final_state", "outcome"}
+        What is computed of every trajectory.
+    model : Model
+        The model; what `over` names is varied in it.
+    over : mapping of str to array_like
+        One to three axes: parameters of the model (an effect's as ``"effect.name"``) or components of the
+        initial state, with their values.
+    state0 : array_like, shape (dim,), optional
+        The initial state, for the components that are not varied; by default that of :func:`udd.lyapunov`.
+    options : mapping of str to float, optional
+        "lyapunov" and "spectrum": `t`, `tol`, `transient`, `rtol` and `atol` as in :func:`udd.lyapunov`.
+        "final_state" and "outcome": the length `t` of the runs, `rtol` and `atol`; they are those of
+        :func:`udd.ensemble`.
+    chunk : int
+        How many trajectories are computed and written at once, at most.
+
+    Raises
+    ------
+    ModelError
+        An unknown name, or a value that cannot be used.
+
+    Examples
+    --------
+    >>> import udd
+    >>> spec = udd.SweepSpec("lyapunov", udd.DLE(1.0), {"w": [0.5, 1.0, 2.0]}, options={"tol": 0.01})
+    >>> spec.shape
+    (3,)
+    >>> udd.SweepSpec.from_json(spec.to_json()) == spec
+    True
+    """
+
+    quantity: str
+    model: Model
+    over: Mapping[str, ArrayLike]
+    state0: ArrayLike | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    chunk: int = 1024
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
+            raise ModelError(f"quantity must be one of {', '.join(QUANTITIES)}, not {self.quantity!r}")
+        require_model(self.model)
+        model_to_dict(self.model)
+        if not isinstance(self.over, Mapping) or not 1 <= len(self.over) <= 3:
+            raise ModelError("over must name one to three axes with their values")
+        over = {name: _axis(self.model, name, values) for name, values in self.over.items()}
+        state = initial_state(self.model, default_state(self.model) if self.state0 is None else self.state0)
+        if not isinstance(self.options, Mapping):
+            raise ModelError(f"options must be a table of names and values, not {self.options!r}")
+        options = QUANTITIES[self.quantity].options(self.model, self.options)
+        checked = {"over": over, "state0": state, "options": options, "chunk": whole("chunk", self.chunk, 1)}
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def axes(self) -> dict[str, NDArray[np.float64]]:
+        """The values along each axis."""
+        return {name: np.asarray(values) for name, values in self.over.items()}
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The number of values along each axis."""
+        return tuple(len(values) for values in self.axes.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain data; equally spaced values as their ends and number."""
+        return {
+            "quantity": self.quantity,
+            "model": model_to_dict(self.model),
+            "over": [{"name": name, **_values_to_dict(values)} for name, values in self.axes.items()],
+            "state0": np.asarray(self.state0).tolist(),
+            "options": dict(self.options),
+            "chunk": self.chunk,
+        }
+
+    def to_json(self) -> str:
+        """All of it as JSON, always in the same words."""
+        return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> SweepSpec:
+        """The spec in plain data; `over` may also be a table of names and values.
+
+        Raises
+        ------
+        ModelError
+            Something is missing, unknown or unusable.
+        """
+        if not isinstance(data, Mapping):
+            raise ModelError(f"a sweep must be a table of names and values, not {data!r}")
+        for key in data:
+            if key not in _KEYS:
+                raise ModelError(f"a sweep has no {key!r}; it has {', '.join(_KEYS)}")
+        for key in _KEYS[:3]:
+            if key not in data:
+                raise ModelError(f"the sweep does not say its {key}")
+        over = data["over"]
+        if isinstance(over, list) and all(
+            isinstance(axis, dict) and isinstance(axis.get("name"), str) for axis in over
+        ):
+            if len({axis["name"] for axis in over}) < len(over):
+                raise ModelError("over names an axis twice")
+            over = {axis["name"]: {k: v for k, v in axis.items() if k != "name"} for axis in over}
+        if not isinstance(over, Mapping):
+            raise ModelError(f"over must be a table of names and values, not {over!r}")
+        axes = {name: _values_from(name, values) for name, values in over.items()}
+        more = {key: data[key] for key in _KEYS[3:] if key in data}
+        return cls(data["quantity"], model_from_dict(data["model"]), axes, **more)
+
+    @classmethod
+    def from_json(cls, text: str) -> SweepSpec:
+        """The spec in JSON.
+
+        Raises
+        ------
+        ModelError
+            It is not JSON, or not of a sweep.
+        """
+        try:
+            data = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise ModelError(f"the sweep is not in JSON: {error}") from None
+        return cls.from_dict(data)
+
+    @classmethod
+    def read(cls, path: str | Path) -> SweepSpec:
+        """The spec in a file: TOML where its name ends so, otherwise JSON.
+
+        Raises
+        ------
+        UddError
+            The file cannot be read or understood; the sentence names it.
+        """
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+            return cls.from_dict(tomllib.loads(text)) if Path(path).suffix == ".toml" else cls.from_json(text)
+        except OSError as error:
+            raise UddError(f"{path} cannot be read: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:  # ours, or what is no UTF-8 or no TOML
+            raise UddError(f"{path}: {error}") from None
+
+    @cached_property
+    def sha256(self) -> str:
+        """The hash of the spec and of the format of results."""
+        return hashlib.sha256(f"udd sweep {RESULT_FORMAT} {self.to_json()}".encode()).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SweepSpec) and self.sha256 == other.sha256
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
+
+    def __repr__(self) -> str:
+        axes = ", ".join(
+            f"{name}: {len(values)} from {values[0]:g} to {values[-1]:g}"
+            for name, values in self.axes.items()
+        )
+        return f"<SweepSpec: {self.quantity} of {self.model!r} over {axes}>"
+
+
+def _axis(model: Model, name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """The checked values of an axis, as an array of its own that stays as it is."""
+    if name not in (*model.parameters, *model.state_names):
+        known = ", ".join((*model.parameters, *model.state_names))
+        raise ModelError(f"nothing of this model is called {name!r}; there are {known}")
+    axis = array(f"the values of {name}", values).copy()
+    if axis.ndim != 1 or not len(axis):
+        raise ModelError(f"the values of {name} must be a list of at least one number")
+    if name in model.parameters:
+        effect, _, own = name.rpartition(".")
+        for value in (float(axis.min()), float(axis.max())):  # the ranges have no gaps
+            if effect:
+                spec = next(e.spec for e in model.effects if e.name == effect)
+                next(p for p in spec.parameters if p.name == own).check(effect, value, strict=False)
+            else:
+                model.replace(**{name: value})
+    axis.flags.writeable = False
+    return axis
+
+
+def _values_to_dict(values: NDArray[np.float64]) -> dict[str, Any]:
+    first, last, n = float(values[0]), float(values[-1]), len(values)
+    if n > 2 and (np.linspace(first, last, n).view(np.uint64) == values.view(np.uint64)).all():  # to the bit
+        return {"from": first, "to": last, "n": n}
+    return {"values": values.tolist()}
+
+
+def _values_from(name: str, data: Any) -> ArrayLike:
+    if not isinstance(data, Mapping):
+        return np.atleast_1d(array(f"the values of {name}", data))
+    if set(data) == {"values"}:
+        return array(f"the values of {name}", data["values"])
+    if set(data) != {"from", "to", "n"}:
+        raise ModelError(f"the values of {name} must be a list, or from, to and n")
+    if whole(f"over.{name}.n", data["n"], 1) > _LONGEST:
+        raise ModelError(f"over.{name}.n must be at most {_LONGEST}, not {data['n']}")
+    first, last = (number(f"{name} {end}", data[end]) for end in ("from", "to"))
+    return np.linspace(first, last, data["n"])

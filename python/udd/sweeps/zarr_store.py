@@ -1,0 +1,199 @@
+"""A sweep in a Zarr group: template, writing, resuming."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import UddError
+
+from .chunks import (
+    Grid,
+    Part,
+    attributes,
+    compute,
+    coordinate_attributes,
+    fill_of,
+    part_of,
+    spec_attributes,
+    variables_of,
+)
+from .spec import SweepSpec
+
+if TYPE_CHECKING:
+    import xarray as xr
+    import zarr
+
+_HASH = "spec_sha256"
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a chunk is written; travels to whoever does the work."""
+
+    arrays: dict[str, zarr.Array[Any]]
+    done: zarr.Array[Any]
+    region: tuple[slice, ...]
+    place: tuple[int, ...]
+
+
+def compute_and_write(part: Part, threads: int, target: Target) -> None:
+    """The work on a chunk, written to the store, and only then its flag.
+
+    A process that is killed on the way leaves no flag, so that the chunk is computed again. Every Zarr
+    chunk belongs to one chunk of the work, and a local store puts each into place whole.
+    """
+    for name, values in compute(part, threads).items():
+        target.arrays[name][target.region] = values
+    target.done[target.place] = True
+
+
+class SweepStore:
+    """A Zarr group with the template of a sweep, which the workers fill."""
+
+    work = staticmethod(compute_and_write)
+    remedy = "the same call goes on from here"
+
+    def __init__(
+        self, store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, grid: Grid, threads: int
+    ) -> None:
+        self._spec, self._grid, self._threads = spec, grid, threads
+        self._group = _opened(store, spec)
+        if "done" not in self._group:  # made last
+            _make_template(self._group, spec, grid)
+        self._arrays = {v.name: _array(self._group, v.name) for v in variables_of(spec)}
+        self._done = _array(self._group, "done")
+        self._reached = False
+
+    def arguments(self, chunk: int) -> tuple[Any, ...]:
+        """What `work` takes."""
+        place = self._grid.place(chunk)
+        target = Target(self._arrays, self._done, self._grid.region(chunk), place)
+        return part_of(self._spec, self._grid, chunk), self._threads, target
+
+    def keep(self, chunk: int, _nothing: None) -> None:
+        """The worker has written it; whether to here, the first one shows."""
+        if not self._reached and not self._done[self._grid.place(chunk)]:
+            raise UddError(
+                "the workers do not write to the store that was given: it must be one that they reach"
+            )
+        self._reached = True
+
+    def done(self) -> NDArray[np.bool_]:
+        """Which chunks are finished."""
+        return np.asarray(self._done[...], dtype=bool).ravel()
+
+    def tidy(self) -> None:
+        """Remove the temporary files that killed writers left behind."""
+        root = getattr(self._group.store, "root", None)
+        if isinstance(root, Path):
+            for path in (root / self._group.path).rglob("*.partial"):
+                path.unlink(missing_ok=True)
+
+    def dataset(self) -> xr.Dataset:
+        """What is there, read when it is looked at."""
+        import xarray as xr
+
+        found: xr.Dataset = xr.open_zarr(
+            self._group.store,
+            group=self._group.path or None,
+            consolidated=False,
+            chunks=None,
+            decode_cf=False,
+            drop_variables=["done"],
+        )
+        return found
+
+
+def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec) -> zarr.Group:
+    """The group of this very sweep, made if there is none."""
+    import zarr
+
+    if isinstance(store, zarr.Group):
+        group, where = store, f"the group {store.name}"
+        if group.metadata.zarr_format != 3:
+            raise UddError(f"{where} is of Zarr format {group.metadata.zarr_format}; a sweep needs format 3")
+        if _HASH not in group.attrs and not any(True for _ in group.members()):
+            group.update_attributes(spec_attributes(spec))
+    else:
+        where = os.fspath(store)
+        place = Path(where).absolute()
+        try:
+            names = [path.name for path in place.iterdir()] if place.exists() else []
+            if "zarr.json" in names:
+                group = zarr.open_group(zarr.storage.LocalStore(place), mode="r+", zarr_format=3)
+            elif all(name.endswith(".partial") for name in names):
+                new = zarr.storage.LocalStore(place)
+                group = zarr.create_group(new, zarr_format=3, attributes=spec_attributes(spec))
+            else:
+                raise UddError(f"{where} holds other things already: a sweep needs a new or an empty folder")
+        except (OSError, zarr.errors.BaseZarrError) as error:
+            said = getattr(error, "strerror", None) or str(error)
+            raise UddError(f"{where} cannot be used for a sweep: {said}") from None
+    found = group.attrs.get(_HASH)
+    if found is None:
+        raise UddError(f"{where} holds other data already: a sweep needs a place of its own")
+    if found != spec.sha256:
+        raise UddError(
+            f"{where} holds another sweep ({str(found)[:12]}, not {spec.sha256[:12]}): "
+            "take another place, or the spec that it was begun with"
+        )
+    return group
+
+
+def _make_template(group: zarr.Group, spec: SweepSpec, grid: Grid) -> None:
+    """All arrays with their fill values; the flags last, so that their presence says that all is there."""
+    from zarr.codecs import ZstdCodec
+
+    names = tuple(spec.over)
+
+    def make(name: str, **more: Any) -> zarr.Array[Any]:
+        # Said in full, so that no setting of the user's changes the bytes.
+        codecs: dict[str, Any] = {"compressors": (ZstdCodec(level=3),), "filters": (), "serializer": "auto"}
+        return group.create_array(name, overwrite=True, **codecs, **more)
+
+    for name, values in spec.axes.items():
+        coordinate = make(
+            name,
+            shape=values.shape,
+            chunks=values.shape,
+            dtype="float64",
+            fill_value=float("nan"),
+            dimension_names=(name,),
+            attributes=coordinate_attributes(spec, name),
+        )
+        coordinate[:] = values
+    for variable in variables_of(spec):
+        lengths = tuple(n for _, n in variable.more)
+        make(
+            variable.name,
+            shape=(*grid.shape, *lengths),
+            chunks=(*grid.box, *lengths),
+            dtype=variable.dtype,
+            fill_value=fill_of(variable),
+            dimension_names=(*names, *(name for name, _ in variable.more)),
+            attributes=attributes(variable),
+        )
+    make(
+        "done",
+        shape=grid.counts,
+        chunks=(1,) * len(names),
+        dtype="bool",
+        fill_value=False,
+        dimension_names=tuple(f"chunk of {name}" for name in names),
+        attributes={"long_name": "whether the chunk is finished"},
+    )
+
+
+def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+    import zarr
+
+    found = group.get(name)
+    if not isinstance(found, zarr.Array):
+        raise UddError(f"the store's array {name!r} is missing: something has changed it")
+    return found

@@ -1,0 +1,127 @@
+"""What is known of a film, from a TOML file."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from udd.markers.layout import read_bob, read_layout
+from udd.markers.tags import is_tags, read_tags
+from udd.video.reader import TrackError
+
+from .setup import read_apart, read_calibrate, read_region, read_sigma
+
+Config = str | os.PathLike[str] | Mapping[str, Any]
+
+
+def settings(config: Config, **given: Any) -> dict[str, Any]:
+    """Arguments of `udd.track`: those of a config, and those given (not None), which win.
+
+    Parameters
+    ----------
+    config : path or mapping
+        A TOML file, or what would stand in one: ``disk_radius``, ``mark_distance`` [m], ``fps`` [1/s],
+        ``pivot`` (two numbers [pixels]), ``refine`` (true or false), ``scale`` [pixels per metre],
+        ``region`` (four numbers [pixels]), ``layout`` (a list of marks, each with ``at`` and ``colour``),
+        ``calibrate`` (a table of what is to be found in the film), ``sigma`` (a table of standard errors of
+        what is said), ``apart`` (numbers of two marks, and their distance [m]), ``bob`` (a colour),
+        ``length`` [m].
+    **given
+        The same by name; None is not given.
+
+    Raises
+    ------
+    TrackError
+        No such file, no TOML, a key that there is not, or a value of the wrong kind.
+
+    Examples
+    --------
+    >>> settings({"disk_radius": 0.08, "pivot": [275, 310.5]}, disk_radius=0.075)
+    {'disk_radius': 0.075, 'pivot': (275.0, 310.5)}
+    """
+    where, said = as_said(config)
+    found = {}
+    for key, value in said.items():
+        if key not in _KINDS:
+            raise TrackError(f"{where}: there is no setting {key!r}; there are {', '.join(_KINDS)}")
+        kind, read = _KINDS[key]
+        try:
+            found[key] = read(value)
+        except TrackError as error:
+            raise TrackError(f"{where}: {error}") from None
+        except (TypeError, ValueError, OverflowError):
+            raise TrackError(f"{where}: {key} must be {kind}, not {value!r}") from None
+    return {**found, **{key: value for key, value in given.items() if value is not None}}
+
+
+def as_said(config: Config) -> tuple[str, Mapping[str, Any]]:
+    """The name of a config, and what stands in it, unread."""
+    if isinstance(config, Mapping):
+        return "config", config
+    if not isinstance(config, str | os.PathLike):
+        raise TrackError(f"config must be a file or a table of names and values, not {config!r}")
+    return _read(Path(config))
+
+
+def _read(path: Path) -> tuple[str, dict[str, Any]]:
+    try:
+        return str(path), tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TrackError(f"{path} cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # no TOML, or no UTF-8
+        raise TrackError(f"{path} is not a TOML file: {error}") from None
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TypeError
+    return float(value)
+
+
+def _positive(value: Any) -> float:
+    if not _number(value) > 0:
+        raise ValueError
+    return float(value)
+
+
+def _place(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list | tuple):
+        raise TypeError
+    u, v = value
+    return _number(u), _number(v)
+
+
+def _switch(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError
+    return value
+
+
+def _bob(value: Any) -> Any:
+    read_bob(value)
+    return value
+
+
+def _layout(value: Any) -> Any:
+    return read_tags(value) if is_tags(value) else read_layout(value)
+
+
+_KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "disk_radius": ("a positive number of metres", _positive),
+    "mark_distance": ("a positive number of metres", _positive),
+    "fps": ("a positive number of frames per second", _positive),
+    "pivot": ("two numbers of pixels [u, v]", _place),
+    "refine": ("true or false", _switch),
+    "scale": ("a positive number of pixels per metre", _positive),
+    "region": ("four numbers of pixels [u0, v0, u1, v1]", read_region),
+    "layout": ("a list of marks", _layout),
+    "calibrate": ("a table", read_calibrate),
+    "sigma": ("a table of standard errors", read_sigma),
+    "apart": ("two marks' numbers and a distance", read_apart),
+    "bob": ("the colour of a pendulum's bob", _bob),
+    "length": ("a positive number of metres", _positive),
+}

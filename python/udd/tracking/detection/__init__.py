@@ -1,0 +1,1 @@
+"""Finding the disk and its marks in a frame."""

@@ -1,0 +1,172 @@
+"""Finding the disk without any hint: four coloured blobs at the corners of a square."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.markers.layout import BODY
+from udd.video.reader import Picture
+
+Complexes = NDArray[np.complex128]
+
+COLOURS = ("red", "orange", "blue", "green")  # clockwise on the disk
+# Hue in the plane of the colour differences (angle of U + iV, degrees) of paper and paint in these
+# colours: from sRGB by BT.601; red and orange part at 122.
+HUES = {"red": (80.0, 122.0), "orange": (122.0, 165.0), "blue": (-70.0, 15.0), "green": (195.0, 285.0)}
+LEAST_CHROMA = 18.0  # of 127: below, grey with noise
+FADED = 8.0  # the same where no strong colours are found
+FEWEST = 3  # frames that must show the disk
+
+
+@dataclass(frozen=True)
+class Blobs:
+    """Coloured patches: centres (u + iv, pixels of the full picture) and areas (full pixels)."""
+
+    centre: Complexes
+    area: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A disk seen in a survey frame."""
+
+    centre: complex  # pixels
+    angle: float  # beta [rad], not unwrapped
+    reach: float  # distance of the marks from the centre [pixels]
+    area: float  # mean area of a mark [pixels]
+
+
+@cache
+def _names(least: float) -> NDArray[np.uint8]:
+    """Number of the colour, 1 to 4 (0: none), for each pair of colour differences, (256, 256) by U and V."""
+    difference = np.arange(256.0) - 128
+    u, v = difference[:, None], difference[None, :]
+    hue = np.degrees(np.arctan2(v, u)) % 360
+    hue = np.where(hue > 285, hue - 360, hue)
+    strong = np.hypot(u, v) > least
+    names = np.zeros((256, 256), dtype=np.uint8)
+    for k, colour in enumerate(COLOURS):
+        names[strong & (hue > HUES[colour][0]) & (hue <= HUES[colour][1])] = k + 1
+    return names
+
+
+def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
+    """Connected patches of a half-resolution mask, the largest first."""
+    import cv2
+
+    codes = mask.astype(np.uint8)
+    column, row, width, height = cv2.boundingRect(codes)  # most of a picture has none of the colour
+    if not width:
+        return Blobs(np.empty(0, np.complex128), np.empty(0))
+    part = codes[row : row + height, column : column + width]
+    count, _, stats, centre = cv2.connectedComponentsWithStats(part, connectivity=8)
+    area = stats[1:count, cv2.CC_STAT_AREA]
+    order = np.argsort(-area, kind="stable")[:most]
+    order = order[area[order] >= least]
+    xy = centre[1:count][order] + [column, row]
+    # a half-resolution sample i covers the full pixels 2i and 2i + 1, whose middle is 2i + 1/2
+    return Blobs(np.asarray(2 * (xy[:, 0] + 1j * xy[:, 1]) + (0.5 + 0.5j)), np.asarray(4.0 * area[order]))
+
+
+def coloured(picture: Picture, chroma: float = LEAST_CHROMA) -> list[Blobs]:
+    """Blobs of each of the four colours, by broad hues, stronger than `chroma`."""
+    name = _names(chroma).ravel()[(picture.u.astype(np.uint16) << 8) | picture.v]
+    least = max(6, picture.u.size // 20000)
+    return [blobs(name == k + 1, least) for k in range(len(COLOURS))]
+
+
+def squares(
+    patches: list[Blobs], without: int | None = None, slack: float = 0.12
+) -> list[tuple[float, Sight]]:
+    """Quadruples of blobs that could be the marks of one disk, as (misfit, sight).
+
+    The two diagonals share their middle and their length and cross at a right angle, red, orange,
+    blue, green clockwise; the areas are alike and small against the square. `without` one of the marks, half
+    a diagonal has to do.
+    """
+    if without is not None:
+        return _corners(patches, without, slack / 2)
+    red, orange, blue, green = (b.centre for b in patches)
+    if 0 in (len(red), len(orange), len(blue), len(green)):
+        return []
+    d1 = (red[:, None] - blue[None, :]).reshape(-1, 1)
+    d2 = ((orange[:, None] - green[None, :]) / 1j).reshape(1, -1)
+    m1 = ((red[:, None] + blue[None, :]) / 2).reshape(-1, 1)
+    m2 = ((orange[:, None] + green[None, :]) / 2).reshape(1, -1)
+    size = np.abs(d1) + 1e-9
+    misfit = np.maximum(np.abs(m1 - m2) / size, np.abs(d1 - d2) / size)
+    found = []
+    for i, j in np.argwhere(misfit < slack):
+        a, c = divmod(int(i), len(blue))
+        b, d = divmod(int(j), len(green))
+        area = np.array([p.area[k] for p, k in zip(patches, (a, b, c, d), strict=True)])
+        sight = _sight(complex(m1[i, 0] + m2[0, j]) / 2, complex(d1[i, 0] + d2[0, j]) / 4, 0, area)
+        if sight is not None:
+            found.append((float(misfit[i, j]), sight))
+    return sorted(found, key=lambda item: item[0])
+
+
+def _corners(patches: list[Blobs], without: int, slack: float) -> list[tuple[float, Sight]]:
+    """Triples that could be three of the marks: a diagonal, and one mark where the other one crosses it."""
+    single, first, second = (without + 2) % 4, (without + 1) % 4, (without + 3) % 4
+    a, b, c = (patches[k].centre for k in (first, second, single))
+    if 0 in (len(a), len(b), len(c)):
+        return []
+    middle = ((a[:, None] + b[None, :]) / 2).reshape(-1, 1)
+    arm = ((a[:, None] - b[None, :]) / 2).reshape(-1, 1)
+    # a quarter turn clockwise (in u + iv) leads from one mark to the next
+    expected = middle + arm * 1j ** (single - first)
+    misfit = np.abs(c[None, :] - expected) / (2 * np.abs(arm) + 1e-9)
+    found = []
+    for i, k in np.argwhere(misfit < slack):
+        p, q = divmod(int(i), len(b))
+        area = np.array([patches[first].area[p], patches[second].area[q], patches[single].area[k]])
+        sight = _sight(complex(middle[i, 0]), complex(arm[i, 0]), first, area)
+        if sight is not None:
+            found.append((float(misfit[i, k]), sight))
+    return sorted(found, key=lambda item: item[0])
+
+
+def _sight(centre: complex, arm: complex, mark: int, area: NDArray[np.float64]) -> Sight | None:
+    """The disk with its centre and the arm to one of its marks, if the marks' areas fit."""
+    ratio = np.sqrt(area) / (2 * abs(arm) + 1e-9)
+    if area.max() > 4 * area.min() or ratio.max() > 0.4 or ratio.min() < 0.02:
+        return None
+    angle = float(np.angle(arm / BODY[mark]))
+    return Sight(centre, angle, abs(arm), float(area.mean()))
+
+
+def sightings(pictures: list[Picture]) -> tuple[list[Sight | None], int | None]:
+    """The disk in each picture where its marks can be told, None elsewhere; and the mark that is missing.
+
+    Strong colours are looked for first, then faded ones, then three marks instead of four.
+    """
+    best: tuple[list[Sight | None], int | None] = ([None] * len(pictures), None)
+    for chroma in (LEAST_CHROMA, FADED):
+        patches = [coloured(p, chroma) for p in pictures]
+        for without in (None, 0, 1, 2, 3):
+            sights = agreeing([squares(p, without) for p in patches])
+            if _count(sights) > (1 if without is None else 2) * max(_count(best[0]), FEWEST - 1):
+                best = sights, without
+            if _count(best[0]) >= max(FEWEST, len(pictures) // 10):
+                return best
+    return best
+
+
+def _count(sights: list[Sight | None]) -> int:
+    return sum(s is not None for s in sights)
+
+
+def agreeing(everything: list[list[tuple[float, Sight]]]) -> list[Sight | None]:
+    """One sight a picture, of the size that most agree on: the camera stands still."""
+    reaches = np.array([s.reach for found in everything for _, s in found[:20]])
+    weight = np.array([1 / (0.01 + misfit) for found in everything for misfit, _ in found[:20]])
+    if not len(reaches):
+        return [None] * len(everything)
+    near = np.abs(np.log(reaches[:, None] / reaches[None, :])) < 0.03
+    reach = float(reaches[np.argmax(near @ weight)])
+    return [next((s for _, s in found if abs(np.log(s.reach / reach)) < 0.04), None) for found in everything]

@@ -1,0 +1,1 @@
+"""How a pose of the disk looks in a picture."""

@@ -1,0 +1,156 @@
+"""From pixels to metres: scale, contact point, honest errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.markers.layout import STANDARD
+from udd.measurement import Measurement
+from udd.tracking.geometry.lens import PLAIN, Lens
+from udd.tracking.passes.first_pass import Tracks
+
+Array = NDArray[np.float64]
+OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
+NEAR_EDGE = 0.8  # of the radius; a disk that was last seen farther in is lost, not gone
+LEAP = 3.0  # times as fast as nearly all the time; a disk near its edge that moves so has been let go
+FAR = 0.02  # of the radius, that a leap goes at least
+LONG = 1.0  # s: over a longer gap the rate may have done anything
+
+
+@dataclass(frozen=True)
+class Camera:
+    """How the picture maps to the plane of the disk."""
+
+    scale: float  # pixels per metre
+    scale_sigma: float
+    scale_from: str  # "marks", "rim" or both
+    pivot: complex  # contact point [pixels, u + iv]
+    pivot_sigma: float  # [m]
+    pivot_from: str  # "rolling constraint", "support" or "given"
+    drive: complex  # velocity of the driven material that goes with it [m/s, Y + iZ], NaN if unknown
+    drive_sigma: float = np.nan
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """Where to draw the fitted disk in the picture (pixels: u to the right, v down; NaN where not seen)."""
+
+    centre: Array  # (n, 2)
+    angle: Array  # (n,) beta [rad]
+    marks: Array  # (n, marks, 2); of the standard disk red, orange, blue, green
+    rim: Array  # (n, 73, 2): a closed line; a circle but for tilt and lens
+    radius: float
+    pivot: Array  # (2,)
+    scale: float  # pixels per metre
+    colours: tuple[tuple[int, int, int], ...]  # of the marks, sRGB
+
+
+def pixels(m: Measurement) -> Pixels:
+    """The fitted disk in picture coordinates, from what a tracked measurement says about its camera.
+
+    Parameters
+    ----------
+    m : Measurement
+        From `udd.track`, or read back from its file.
+
+    Raises
+    ------
+    KeyError
+        The measurement does not come from a film.
+    """
+    if m.kind == "pendulum":
+        return _of_pendulum(m)
+    scale = float(m.meta["px_per_m"])
+    pivot = complex(float(m.meta["pivot_u"]), float(m.meta["pivot_v"]))
+    bent = [float(x) for x in m.meta["lens"]]
+    lens = Lens(complex(bent[0], bent[1]), *bent[2:]) if bent else PLAIN
+    places = np.array(m.meta["marks_px"], dtype=float) @ [1, 1j]
+    radius = scale * float(m.meta["R"])
+    said = m.meta.get("marks_rgb", STANDARD.colours)  # an older file says nothing
+    colours = tuple((int(r), int(g), int(b)) for r, g, b in said)
+    ring = radius * np.exp(2j * np.pi * np.arange(73) / 72)
+    centre = pivot + scale * (m["Y"] - 1j * m["Z"])
+    marks = centre[:, None] + places * np.exp(1j * m["beta"])[:, None]
+
+    def show(z: Any) -> Array:
+        at = lens.picture(z)
+        return np.stack([at.real, at.imag], axis=-1)
+
+    rim = show(centre[:, None] + ring)
+    return Pixels(show(centre), m["beta"], show(marks), rim, radius, show(np.array(pivot)), scale, colours)
+
+
+def _of_pendulum(m: Measurement) -> Pixels:
+    """The bob as a disk whose one mark is its middle."""
+    pivot = np.array([float(m.meta["pivot_u"]), float(m.meta["pivot_v"])])
+    long, radius, theta = float(m.meta["length_px"]), float(m.meta["bob_px"]), m["theta"]
+    centre = pivot + long * np.column_stack([np.sin(theta), np.cos(theta)])
+    ring = 2 * np.pi * np.arange(73) / 72
+    rim = centre[:, None] + radius * np.column_stack([np.cos(ring), np.sin(ring)])
+    (red, green, blue), *_ = m.meta["marks_rgb"]
+    scale = float(m.meta["px_per_m"] or np.nan)
+    return Pixels(
+        centre, theta, centre[:, None], rim, radius, pivot, scale, ((int(red), int(green), int(blue)),)
+    )
+
+
+def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array, Array]:
+    """Values (n, 3), standard errors (n, 3) and correlations (n, 3) of Y, Z [m] and beta [rad]."""
+    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
+    away = (centre - camera.pivot) / camera.scale
+    values = np.column_stack([away.real, -away.imag, angle])
+    to = np.array([1 / camera.scale, -1 / camera.scale, 1.0])
+    c = covariance * to[:, None] * to[None, :]
+    sigma = np.sqrt(np.einsum("nii->ni", c))
+    rho = np.stack([c[:, a, b] / (sigma[:, a] * sigma[:, b]) for a, b in ((0, 1), (0, 2), (1, 2))], axis=1)
+    return values, sigma, np.clip(rho, -0.999999, 0.999999)
+
+
+def left_the_wheels(t: Array, values: Array, radius: float, pivot_sigma: float) -> NDArray[np.bool_]:
+    """Frames from the one on in which the disk is held no more.
+
+    The contact lies outside of it then, or leaps: of a disk that rolls d(Y^2 + Z^2)/dT = 2 W Z, so that its
+    distance changes no faster than the wheels turn. Also those after the last in which the disk was seen,
+    where the contact was near its edge.
+    """
+    gone = np.zeros(len(values), dtype=bool)
+    away = np.hypot(values[:, 0], values[:, 1])
+    outside = away > radius * (1 + OUTSIDE) + 3 * pivot_sigma
+    seen = np.flatnonzero(np.isfinite(away))
+    if len(seen) > 1:
+        change, time = np.abs(np.diff(away[seen])), np.diff(t[seen])
+        most = np.maximum(LEAP * float(np.quantile(change / time, 0.95)) * time, FAR * radius)
+        outside[seen[1:]] |= (away[seen[:-1]] > NEAR_EDGE * radius) & (change > most)
+    if outside.any():
+        gone[np.argmax(outside) :] = True
+    elif len(seen) and away[seen[-1]] > NEAR_EDGE * radius and len(away) - seen[-1] > 3:
+        gone[seen[-1] + 1 :] = True
+    return gone
+
+
+def recount(t: Array, angle: Array) -> tuple[Array, int]:
+    """Whole turns across gaps, from the rates of turning on both sides; how many gaps leave doubt.
+
+    A frame shows the angle but for whole turns. Across a gap the mean of the rates before and after
+    decides; where they differ by so much that it could be off by half a turn, the gap is doubtful.
+    """
+    angle, doubtful = angle.copy(), 0
+    seen = np.flatnonzero(np.isfinite(angle))
+    if len(seen) < 4:
+        return angle, doubtful
+    usual = float(np.median(np.diff(t)))
+    for k in range(1, len(seen) - 2):
+        i, j = seen[k], seen[k + 1]
+        gap = t[j] - t[i]
+        if gap < 3.5 * usual:
+            continue
+        before = (angle[i] - angle[seen[k - 1]]) / (t[i] - t[seen[k - 1]])
+        after = (angle[seen[k + 2]] - angle[j]) / (t[seen[k + 2]] - t[j])
+        expected = 0.5 * (before + after) * gap
+        angle[j:] += 2 * np.pi * np.round((expected - (angle[j] - angle[i])) / (2 * np.pi))
+        doubtful += bool(abs(after - before) * gap / 4 > np.pi / 2 or gap > LONG)
+    return angle, doubtful

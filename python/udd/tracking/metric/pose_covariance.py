@@ -1,0 +1,77 @@
+"""How large the errors of a pose are, judged by how well the marks of one disk agree with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.geometry.pose import DiskAppearance
+from udd.tracking.passes.first_pass import Tracks
+
+from .streak_errors import left_over, unit_covariance
+
+Array = NDArray[np.float64]
+OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not speak for the others
+ALIKE = 1000.0  # coordinates that stand for a usual frame where frames differ by no more than chance
+GROUP = 40  # frames with like streaks from which their usual disagreement is taken
+
+
+def covariance(tracks: Tracks, look: DiskAppearance) -> Array:
+    """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad, of what moves each mark for itself.
+
+    The fit's own covariance assumes independent pixels of known noise. Compression, lens and light
+    are neither; the marks' disagreement shows by how much, along their streaks and across: a rigid disk
+    leaves 2 m - 3 of the 2 m coordinates of m marks over.
+    """
+    off, used = left_over(tracks), np.isfinite(np.array(tracks.chi2))
+    spare = np.maximum(2 * used.sum(axis=1) - 3, 0)
+    chi2 = np.einsum("nmi,nmij,nmj->nm", off, np.array(tracks.marks, dtype=float), off)
+    total = np.where(used, chi2, 0.0).sum(axis=1)
+    usual, belief, group = _usual(total, spare, np.array(tracks.streak))
+    # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
+    inflation = (belief * usual + total) / (belief + spare)
+    return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, off, group))
+
+
+def with_causes(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
+    """The covariance with causes that move all marks together, the centre known to so much.
+
+    Where the centre is among the marks only the rim says; what it is off by turns with the disk. `shared`
+    are standard errors (n, 3) of u, v and beta, signed alike.
+    """
+    out = covariance + np.diag([centre_sigma**2, centre_sigma**2, 0.0])
+    for cause in shared:
+        out = out + cause[:, :, None] * cause[:, None, :]
+    return np.asarray(out)
+
+
+def _usual(total: Array, spare: NDArray[np.int_], streak: Array) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Misfit per spare coordinate of frames with like streaks, the coordinates that is worth, their group.
+
+    Of a variance that itself is drawn anew for each frame, 1 / variance being gamma distributed, the mean
+    given a frame's misfit is that of both, and the less they scatter the more the usual one counts.
+    """
+    out, belief = np.ones(len(total)), np.full(len(total), ALIKE)
+    which = np.full(len(total), -1)
+    known = np.flatnonzero(spare > 0)
+    order = known[np.argsort(streak[known], kind="stable")]
+    groups = np.array_split(order, max(1, min(6, len(order) // GROUP))) if len(order) else []
+    for number, group in enumerate(groups):
+        each = total[group] / spare[group]
+        most = OUTLIER * float(np.median(each))
+        each = np.minimum(each, most)
+        level = float(np.sum(each * spare[group]) / spare[group].sum())
+        out[group], belief[group], which[group] = level, _belief(each / level, spare[group]), number
+    return out, belief, which
+
+
+def _belief(each: Array, spare: NDArray[np.int_]) -> float:
+    """By moments, from misfits per spare coordinate with the mean 1: chance alone scatters them by 2 / spare.
+
+    A variance with relative scatter s has 1 / s more than 2 of its inverse's degrees of freedom in doubles.
+    """
+    chance = float(np.mean(2 / spare))
+    scatter = (float(np.mean((each - 1) ** 2)) - chance) / (1 + chance)
+    return min(2 + 2 / scatter, ALIKE) if scatter > 0 else ALIKE

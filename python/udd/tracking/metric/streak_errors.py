@@ -1,0 +1,99 @@
+"""Errors along a mark's streak and across it, told apart by what the marks of one disk leave over."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.geometry.pose import DiskAppearance, moved_by_pose
+from udd.tracking.passes.first_pass import Tracks
+from udd.tracking.passes.second_pass import LocalMotion
+
+Array = NDArray[np.float64]
+OUTLIER = 6.0  # times the median square; a mark beyond does not speak for the others
+LEAST = 0.05  # share of the misfit that either direction has at least
+
+
+def left_over(tracks: Tracks) -> Array:
+    """What each mark is off, (n, marks, 2), without what it is off in all frames: that is its place."""
+    turn = np.exp(1j * np.array(tracks.angle))[:, None]
+    off = np.array(tracks.leftover) @ np.array([1, 1j]) * turn.conj()
+    seen = np.isfinite(off).any(axis=0)
+    off[:, seen] -= np.nanmedian(off[:, seen].real, axis=0) + 1j * np.nanmedian(off[:, seen].imag, axis=0)
+    off *= turn
+    return np.stack([off.real, off.imag], axis=-1)
+
+
+def unit_covariance(tracks: Tracks, look: DiskAppearance, off: Array, group: NDArray[np.int_]) -> Array:
+    """Covariance (n, 3, 3) of (u, v, beta) for a misfit of 1 per coordinate that is left over.
+
+    Along its streak a mark fades over many pixels, and errors that many pixels share, as those of
+    compression, light and blur are, move it further there than the noise of single pixels lets expect.
+    `off` is what the marks leave over.
+    `group` numbers the frames (below 0: none) whose streaks are so alike that the ratio is taken to be, too.
+    """
+    out = np.full((len(tracks.t), 3, 3), np.nan)
+    around = LocalMotion(tracks)
+    held = np.isfinite(np.array(tracks.information)).all(axis=(1, 2))
+    for number in np.unique(group[group >= 0]):
+        members = [int(k) for k in np.flatnonzero((group == number) & held)]
+        frames = [_marks(tracks, look, off, around, k) for k in members]
+        ratio = _ratio([f for f in frames if f is not None])
+        for k, frame in zip(members, frames, strict=True):
+            out[k] = np.linalg.inv(tracks.information[k]) if frame is None else _covariance(frame[0], ratio)
+    return out
+
+
+def _marks(
+    tracks: Tracks, look: DiskAppearance, off: Array, around: LocalMotion, k: int
+) -> tuple[Array, Array] | None:
+    """How the pose moves a frame's marks, (2 marks, 3), and what they are off, (2 marks,).
+
+    Each mark has a row along its streak and one across, both in units of the noise assumed. None where it is
+    not known whither the marks move.
+    """
+    here = around.at(k)
+    used = np.isfinite(tracks.chi2[k])
+    if here is None or used.sum() < 2:
+        return None
+    arm = look.places[used] * np.exp(1j * tracks.angle[k])
+    moving = here.rate + 1j * here.spin * arm
+    if not np.abs(moving).all():
+        return None
+    way = moving / np.abs(moving)
+    axes = np.stack([way.real, way.imag, -way.imag, way.real], axis=-1).reshape(-1, 2, 2)
+    values, vectors = np.linalg.eigh(axes @ tracks.marks[k][used].astype(float) @ axes.transpose(0, 2, 1))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :] @ vectors.transpose(0, 2, 1) @ axes
+    design = (root @ moved_by_pose(arm)).reshape(-1, 3)
+    return design, (root @ off[k][used][..., None]).ravel()
+
+
+def _left(design: Array) -> Array:
+    """What is left of each coordinate's error, and what others add, when the pose has taken its part."""
+    return np.asarray(np.eye(len(design)) - design @ np.linalg.solve(design.T @ design, design.T))
+
+
+def _ratio(frames: list[tuple[Array, Array]]) -> Array:
+    """Misfit along streaks and across them, with the mean 1: the variances that make both squares."""
+    if not frames:
+        return np.ones(2)
+    squares = np.concatenate([(off**2).reshape(-1, 2) for _, off in frames])
+    most = OUTLIER * np.median(squares, axis=0)
+    found = np.minimum(squares, most).sum(axis=0)
+    made = np.zeros((2, 2))
+    for design, _ in frames:
+        marks = len(design) // 2
+        made += (_left(design) ** 2).reshape(marks, 2, marks, 2).sum(axis=(0, 2))
+    if np.linalg.cond(made) > 1e3:  # too few marks to tell
+        return np.ones(2)
+    each = np.linalg.solve(made, found)
+    each = np.maximum(each, LEAST * each.max())
+    return np.asarray(each / each.mean())
+
+
+def _covariance(design: Array, ratio: Array) -> Array:
+    """Of the pose that took coordinates for as good as assumed, at a misfit of 1 per spare coordinate."""
+    variance = np.tile(ratio, len(design) // 2)
+    solved = np.linalg.solve(design.T @ design, design.T)
+    spare = len(design) - 3
+    return np.asarray((solved * variance) @ solved.T * spare / (np.diag(_left(design)) @ variance))

@@ -1,0 +1,318 @@
+"""The first pass: the disk is followed from frame to frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.calibration.rolling_shutter import Readout
+from udd.tracking.detection.candidates import candidates, classify
+from udd.tracking.detection.frame_flags import REPEATED, lost, unusable
+from udd.tracking.geometry.contact_point import Contact
+from udd.tracking.geometry.lens import Bent
+from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
+from udd.tracking.marks.localization import MISFIT
+from udd.tracking.marks.pose_fit import Fit, align
+from udd.video.reader import Picture
+
+Array = NDArray[np.float64]
+CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
+FAR = [2.0, 1.0, MISFIT, MISFIT, MISFIT]  # rounds from blobs, good to ten
+MOST_OFF = 2.0  # pixels by which a mark may disagree with the others before it is left out
+STREAK_OFF = 0.05  # more for a streak, per pixel of its length
+FRESH = 0.15  # s: how long the last pose tells where to look
+MOST_TRIED = 3  # starting poses
+FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
+STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
+BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
+SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
+COPIED = 10  # codes by which a copy may differ
+UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
+
+
+@dataclass
+class Tracks:
+    """What the pictures say, frame by frame, in pixels and radians."""
+
+    t: list[float]
+    centre: list[complex]
+    angle: list[float]  # unwrapped
+    information: list[Array]  # (3, 3) of (u, v, beta) for the assumed pixel noise
+    leftover: list[Array]  # (marks, 2) misfit of each [pixels], NaN where not used
+    chi2: list[Array]  # (marks,)
+    marks: list[Array]  # (marks, 2, 2) information of (u, v) of each, of the pose's, 0 where not used
+    complete: list[Array]  # (marks,) share of each mark's edges in view
+    streak: list[float]  # blur length at the marks [pixels]
+    flag: list[str]
+    method: list[str]  # "fast" or "refined", empty where the disk was not held
+
+
+@dataclass
+class TrackerState:
+    """All that is known before the loop starts."""
+
+    look: DiskAppearance
+    view: NDArray[np.bool_]
+    colours: Array
+    exposure: float  # [s]
+    white: float  # brightness code of the bare disk
+    contact: Contact | None
+    readout: Readout
+    exposure_sigma: float = np.inf
+    bent: Bent | None = None  # the lens with its uncertainty
+
+
+@dataclass(frozen=True)
+class PoseSample:
+    """A frame in which the disk was held."""
+
+    t: float
+    pose: Pose
+    rate: float  # of turning [rad/s]
+
+
+def follow(
+    pictures: Iterable[Picture],
+    known: TrackerState,
+    tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
+) -> Tracks:
+    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held.
+
+    After each picture `tick` is told where the disk is in it, NaN where it is not held.
+    """
+    tracks = Tracks(*([] for _ in fields(Tracks)))
+    past: list[PoseSample] = []
+    last: NDArray[np.uint8] | None = None
+    for picture in pictures:
+        flag, fit, pose, motion = _one(picture, known, past, last)
+        last = picture.y
+        append(tracks, picture.t, flag, fit, pose, known.look.streak(motion), len(known.look.marks))
+        if fit is not None:
+            past = [*past[-2:], PoseSample(picture.t, pose, motion.spin)]
+        tick(picture, pose)
+    return tracks
+
+
+def _one(
+    picture: Picture, known: TrackerState, past: list[PoseSample], last: NDArray[np.uint8] | None
+) -> tuple[str, Fit | None, Pose, Motion]:
+    nowhere = Pose(complex(np.nan, np.nan), np.nan)
+    flag = unusable(picture)
+    if flag:
+        return flag, None, nowhere, Motion()
+    guess = predict(past, picture.t, known.contact)
+    if last is not None and guess is not None and repeats(picture.y, last, guess, past[-1].pose, known.look):
+        return REPEATED, None, nowhere, Motion()
+    if guess is not None and picture.t - past[-1].t < FRESH:
+        pose = Pose(guess.centre, guess.angle)
+        motion = _motion(past, guess, picture.t, known)
+        fit = hold(picture, known, pose, motion, CLOSE)
+        if fit is not None:
+            better = _motion(past, pose, picture.t, known)
+            if abs(known.look.streak(better) - known.look.streak(motion)) > 0.3:
+                motion = better
+                fit = hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
+            return "", fit, pose, motion
+    best = _anywhere(picture, known, guess, past)
+    if best is None:
+        return lost("fewer than two marks agree"), None, nowhere, Motion()
+    fit, pose, motion = best
+    return "", fit, pose, motion
+
+
+def hold(
+    picture: Picture, known: TrackerState, pose: Pose, motion: Motion, rounds: list[float]
+) -> Fit | None:
+    """Align and check; a mark that disagrees with three others is left out."""
+    most_off = MOST_OFF + STREAK_OFF * known.look.streak(motion)
+    start = Pose(pose.centre, pose.angle)
+    fit = align(picture.y, known.view, known.look, pose, motion, rounds)
+    if fit is not None and fit.used.sum() >= 4 and _worst(fit)[1] > most_off:
+        pose.centre, pose.angle = start.centre, start.angle
+        fit = align(picture.y, known.view, known.look, pose, motion, rounds, without=_worst(fit)[0])
+    if fit is None or fit.moved > 0.5 + 0.1 * most_off or _worst(fit)[1] > most_off:
+        return None
+    return fit if _on_the_disk(picture, known, pose) else None
+
+
+def _worst(fit: Fit) -> tuple[int, float]:
+    off = np.where(fit.used, np.hypot(*fit.step.leftover.T), 0.0)
+    k = int(np.argmax(off))
+    return k, float(off[k])
+
+
+def _on_the_disk(picture: Picture, known: TrackerState, pose: Pose) -> bool:
+    """Whether the disk is where the marks say: bare and bright inside the square of the marks."""
+    look = known.look
+    half = np.hypot(*look.marks[0].half)
+    inner = 0.7 * (look.reach - half) * BARE
+    marks = look.places * np.exp(1j * pose.angle)
+    bare = np.abs(inner[:, None] - marks[None, :]).min(axis=1) > 1.2 * half  # of the standard marks all
+    points = look.lens.picture(pose.centre + inner[bare])
+    r, c = np.round(points.imag).astype(int), np.round(points.real).astype(int)
+    height, width = picture.y.shape
+    ok = (r >= 0) & (r < height) & (c >= 0) & (c < width)
+    r, c = r[ok], c[ok]
+    clear = known.view[r, c]
+    if clear.sum() < 5:
+        return True
+    level = picture.y[r[clear], c[clear]].astype(float)
+    return bool(np.mean(np.abs(level - known.white) < 0.2 * known.white) > 0.7)
+
+
+def _anywhere(
+    picture: Picture, known: TrackerState, guess: Pose | None, past: list[PoseSample]
+) -> tuple[Fit, Pose, Motion] | None:
+    """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
+    shape = picture.y.shape
+    reach = known.look.reach
+    box = (0, shape[0], 0, shape[1])
+    fresh = guess is not None and picture.t - past[-1].t < FRESH
+    if guess is not None and fresh:
+        r, at = 2.0 * reach, complex(known.look.lens.picture(guess.centre))
+        box = (
+            max(0, int(at.imag - r)),
+            min(shape[0], int(at.imag + r)),
+            max(0, int(at.real - r)),
+            min(shape[1], int(at.real + r)),
+        )
+        if box[1] - box[0] < reach or box[3] - box[2] < reach:
+            return None
+    patches = classify(picture, known.colours, known.view, box)
+    best: tuple[float, Fit, Pose, Motion] | None = None
+    for start in candidates(patches, known.look, guess if fresh else None)[:MOST_TRIED]:
+        if guess is not None:
+            start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
+        for motion in _motions(past, start, picture.t, known, fresh):
+            pose = Pose(start.centre, start.angle)
+            fit = hold(picture, known, pose, motion, FAR)
+            if fit is not None:
+                score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
+                if best is None or score > best[0]:
+                    best = (score, fit, pose, motion)
+        if best is not None:
+            break
+    return None if best is None else best[1:]
+
+
+def _motions(past: list[PoseSample], pose: Pose, t: float, known: TrackerState, fresh: bool) -> list[Motion]:
+    if fresh:
+        return [_motion(past, pose, t, known)]
+    if known.exposure <= 0:
+        return [Motion()]
+    step = 2 * STREAK_STEP / (known.look.reach * known.exposure)
+    count = int(np.ceil(FASTEST / step))
+    rates = step * np.arange(-count, count + 1)
+    if known.contact is not None:
+        return [along_contact(known, pose, r) for r in rates]
+    return [Motion(0j, r * known.exposure, spin=r) for r in rates]
+
+
+def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose | None:
+    """Where the disk will be: its angle by extrapolation, its centre by turning about the contact."""
+    if not past:
+        return None
+    last = past[-1]
+    dt = t - last.t
+    recent = [h for h in past if t - h.t < 0.5] or [last]
+    if len(recent) == 3 and dt > 1.6 * (last.t - recent[-2].t):
+        recent = recent[-2:]  # a parabola does not reach across a gap
+    times = np.array([h.t - t for h in recent])
+    weights = np.array([np.prod([-b / (a - b) for b in times if b != a]) for a in times])  # Lagrange at 0
+    if len(recent) == 1:
+        angle = last.pose.angle + last.rate * min(dt, 0.5)
+    else:
+        angle = float(weights @ np.array([h.pose.angle for h in recent]))
+    if contact is not None:
+        return Pose(contact.carry(last.pose.centre, angle - last.pose.angle, dt), angle)
+    return Pose(complex(weights @ np.array([h.pose.centre for h in recent])), angle)
+
+
+def _motion(past: list[PoseSample], pose: Pose, t: float, known: TrackerState) -> Motion:
+    """Movement during the exposure, from the derivative at `t` of the curve through the last poses."""
+    points = [h for h in past[-2:] if t - h.t < 0.5]
+    if not points:
+        return Motion()
+    t1, p1 = points[-1].t, points[-1].pose
+    shift, turn = (pose.centre - p1.centre) / (t - t1), (pose.angle - p1.angle) / (t - t1)
+    change = 0.0  # of the rate of turning [rad/s^2]
+    if len(points) == 2:
+        t0, p0 = points[0].t, points[0].pose
+        s0, a0 = (p1.centre - p0.centre) / (t1 - t0), (p1.angle - p0.angle) / (t1 - t0)
+        lean = (t - t1) / (t - t0)
+        change = 2 * (turn - a0) / (t - t0)
+        shift, turn = shift + (shift - s0) * lean, turn + (turn - a0) * lean
+    else:
+        turn = 2 * turn - points[-1].rate  # the mean rate over the step, and the rate at its beginning
+    if known.contact is None:
+        return Motion(shift * known.exposure, turn * known.exposure, rate=shift, spin=turn)
+    return along_contact(known, pose, turn, change)
+
+
+def along_contact(known: TrackerState, pose: Pose, spin: float, change: float = 0.0) -> Motion:
+    """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
+    contact, open_for = known.contact, known.exposure
+    assert contact is not None
+    rate = contact.velocity(pose.centre, spin)
+    bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
+    half = 0.5 * open_for**2
+    shift, turn = rate * open_for, spin * open_for
+    return Motion(shift, turn, bending * half, change * half, rate, spin, bending, change)
+
+
+def repeats(
+    y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before: Pose, look: DiskAppearance
+) -> bool:
+    """Whether a frame is a copy of the last although the disk should have moved."""
+    reach = look.reach
+    if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
+        return False
+    changed, size = 0, 0
+    for place in look.lens.picture(before.centre + look.places * np.exp(1j * before.angle)):
+        r, c, n = int(place.imag), int(place.real), int(SURROUNDINGS * np.hypot(*look.marks[0].half))
+        part = slice(max(0, r - n), max(0, r + n)), slice(max(0, c - n), max(0, c + n))
+        # a codec does not copy exactly, but it moves no edge
+        changed += int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED))
+        size += y[part].size
+    return size > 0 and changed < UNCHANGED
+
+
+def append(
+    tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float, marks: int
+) -> None:
+    """One more row."""
+    tracks.t.append(t)
+    tracks.flag.append(flag)
+    tracks.centre.append(pose.centre)
+    tracks.angle.append(pose.angle)
+    tracks.streak.append(streak)
+    tracks.information.append(np.full((3, 3), np.nan))
+    tracks.leftover.append(np.full((marks, 2), np.nan))
+    tracks.chi2.append(np.full(marks, np.nan))
+    tracks.marks.append(np.zeros((marks, 2, 2), dtype=np.float32))
+    tracks.complete.append(np.zeros(marks))
+    tracks.method.append("" if fit is None else "fast")
+    if fit is not None:
+        put(tracks, -1, fit, pose, streak)
+
+
+def put(tracks: Tracks, k: int, fit: Fit, pose: Pose, streak: float) -> None:
+    """Write what was found in a frame into its row."""
+    tracks.centre[k], tracks.angle[k], tracks.streak[k] = pose.centre, pose.angle, streak
+    used = fit.used[:, None]
+    tracks.information[k] = fit.step.information
+    tracks.leftover[k] = np.where(used, fit.step.leftover, np.nan)
+    tracks.chi2[k] = np.where(fit.used, fit.step.chi2, np.nan)
+    tracks.marks[k] = np.array(
+        [
+            s.information if s and u else np.zeros((2, 2))
+            for s, u in zip(fit.sightings, fit.used, strict=True)
+        ],
+        dtype=np.float32,
+    )
+    tracks.complete[k] = np.array(
+        [s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]
+    )

@@ -1,0 +1,198 @@
+"""All that is learned from a film before its disk is followed: marks, lens, exposure, rim, contact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.calibration.exposure import Exposure, exposure
+from udd.tracking.calibration.rim import SPAN, Rim, outline
+from udd.tracking.calibration.rolling_shutter import Readout, readout
+from udd.tracking.calibration.setup import Setup
+from udd.tracking.detection.candidates import colours_of
+from udd.tracking.detection.colour_blobs import Sight
+from udd.tracking.detection.colour_mixing import mixed
+from udd.tracking.detection.illumination import evenness
+from udd.tracking.detection.occluder import visible
+from udd.tracking.detection.survey import Moving, Survey, moving, repeats_last
+from udd.tracking.geometry.contact_point import Contact, rough_contact
+from udd.tracking.geometry.lens import Lens, calibrate
+from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
+from udd.tracking.marks.learning import first_look, places, refine
+from udd.tracking.marks.localization import MISFIT
+from udd.tracking.marks.pose_fit import align
+from udd.video.reader import Film, Picture, TrackError
+
+from .first_pass import TrackerState
+
+FEWEST = 3  # frames in motion from which marks are learned a second time
+SHARP = 60  # slow frames from which the rim is measured
+FOR_LENS = 90  # frames from which tilt and lens are measured
+LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
+SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
+RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
+SURE = 4.0  # standard errors of the layout by which it may be further off, up to as much again
+NEAR_RIM = 0.12  # of the radius by which the rim may be off where a layout says it is
+
+
+def prepare(
+    film: Film,
+    look_over: Survey,
+    sights: list[Sight | None],
+    seen: list[tuple[Picture, Sight]],
+    setup: Setup,
+) -> tuple[TrackerState, Rim | None]:
+    """Learn from the survey's pictures, in which the disk was found at `sights` (`seen`: slowest first).
+
+    Raises
+    ------
+    TrackError
+        No picture is sharp enough, or the rim does not stand out from the background and is needed.
+    """
+    body, wanted = setup.layout.unit, setup.calibrate
+    fixed = None if wanted.layout else body
+    view, white = visible(seen, body)
+    view = view & setup.view(view.shape)
+    look = first_look(seen, view, white, film.light, body)
+    colours = colours_of([p for p, _ in seen], [Pose(s.centre, s.angle) for _, s in seen], look, view)
+    even = evenness(seen, view, body, film.light)
+    bright = float(film.light[round(white)])
+    look = replace(
+        look,
+        even=even,
+        mixed=np.stack(
+            [
+                mixed(film.light, bright, bright + m.level, colour, film.full_range)
+                for m, colour in zip(look.marks, colours, strict=True)
+            ]
+        ),
+    )
+    look = refine(look, [(p.y, Pose(s.centre, s.angle), Motion()) for p, s in seen], view, fixed=fixed)
+    # a second time with frames whose speed is known, hence their blur
+    in_motion = moving(look_over.bursts, sights)
+    given = wanted.given("exposure")
+    open_for = exposure(in_motion, look, view) if given is None else Exposure(given, 0.0)
+    in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
+    in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
+    frames = [
+        (
+            m.picture.y,
+            Pose(m.sight.centre, m.sight.angle),
+            Motion(m.rate * open_for.value, m.turning * open_for.value, rate=m.rate, spin=m.turning),
+        )
+        for m in in_motion
+    ]
+    paths = {m.picture.index: path for m, (_, _, path) in zip(in_motion, frames, strict=True)}
+    interval = float(np.median([m.interval for m in in_motion])) if in_motion else 0.0
+    given = wanted.given("readout")
+    rolling = readout(frames, look, view, interval) if given is None else Readout(given, 0.0)
+    if rolling.value:
+        look = replace(look, readout=rolling.value)
+        look = refine(look, frames, view, fixed=fixed)
+        if given is None:
+            rolling = readout(frames, look, view, interval)
+            look = replace(look, readout=rolling.value)
+    for _ in range(LENS_ROUNDS):
+        at = places(look, frames[:FOR_LENS], view)
+        bent = calibrate(at, view.shape, body, wanted.given("lens"), wanted.given("tilt"))
+        if bent.lens.plain:
+            break
+        look = replace(look, lens=bent.lens)
+        for (_, pose, _), m in zip(frames, in_motion, strict=True):
+            pose.centre, pose.angle = _in_plane(bent.lens, m.sight, body)
+        look = refine(look, frames, view, fixed=fixed)
+    else:
+        frames = frames[:0]
+    if len(frames) >= FEWEST:
+        look = refine(look, frames, view, 2, fixed)
+    sharp: list[tuple[Picture, Pose, Motion]] = []
+    for picture, sight in seen[:SHARP]:
+        pose, motion = Pose(*_in_plane(look.lens, sight, body)), paths.get(picture.index, Motion())
+        if align(picture.y, view, look, pose, motion, [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
+            sharp.append((picture, pose, motion))
+    if not sharp:
+        raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
+    rim = _rim(film, sharp, look, view, setup)
+    if rim is not None:
+        look = replace(look, rim=rim.radius - RIM_SMEAR)
+    look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, setup)
+    contact = _contact(in_motion, look)
+    known = TrackerState(look, view, colours, open_for.value, white, contact, rolling, open_for.sigma, bent)
+    return known, rim
+
+
+def _rim(
+    film: Film,
+    sharp: list[tuple[Picture, Pose, Motion]],
+    look: DiskAppearance,
+    view: NDArray[np.bool_],
+    setup: Setup,
+) -> Rim | None:
+    """The disk's outline; None where it does not show and the layout says where its centre is."""
+    try:
+        return outline(sharp, look, view, rim_span(setup))
+    except TrackError as error:
+        if not setup.layout.standard:
+            return None
+        raise TrackError(f"{film.path}: {error}") from None
+
+
+def rim_span(setup: Setup) -> tuple[float, float]:
+    """Where to look for the rim, in units of the marks' reach."""
+    if setup.layout.standard:
+        return SPAN
+    ratio = setup.radius / setup.layout.reach
+    near = NEAR_RIM + min(SURE * setup.sigma.layout / setup.radius, NEAR_RIM)
+    return (1 - near) * ratio, (1 + near) * ratio
+
+
+def _contact(in_motion: list[Moving], look: DiskAppearance) -> Contact | None:
+    if not in_motion:
+        return None
+    before = look.lens.plane(np.array([m.step[0] for m in in_motion], dtype=np.complex128))
+    after = look.lens.plane(np.array([m.step[1] for m in in_motion], dtype=np.complex128))
+    turn, dt = np.array([m.step[2] for m in in_motion]), np.array([m.step[3] for m in in_motion])
+    return rough_contact(before, after, turn, dt, look.reach)
+
+
+def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[complex, float]:
+    """A sight in the picture as a pose in the plane of the disk."""
+    arms = body * sight.reach * np.exp(1j * sight.angle)
+    marks = lens.plane(sight.centre + arms)
+    spread = arms - arms.mean()
+    spin = complex(np.vdot(spread, marks - marks.mean()))
+    turn = float(np.angle(spin))
+    factor = spin / float(np.vdot(spread, spread).real)
+    return complex(marks.mean() - factor * arms.mean()), sight.angle + turn
+
+
+def _centred(look: DiskAppearance, centre: complex, setup: Setup) -> DiskAppearance:
+    """Marks as seen from the disk's own centre, turned to beta = 0."""
+    turn = upward(look.places - centre, setup)
+    marks = [
+        replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
+    ]
+    return replace(look, marks=marks)
+
+
+def upward(places: NDArray[np.complex128], setup: Setup) -> complex:
+    """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
+
+    Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
+    all the marks of any other layout. Of one that is said with an error the first mark says it.
+    """
+    body = setup.layout.unit
+    if setup.sigma.layout and setup.calibrate.layout:
+        first = setup.layout.first
+        turn = complex(places[first] / body[first])
+        return turn / abs(turn)
+    if not setup.layout.standard:
+        turn = complex(np.vdot(body - body.mean(), places - places.mean()))
+        return turn / abs(turn)
+    turns = places / np.abs(places) / body
+    off = np.angle(turns / turns.mean()) * np.abs(places)
+    if np.abs(off).max() < SQUARE:
+        return complex(turns.mean() / abs(turns.mean()))
+    return complex(turns[0])

@@ -1,0 +1,207 @@
+"""The second pass: every frame again, its blur path known from the frames on both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.detection.frame_flags import is_lost, lost
+from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
+from udd.tracking.marks.localization import MISFIT
+from udd.video.reader import Picture
+
+from .first_pass import TrackerState, Tracks, hold, put
+
+Array = NDArray[np.float64]
+EACH_SIDE = 2  # neighbours on each side
+NEAR = 3.5  # intervals within which a neighbour tells anything
+KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
+FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
+APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
+APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
+LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
+WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
+WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
+# where the second derivative jumps, as friction makes it where a disk turns back: its error times interval^2
+# against the miss, rms over the times at which it may jump, for the mean over a whole interval
+JUMP = 1.10
+FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
+
+
+@dataclass(frozen=True)
+class Local:
+    """Pose and its rates at one instant [pixels, rad, s]."""
+
+    pose: Pose
+    rate: complex
+    spin: float
+    bending: complex  # second derivative of the centre
+    twisting: float
+    held: bool  # by the first pass
+
+    def motion(self, open_for: float) -> Motion:
+        """What the exposure sees of it."""
+        half = 0.5 * open_for**2
+        return Motion(
+            self.rate * open_for,
+            self.spin * open_for,
+            self.bending * half,
+            self.twisting * half,
+            self.rate,
+            self.spin,
+            self.bending,
+            self.twisting,
+        )
+
+
+def refine(
+    pictures: Iterable[Picture],
+    known: TrackerState,
+    first: Tracks,
+    tick: Callable[[int], object] = lambda _: None,
+    streaks_only: bool = False,
+    look_at: Callable[[int], DiskAppearance] | None = None,
+) -> Tracks:
+    """Fit every frame again from what the first pass says about it and its neighbours.
+
+    A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
+    the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
+    streaks stay as they are. `look_at` gives each frame's look where it is not always the same.
+    """
+    tracks = replace(
+        first,
+        **{name: list(getattr(first, name)) for name in Tracks.__dataclass_fields__},
+    )
+    around = LocalMotion(first)
+    for k, picture in enumerate(pictures):
+        if k < len(first.t) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
+            seen = known if look_at is None else replace(known, look=look_at(k))
+            _again(picture, k, seen, around, tracks)
+        tick(picture.index)
+    return tracks
+
+
+def _again(picture: Picture, k: int, known: TrackerState, around: LocalMotion, tracks: Tracks) -> None:
+    if tracks.flag[k] and not is_lost(tracks.flag[k]):
+        return
+    here = around.at(k)
+    if here is None:
+        return
+    motion = here.motion(known.exposure)
+    pose = Pose(here.pose.centre, here.pose.angle)
+    fit = hold(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
+    reach = known.look.reach
+    streak = known.look.streak(motion)
+    if fit is None:
+        return
+    away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
+    if away > (APART if here.held else FORESEEN_APART) + APART_BY_STREAK * streak:
+        return
+    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.held:
+        return  # two pale streaks agree with much
+    put(tracks, k, fit, pose, streak)
+    tracks.flag[k], tracks.method[k] = "", "refined"
+
+
+def weak(tracks: Tracks) -> NDArray[np.bool_]:
+    """Frames with long streaks of too few marks, or of marks that disagree."""
+    used = np.array([np.isfinite(c).sum() for c in tracks.chi2])
+    off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.leftover])
+    long = np.array(tracks.streak) > LONG
+    return np.asarray(long & ((used < WEAK_MARKS) | (off > WEAK_OFF + 0.03 * np.array(tracks.streak))))
+
+
+def drop_weak(tracks: Tracks) -> None:
+    """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
+    for k in np.flatnonzero(weak(tracks)):
+        if tracks.flag[k] == "":
+            tracks.flag[k], tracks.method[k] = lost("too few marks in a long streak"), ""
+            tracks.centre[k], tracks.angle[k] = complex(np.nan, np.nan), np.nan
+            tracks.information[k] = np.full((3, 3), np.nan)
+            tracks.chi2[k] = np.full_like(tracks.chi2[k], np.nan)
+            tracks.leftover[k] = np.full_like(tracks.leftover[k], np.nan)
+
+
+def unforeseen(tracks: Tracks, variance: float) -> Array:
+    """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
+
+    A streak stands for the mean of its path, which is off its middle by half the second derivative times the
+    variance of the time [s^2] over which it is seen. The polynomials that tell this derivative do not know
+    what happens between frames; how far they miss the frame itself when it is left out shows how much.
+    """
+    around = LocalMotion(tracks)
+    factor = 0.5 * JUMP * variance / around.interval**2
+    missed = [around.surprise(k) for k in range(len(tracks.t))]
+    return factor * np.array([(centre.real, centre.imag, angle) for centre, angle in missed])
+
+
+def taken_to_middle(tracks: Tracks, covariance: Array, variance: float) -> Array:
+    """Covariances (n, 3, 3) of poses in the middle of paths whose bending poses with those errors told.
+
+    What the mean of a path is off its middle by is taken off, half the second derivative times `variance`
+    [s^2]. That derivative has the errors of the frame itself, against the sign, and of its neighbours: of a
+    shutter that is open all the time they make the pose worse by a tenth.
+    """
+    around, out = LocalMotion(tracks), covariance.copy()
+    good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
+    for k in np.flatnonzero(good):
+        near, weights = around.bending(int(k))
+        if good[near].all():
+            share = (near == k) - 0.5 * variance * weights
+            out[k] = np.einsum("j,jab->ab", share**2, covariance[near])
+    return out
+
+
+class LocalMotion:
+    """A first pass, to be looked at around each of its frames."""
+
+    def __init__(self, tracks: Tracks) -> None:
+        self.t = np.array(tracks.t)
+        self.centre, self.angle = np.array(tracks.centre), np.array(tracks.angle)
+        self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
+        self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+
+    def _near(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
+        """The nearest frames on both sides, how many intervals off, and whether k is held."""
+        place = int(np.searchsorted(self.good, k))
+        held = place < len(self.good) and bool(self.good[place] == k)
+        low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + held
+        near = self.good[low:high]
+        x = (self.t[near] - self.t[k]) / self.interval
+        return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], held
+
+    def surprise(self, k: int) -> tuple[complex, float]:
+        """How far centre and angle are from what the neighbours alone foretell; 0 where these are too few."""
+        near, x, _ = self._near(k)
+        others = near != k
+        if others.all() or others.sum() < 2:
+            return 0j, 0.0
+        near, x = near[others], x[others]
+        weights = np.linalg.inv(np.vander(x, len(x), increasing=True))[0]
+        centre, angle = weights @ self.centre[near], weights @ self.angle[near]
+        return complex(self.centre[k] - centre), float(self.angle[k] - angle)
+
+    def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
+        """Frames that tell the second derivative at a frame that is held, and their weights [1 / s^2]."""
+        near, x, held = self._near(k)
+        if len(near) < 3 or not held:
+            return np.array([k]), np.zeros(1)
+        return near, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
+
+    def at(self, k: int) -> Local | None:
+        """Polynomials through the nearest poses on both sides; None where too few are near."""
+        near, x, held = self._near(k)
+        if len(near) < 3 or (not held and not (x.min() < 0 < x.max())):
+            return None
+        powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]
+        c, a = powers @ self.centre[near], powers @ self.angle[near]
+        pose = (
+            Pose(complex(self.centre[k]), float(self.angle[k])) if held else Pose(complex(c[0]), float(a[0]))
+        )
+        h = self.interval
+        return Local(
+            pose, complex(c[1]) / h, float(a[1]) / h, 2 * complex(c[2]) / h**2, 2 * float(a[2]) / h**2, held
+        )

@@ -1,0 +1,1 @@
+"""Films in and out: reader, writer, webcam and colour."""

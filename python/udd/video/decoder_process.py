@@ -1,0 +1,215 @@
+"""The process that decodes a film for `udd.video.reader` (PyAV): pictures out through a pipe.
+
+    python -P decoder_process.py PATH MEMORY
+
+It is told what to do by lines: `look`, or the time [s] from which pictures are wanted. It answers with
+a line of JSON (what the header says; or error), then, where they are wanted, each picture's head and planes
+and an end. Run as a script, it imports nothing but PyAV: it is there in a fifth of the time that the
+package takes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import struct
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+HEAD = struct.Struct(
+    "<qdIIIII?"
+)  # number, time, height, width, chroma's height and width, quarter turns, damaged
+NO_FILM = "is not a film that can be decoded, or it is cut off"
+LOOK = "look"
+MOST_BROKEN = 200  # consecutive undecodable packets after which a film is given up
+MOST_PIXELS = 1 << 26  # of a picture
+
+
+class Refused(Exception):
+    """Why the file is no film."""
+
+
+def main(path: str, memory: int) -> None:
+    """Do what the standard input says, until it ends."""
+    limit(memory)
+    for line in sys.stdin:
+        answer(path, line.strip())
+
+
+def answer(path: str, request: str) -> None:
+    """Look at the film, or decode it."""
+    try:
+        with opened(path) as container:
+            stream = container.streams.video[0]
+            said = facts(stream)
+            if request == LOOK:
+                said["packets"] = packets(container, stream)
+            put(json.dumps(said).encode() + b"\n")
+            if request != LOOK:
+                send(container, stream, float(request))
+    except Refused as error:
+        put(json.dumps({"error": str(error)}).encode() + b"\n")
+
+
+def put(data: Any) -> None:
+    """Every byte to the standard output: a buffered one loses some where the process is paused."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(1, rest) :]
+
+
+def limit(memory: int) -> None:
+    """Keep the process from taking the machine's memory."""
+    try:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    except (ImportError, ValueError, OSError):
+        pass  # a system without such limits
+
+
+def opened(path: str) -> Any:
+    """The container, if it holds a video of a reasonable size."""
+    import av
+
+    try:
+        container = av.open(path, metadata_errors="ignore")
+    except (av.error.FFmpegError, OSError, ValueError):
+        raise Refused(NO_FILM) from None
+    if not container.streams.video:
+        raise Refused("holds no video")
+    stream = container.streams.video[0]
+    if stream.width * stream.height > MOST_PIXELS:
+        raise Refused(f"has pictures of {stream.width} x {stream.height} pixels, more than can be tracked")
+    return container
+
+
+def facts(stream: Any) -> dict[str, Any]:
+    """What the header says."""
+    rate = stream.average_rate or stream.guessed_rate
+    pixel = stream.codec_context.pix_fmt or ""
+    full = stream.codec_context.color_range == 2 or pixel.startswith(("yuvj", "rgb", "bgr", "gbr"))
+    return {
+        "frames": int(stream.frames),
+        "fps": float(rate) if rate else None,
+        "full_range": full,
+        "width": int(stream.width),
+        "height": int(stream.height),
+    }
+
+
+def packets(container: Any, stream: Any) -> int:
+    """How many coded frames the file holds; none is decoded."""
+    import av
+
+    count = 0
+    try:
+        for packet in container.demux(stream):
+            count += packet.size > 0 and not packet.is_corrupt
+    except av.error.FFmpegError:
+        pass  # cut off in the middle of one
+    return count
+
+
+def send(container: Any, stream: Any, since: float) -> None:
+    """Write all pictures, then the end with the number of packets that did not decode."""
+    broken = [0]
+    for index, t, frame, damaged in pictures(container, stream, since, broken):
+        if frame.format.name not in ("yuv420p", "yuvj420p"):
+            frame = frame.reformat(format="yuv420p")
+        y, u, v = frame.planes[:3]
+        turns = round((frame.rotation or 0) / 90) % 4  # phones note how they were held
+        put(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
+        for plane in (y, u, v):
+            put(pixels(plane))
+    put(HEAD.pack(-1, 0.0, broken[0], 0, 0, 0, 0, False))
+
+
+def pixels(plane: Any) -> memoryview | bytearray:
+    """A plane's rows, without what fills them up in memory."""
+    rows = memoryview(plane)
+    if plane.line_size == plane.width:
+        return rows[: plane.width * plane.height]
+    out = bytearray()
+    for k in range(plane.height):
+        out += rows[k * plane.line_size : k * plane.line_size + plane.width]
+    return out
+
+
+def pictures(
+    container: Any, stream: Any, since: float, broken: list[int]
+) -> Iterator[tuple[int, float, Any, bool]]:
+    """All frames that decode, in order of presentation, with increasing times."""
+    import av
+
+    rate = stream.average_rate or stream.guessed_rate
+    fps = float(rate) if rate else math.nan
+    index, last, row, damaged = 0, -math.inf, 0, False
+    origin = stream.start_time or 0
+    if since > 0 and stream.time_base:
+        container.seek(origin + int(since / stream.time_base), stream=stream)
+    packets, fields = container.demux(stream), Fields(stream)
+    while row < MOST_BROKEN:
+        try:
+            packet = next(packets)
+            frames = packet.decode()
+            row = 0
+        except StopIteration:
+            return
+        except av.error.FFmpegError:
+            broken[0], row, damaged = broken[0] + 1, row + 1, True
+            continue
+        for frame in fields(frames):
+            wrong = bool(frame.is_corrupt or packet.is_corrupt)
+            # frames are coded as changes: after a broken one all are wrong up to the next whole one
+            damaged = wrong or (damaged and not frame.key_frame)
+            if frame.pts is None or frame.time_base is None:
+                t = index / fps
+            else:
+                t = float((frame.pts - origin) * frame.time_base)
+            if not t > last or frame.width * frame.height > MOST_PIXELS:
+                broken[0] += 1  # a time stamp that stands still carries no new instant
+                continue
+            broken[0] += wrong
+            yield index, t, frame, damaged
+            index, last = index + 1, t
+
+
+class Fields:
+    """Frames as they are; of interlaced ones each half by itself, its missing rows filled in by bwdif.
+
+    The rows of such a frame are of two instants, half a frame apart: a moving disk is a comb.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self.graph: Any = None
+
+    def __call__(self, frames: list[Any]) -> Iterator[Any]:
+        """What a packet held, in order; the last half frame of a film is left in the filter."""
+        import av
+
+        for frame in frames:
+            if self.graph is None and not frame.interlaced_frame:
+                yield frame
+                continue
+            if self.graph is None:
+                self.graph = av.filter.Graph()
+                source = self.graph.add_buffer(template=self.stream)
+                halves = self.graph.add("bwdif", "mode=send_field:parity=auto:deint=interlaced")
+                source.link_to(halves)
+                halves.link_to(self.graph.add("buffersink"))
+                self.graph.configure()
+            self.graph.push(frame)
+            while True:
+                try:
+                    yield self.graph.pull()
+                except (av.error.BlockingIOError, av.error.EOFError):
+                    break
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))

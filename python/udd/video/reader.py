@@ -1,0 +1,206 @@
+"""Films as pictures with their true presentation times, decoded in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import select
+import subprocess
+import sys
+import weakref
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import UddError
+
+from .decoder_process import HEAD, LOOK, NO_FILM
+from .srgb import light_of
+
+Plane = NDArray[np.uint8]
+PATIENCE = 60.0  # s for which the decoder may be silent
+DECODER = str(Path(__file__).with_name("decoder_process.py"))
+MEMORY = 4 << 30  # bytes of address space that it may take
+PIPE = 1 << 20  # bytes that the pipe to it should hold
+
+
+class TrackError(UddError):
+    """A film cannot be read, or shows no disk that can be tracked."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One frame: brightness at full resolution, colour differences at half (4:2:0)."""
+
+    index: int
+    t: float  # presentation time [s]
+    y: Plane
+    u: Plane
+    v: Plane
+    damaged: bool = False  # it, or one it was coded from, did not decode whole
+
+
+def light_of_codes(full_range: bool) -> NDArray[np.float64]:
+    """Amount of light, 0 to 255, for each brightness code of a film: the sRGB curve (IEC 61966-2-1).
+
+    A shutter adds up light, not codes; a streak is only symmetric about its middle in light.
+    """
+    x = np.arange(256) / 255 if full_range else np.clip((np.arange(256) - 16) / 219, 0, 1.08)
+    return np.asarray(255 * light_of(x))
+
+
+class Film:
+    """A film file that can be run through any number of times.
+
+    Brightness and colour stay apart, as films store them: positions come from the brightness, which
+    has the full resolution, and names of marks from the colour, whose samples lie half a pixel off.
+    Decoders are large and films come from anywhere, so they run in a process of their own, with limits
+    on memory, pixels and silence: a film that breaks it ends there, and is an error at worst.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, fps: float | None = None) -> None:
+        self.path = Path(path)
+        if not self.path.exists():
+            raise TrackError(f"{self.path}: there is no such file")
+        if self.path.is_dir():
+            raise TrackError(f"{self.path} is a folder, not a film")
+        if self.path.stat().st_size == 0:
+            raise TrackError(f"{self.path}: the file is empty")
+        if fps is not None and not (math.isfinite(fps) and fps > 0):
+            raise TrackError(f"fps must be positive and finite, not {fps!r}")
+        if find_spec("av") is None:  # what decodes runs elsewhere, where nobody would be told
+            raise ModuleNotFoundError("No module named 'av'", name="av")
+        self.broken = 0  # packets that did not decode in the last run
+        self._idle: _Decoder | None = None  # between runs
+        decoder = self._decoder()
+        said = decoder.ask(LOOK)
+        if "error" in said:
+            raise TrackError(f"{self.path} {said['error']}")
+        self._idle = decoder
+        self.promised = int(said["frames"])  # 0 where the container does not say
+        self.packets = int(said["packets"])  # coded frames that the file holds
+        self.size = (int(said["width"]), int(said["height"]))
+        self.forced = fps  # what the header says about time is not believed then
+        self.fps = float(fps or said["fps"] or math.nan)
+        self.full_range = bool(said["full_range"])
+        self.light = light_of_codes(self.full_range)  # of each brightness code
+
+    def pictures(self, since: float = 0.0) -> Iterator[Picture]:
+        """All frames that decode, in order of presentation, with increasing times.
+
+        Those from the last key frame up to `since` [s] on, where it is above 0; they are numbered from it.
+        """
+        self.broken = 0
+        if self.forced is not None:
+            since = 0.0  # the header's times are no help in seeking
+        decoder = self._decoder()
+        try:
+            said = decoder.ask(repr(since))
+            if "error" in said:
+                raise TrackError(f"{self.path} {said['error']}")
+            for picture in decoder.pictures():
+                if self.forced is not None:
+                    picture = replace(picture, t=picture.index / self.forced)
+                yield picture
+            self.broken = decoder.broken
+        finally:
+            if decoder.whole:
+                self._idle = decoder
+            else:
+                decoder.end()
+
+    def _decoder(self) -> _Decoder:
+        """The process that is left from the last run, or a new one."""
+        idle, self._idle = self._idle, None
+        return _Decoder(self.path) if idle is None or idle.process.poll() is not None else idle
+
+
+class _Decoder:
+    """The process that decodes, and the pipes to and from it. It ends with this object."""
+
+    def __init__(self, path: Path) -> None:
+        self.broken, self.whole = 0, False
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", DECODER, str(path), str(MEMORY)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            bufsize=0,
+        )
+        self.end = weakref.finalize(self, _end, self.process)
+        assert self.process.stdout is not None
+        self.pipe: IO[bytes] = self.process.stdout
+        _widen(self.pipe)
+
+    def ask(self, request: str) -> dict[str, Any]:
+        """What the header says, or an error; pictures follow where a time was asked for."""
+        self.broken, self.whole = 0, False
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(request.encode() + b"\n")
+            line = self.pipe.readline() if _ready(self.pipe) else b""
+        except OSError:
+            line = b""
+        return json.loads(line) if line else {"error": NO_FILM}
+
+    def pictures(self) -> Iterator[Picture]:
+        head = bytearray(HEAD.size)
+        while _fill(self.pipe, head):
+            index, t, height, width, rows, columns, turns, damaged = HEAD.unpack(head)
+            if index < 0:  # the end: what did not decode
+                self.broken, self.whole = height, True
+                return
+            full, half = height * width, rows * columns
+            room = np.empty(full + 2 * half, np.uint8)
+            if not _fill(self.pipe, room.data):
+                break
+            y, u, v = room[:full], room[full : full + half], room[full + half :]
+            y, u, v = y.reshape(height, width), u.reshape(rows, columns), v.reshape(rows, columns)
+            if turns:
+                y, u, v = (np.ascontiguousarray(np.rot90(p, turns)) for p in (y, u, v))
+            yield Picture(index, t, y, u, v, damaged)
+        self.broken = 1  # it ended in the middle
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            pipe.close()
+    process.wait()
+
+
+def _fill(pipe: IO[bytes], room: Any) -> bool:
+    """Read exactly as many bytes as there is room for; False where the pipe ends before."""
+    view, done = memoryview(room), 0
+    while done < len(view):
+        if not _ready(pipe):
+            return False
+        got = pipe.readinto(view[done:])  # type: ignore[attr-defined]
+        if not got:
+            return False
+        done += got
+    return True
+
+
+def _ready(pipe: IO[bytes]) -> bool:
+    """Whether the decoder says something before patience ends (systems that cannot tell wait for ever)."""
+    try:
+        return bool(select.select([pipe], [], [], PATIENCE)[0])
+    except (OSError, ValueError):  # Windows selects among sockets only
+        return True
+
+
+def _widen(pipe: IO[bytes]) -> None:
+    try:
+        import fcntl
+
+        fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, PIPE)
+    except (ImportError, AttributeError, OSError):
+        pass  # not this system; it is only slower

@@ -1,0 +1,142 @@
+//! A packet of trajectories, each with its own job, parameters, time and end.
+
+use crate::integrate::{ErrorNorm, Integrator, Method, Progress};
+use crate::model::{Family, System};
+use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, constants};
+
+/// Where a job starts.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a, S, const D: usize> {
+    /// The values of the family's parameters.
+    pub values: &'a [f64],
+    pub t: f64,
+    /// The state, the same in all lanes.
+    pub x: [S; D],
+    /// The time to run to.
+    pub end: f64,
+}
+
+/// One [`Integrator`] whose lanes are loaded and unloaded one by one.
+pub struct LaneBatch<'a, F: Family<D>, S: Scalar, const D: usize, E, K> {
+    isa: Isa,
+    family: &'a F,
+    values: Vec<S>,
+    /// The packet that is integrated.
+    pub driver: Integrator<F::Built<S>, S, D, E, K>,
+    /// The job in each lane.
+    jobs: Vec<Option<usize>>,
+    /// How many there are.
+    under_way: usize,
+    /// Where each lane's run ends.
+    pub end: S::Real,
+}
+
+impl<'a, F, S, const D: usize, E, K> LaneBatch<'a, F, S, D, E, K>
+where
+    F: Family<D>,
+    S: Scalar,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    /// An empty batch, which needs some start to be built from; packets run with these instructions.
+    pub fn new(
+        isa: Isa,
+        family: &'a F,
+        method: impl FnOnce(Vec<S>) -> K,
+        like: Start<'_, S, D>,
+        norm: &E,
+    ) -> Self {
+        let values: Vec<S> = constants(like.values);
+        let t = S::Real::constant(like.t);
+        let method = method(values.clone());
+        let driver = Integrator::by(method, family.build(&values), t, like.x, None, norm).with_wall();
+        Self { isa, family, values, driver, jobs: vec![None; S::Real::LANES], under_way: 0, end: t }
+    }
+
+    /// Starts a job in a lane.
+    #[inline(always)]
+    pub fn load(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
+        let mut changed = false;
+        for i in 0..start.values.len() {
+            let mut lanes = self.values[i].real();
+            changed |= lanes.lane(lane).to_bits() != start.values[i].to_bits();
+            lanes.set_lane(lane, start.values[i]);
+            self.values[i] = S::lift(lanes);
+        }
+        // What is evaluated once for all steps stays otherwise.
+        if changed {
+            self.driver.set_system(self.family.build(&self.values), &self.values);
+        }
+        let only = S::Mask::from_lanes(|i| i == lane);
+        self.driver.start(only, S::Real::constant(start.t), start.x, None);
+        self.end.set_lane(lane, start.end);
+        self.under_way += usize::from(self.jobs[lane].is_none());
+        self.jobs[lane] = Some(job);
+    }
+
+    /// Ends the job in a lane, which from now on stays where it is.
+    #[inline(always)]
+    pub fn unload(&mut self, lane: usize) -> Option<usize> {
+        self.end.set_lane(lane, self.driver.t().lane(lane));
+        let job = self.jobs[lane].take();
+        self.under_way -= usize::from(job.is_some());
+        job
+    }
+
+    /// The job in a lane.
+    pub fn job(&self, lane: usize) -> Option<usize> {
+        self.jobs[lane]
+    }
+
+    /// The values of the parameters in each lane.
+    #[inline(always)]
+    pub fn values(&self) -> &[S] {
+        &self.values
+    }
+
+    /// Whether all lanes are empty.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.under_way == 0
+    }
+
+    /// Tries a step in every lane.
+    pub fn trial(&mut self) -> Progress<S::Mask> {
+        let end = self.end;
+        work::<S::Real, _>(self.isa, Trial { driver: &mut self.driver, end })
+    }
+
+    /// Lanes that are at their end.
+    #[inline(always)]
+    pub fn arrived(&self) -> S::Mask {
+        let left = self.end - self.driver.t();
+        S::Real::zero().less(left).not()
+    }
+}
+
+/// Does what is worth the best instructions over packets; for a single trajectory a method's kernel alone
+/// is.
+#[inline(always)]
+pub fn work<R: Real, W: Work>(isa: Isa, work: W) -> W::Output {
+    if const { R::LANES > 1 } { R::work(isa, work) } else { work.run::<Plain>() }
+}
+
+struct Trial<'a, M, S: Scalar, const D: usize, E, K> {
+    driver: &'a mut Integrator<M, S, D, E, K>,
+    end: S::Real,
+}
+
+impl<M, S, const D: usize, E, K> Work for Trial<'_, M, S, D, E, K>
+where
+    S: Scalar,
+    M: System<S, D>,
+    E: ErrorNorm<S, D> + Copy,
+    K: Method<S, D>,
+{
+    type Output = Progress<S::Mask>;
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> Progress<S::Mask> {
+        self.driver.trial(self.end)
+    }
+}

@@ -1,0 +1,6 @@
+//! Poincaré sections: crossings of surfaces on dense output.
+
+pub(crate) mod crossing;
+pub(crate) mod dense_output;
+pub(crate) mod section;
+pub(crate) mod sign_changes;

@@ -1,0 +1,130 @@
+//! The model's flow from each frame to the next, and how it responds to what is added on the way.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::bordered::zeros;
+use super::link_propagation::{Law, Span, TransitionIntegrator, TransitionRun, variable};
+use super::parameter_jacobian::{WIDTH, Wide, rates_of};
+use super::{EstimateError, Estimator, Sensor, Unknowns};
+use crate::model::Family;
+use crate::unroll::vector;
+
+/// Places within a link, as parts of its time, and their weights (Gauss-Legendre).
+const PLACES: [f64; PLACES_PER_LINK] = [0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7];
+const WEIGHTS: [f64; PLACES_PER_LINK] = [5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0];
+/// How many of them there are.
+pub const PLACES_PER_LINK: usize = 3;
+
+/// A place within a link, and what acts there.
+#[derive(Clone, Copy, Debug)]
+pub struct QuadraturePoint<const D: usize> {
+    /// In the model's time, since the frame before and in all.
+    pub since: f64,
+    pub t: f64,
+    pub state: [f64; D],
+    /// Column `m` is what a unit forcing of equation `m` here adds to the state at the link's end, the
+    /// place's share of the link's time included. A forcing `f(x, t)` adds the sum of `response f` over
+    /// the places: an integral by Gauss' rule.
+    pub response: SMatrix<f64, D, D>,
+}
+
+/// What acts on a link.
+#[derive(Clone, Copy, Debug)]
+pub struct QuadraturePoints<const D: usize> {
+    /// Whether the law switched on the way: derivatives by its parameters then jump between the places.
+    pub switched: bool,
+    pub places: [QuadraturePoint<D>; PLACES_PER_LINK],
+}
+
+/// What becomes of a frame's state until the next frame.
+#[derive(Clone, Debug)]
+pub struct Transition<const D: usize> {
+    /// The next frame's state less what the model makes of this one.
+    pub defect: SVector<f64, D>,
+    /// The derivatives of what the model makes: by this frame's state, then by those of the model's free
+    /// parameters that find room.
+    pub slopes: [[f64; WIDTH]; D],
+    /// The rate at the end.
+    pub end_rate: SVector<f64, D>,
+}
+
+impl<const D: usize> Transition<D> {
+    /// The derivative by this frame's state.
+    #[inline(always)]
+    pub fn a(&self) -> SMatrix<f64, D, D> {
+        SMatrix::from_fn(|m, k| self.slopes[m][k])
+    }
+}
+
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// Every link, kept where `room` was; those of frames that are not linked are all zero.
+    pub(super) fn flow(
+        &self,
+        point: &Unknowns<D>,
+        laws: &[Law<F::Built<Wide>, Wide>],
+        room: Vec<Transition<D>>,
+    ) -> Result<Vec<Transition<D>>, EstimateError> {
+        let plain = self.plain_laws(point);
+        let zero = zeros();
+        let none = Transition { defect: zero, slopes: [[0.0; WIDTH]; D], end_rate: zero };
+        let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
+                   i: usize,
+                   (film, start, end): Span,
+                   link: &mut Transition<D>| {
+            let x = variable(&point.states[i]);
+            let (last, _) = follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
+            let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
+            let end_rate = rates_of(system, end, &there);
+            for k in 0..D {
+                link.defect[k] = point.states[i + 1][k] - there[k];
+                link.slopes[k] = last[k].d;
+                link.end_rate[k] = end_rate[k];
+            }
+            Ok(())
+        };
+        self.each_link(point, laws, &one, &none, room)
+    }
+
+    /// What acts on every link; all zero where frames are not linked.
+    pub fn places(&self, point: &Unknowns<D>) -> Result<Vec<QuadraturePoints<D>>, EstimateError> {
+        let laws = self.own_laws(point);
+        let place = QuadraturePoint { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
+        let none = QuadraturePoints { switched: false, places: [place; PLACES_PER_LINK] };
+        let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
+                   i: usize,
+                   (_, start, end): Span,
+                   found: &mut QuadraturePoints<D>| {
+            let x: [Wide; D] = variable(&point.states[i]);
+            let mut met = [x; PLACES_PER_LINK];
+            let (last, switched) =
+                follower.follow(TransitionRun { start, end, x, places: &PLACES, met: &mut met })?;
+            let a = by_state(&last);
+            found.switched = switched;
+            for q in 0..PLACES_PER_LINK {
+                let since = PLACES[q] * (end - start);
+                // From here to the end: all the way, less the way up to here.
+                let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
+                let response = a * here * (WEIGHTS[q] * (end - start));
+                let state = vector!(f64, D; k => met[q][k].re);
+                found.places[q] = QuadraturePoint { since, t: start + since, state, response };
+            }
+            Ok(())
+        };
+        self.each_link(point, &laws, &one, &none, Vec::new())
+    }
+}
+
+/// The derivatives of a state by the one it started from, as a matrix.
+fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
+    let mut matrix = zeros();
+    for m in 0..D {
+        for k in 0..D {
+            matrix[(m, k)] = x[m].d[k];
+        }
+    }
+    matrix
+}

@@ -1,0 +1,361 @@
+//! What a change of parameters does to the states and to what is seen.
+
+use nalgebra::SVector;
+
+use super::link_propagation::{Law, TransitionRun, variable};
+use super::link_response::{QuadraturePoints, Transition};
+use super::row_matrix::RowMatrix;
+use super::{EstimateError, Estimator, FreeParameter, Role, Sensor, Unknowns};
+use crate::analysis::batch::parallel::in_parts;
+use crate::integrate::propagate;
+use crate::model::{Family, System, sides_of};
+use crate::scalar::{Dual, Scalar, constants};
+use crate::unroll::vector;
+
+/// Blocks of rows are worked on by so many at least.
+const TOGETHER: usize = 16;
+/// In how many directions one evaluation differentiates.
+pub const WIDTH: usize = 8;
+pub(super) type Wide = Dual<f64, WIDTH>;
+
+/// One column per parameter: `M` rows for each frame, of what is seen, and `D` for each link, of the state at
+/// its end.
+#[derive(Clone, Debug, Default)]
+pub struct ParameterJacobian {
+    pub seen: RowMatrix,
+    pub state: RowMatrix,
+}
+
+impl ParameterJacobian {
+    /// These columns with others to their right.
+    pub fn beside(&self, other: &Self) -> Self {
+        Self { seen: self.seen.beside(&other.seen), state: self.state.beside(&other.state) }
+    }
+}
+
+/// From where time counts in the model's equations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TimeOrigin {
+    /// The record's own time.
+    Record,
+    /// Every frame's time starts at zero.
+    Frame,
+}
+
+/// Laws that are differentiated by some parameters, and the columns of these, film by film.
+pub(super) struct ExtraColumns<B> {
+    pub columns: Vec<Vec<usize>>,
+    pub laws: Vec<Law<B, Wide>>,
+}
+
+/// Values of which those with the numbers of [`acting`] parameters are differentiated by, from direction `first` on.
+pub(super) fn tagged(values: &[f64], own: &[(usize, usize)], first: usize) -> Vec<Wide> {
+    let mut wide: Vec<Wide> = constants(values);
+    for (k, &(_, number)) in own.iter().enumerate() {
+        wide[number] = Wide::variable(values[number], first + k);
+    }
+    wide
+}
+
+/// Their columns.
+pub(super) fn columns_of(own: &[(usize, usize)]) -> Vec<usize> {
+    own.iter().map(|&(column, _)| column).collect()
+}
+
+/// A system whose numbers know their derivatives by some parameters, and those parameters' columns.
+struct DifferentiatedSystem<B> {
+    system: B,
+    columns: Vec<usize>,
+}
+
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// Which films have a law that knows the time, and a free clock that moves it.
+    pub(super) fn timed(&self, point: &Unknowns<D>) -> Vec<bool> {
+        let mut timed = vec![false; point.sets.len()];
+        for (film, law) in self.plain_laws(point).iter().enumerate() {
+            let mut links =
+                (0..self.record.t.len().saturating_sub(1)).filter_map(|i| Some((i, self.link(point, i)?)));
+            timed[film] = self.free.iter().any(|free| free.role == Role::Clock && free.acts_on(film))
+                && links.any(|(i, (of, start, end))| {
+                    let x = vector!(f64, D; k => point.states[i][k]);
+                    of == film && rates_of(&law.system, start, &x) != rates_of(&law.system, end, &x)
+                });
+        }
+        timed
+    }
+
+    /// The rows of the free parameters at the links' ends; some films' laws are [timed](Estimator::timed).
+    pub(super) fn own_state_rows(
+        &self,
+        point: &Unknowns<D>,
+        flow: &[Transition<D>],
+        timed: &[bool],
+        rows: &mut RowMatrix,
+    ) -> Result<(), EstimateError> {
+        let p = self.free.len();
+        rows.become_zeros(flow.len() * D, p);
+        if p == 0 {
+            return Ok(());
+        }
+        let films = 0..point.sets.len();
+        let models: Vec<_> = films.clone().map(|film| acting(&self.free, film, model)).collect();
+        let clocks: Vec<_> = films.map(|film| acting(&self.free, film, clock)).collect();
+        let plain = self.plain_laws(point);
+        in_blocks(rows, D, &|i, rows| {
+            if self.record.linked[i] {
+                let link = &flow[i];
+                let film = self.record.film[i];
+                let dt = self.record.t[i + 1] - self.record.t[i];
+                for n in 0..D {
+                    let row = &mut rows[n * p..(n + 1) * p];
+                    for k in 0..models[film].len().min(WIDTH - D) {
+                        row[models[film][k].0] = link.slopes[n][D + k];
+                    }
+                    // A slower clock lets the flow run on for longer.
+                    for &(column, _) in &clocks[film] {
+                        row[column] = link.end_rate[n] * dt;
+                    }
+                }
+                if timed[film] {
+                    // And begin later: by its start s the flow of x' = f(t, x) changes as -A f(s, x), A its
+                    // derivative by x. Without forces in time that is minus the rate at its end.
+                    let x = vector!(f64, D; k => point.states[i][k]);
+                    let departure =
+                        rates_of(&plain[film].system, self.record.t[i] * point.sets[film].pace(), &x);
+                    let later = (link.end_rate - link.a() * SVector::from(departure)) * self.record.t[i];
+                    for n in 0..D {
+                        for &(column, _) in &clocks[film] {
+                            rows[n * p + column] += later[n];
+                        }
+                    }
+                }
+            }
+        });
+        // Those that found no room beside the state go the way again.
+        for ExtraColumns { columns, laws } in self.beyond(point) {
+            let slopes = self.each_link(
+                point,
+                &laws,
+                &|follower, i, (_, start, end), slopes: &mut [[f64; WIDTH]; D]| {
+                    let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
+                    let (last, _) =
+                        follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
+                    for k in 0..D {
+                        slopes[k] = last[k].d;
+                    }
+                    Ok(())
+                },
+                &[[0.0; WIDTH]; D],
+                Vec::new(),
+            )?;
+            for (i, slopes) in slopes.iter().enumerate() {
+                for (k, &column) in columns[self.record.film[i]].iter().enumerate() {
+                    for n in 0..D {
+                        rows.row_mut(D * i + n)[column] = slopes[n][k];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The laws of all films over numbers that are differentiated by the state and, behind it, by the first of
+    /// the film's free parameters.
+    pub(super) fn own_laws(&self, point: &Unknowns<D>) -> Vec<Law<F::Built<Wide>, Wide>> {
+        const { assert!(D < WIDTH) };
+        self.laws(point, &|film, values| {
+            let own = acting(&self.free, film, model);
+            tagged(values, &own[..own.len().min(WIDTH - D)], D)
+        })
+    }
+
+    /// The laws over numbers that are differentiated by the free parameters that find no room there.
+    pub(super) fn beyond(&self, point: &Unknowns<D>) -> Vec<ExtraColumns<F::Built<Wide>>> {
+        let films = 0..point.sets.len();
+        let models: Vec<_> = films.map(|film| acting(&self.free, film, model)).collect();
+        let most = models.iter().map(Vec::len).max().unwrap_or(0);
+        let (mut all, mut first) = (Vec::new(), WIDTH - D);
+        while first < most {
+            let mut own = Vec::new();
+            for model in &models {
+                own.push(&model[first.min(model.len())..model.len().min(first + WIDTH)]);
+            }
+            let mut columns = Vec::new();
+            for own in &own {
+                columns.push(columns_of(own));
+            }
+            all.push(ExtraColumns {
+                columns,
+                laws: self.laws(point, &|film, values| tagged(values, own[film], 0)),
+            });
+            first += WIDTH;
+        }
+        all
+    }
+
+    /// The columns of parameters that may belong to another family of models, to which each film's values are
+    /// given.
+    pub(super) fn columns(
+        &self,
+        point: &Unknowns<D>,
+        places: &[QuadraturePoints<D>],
+        (family, values): (&F, &[Vec<f64>]),
+        free: &[FreeParameter],
+        origin: TimeOrigin,
+    ) -> ParameterJacobian {
+        let (n, p) = (self.record.t.len(), free.len());
+        let mut columns =
+            ParameterJacobian { seen: RowMatrix::zeros(n * M, p), state: RowMatrix::zeros((n - 1) * D, p) };
+        if p == 0 {
+            return columns;
+        }
+        let actors: Vec<Vec<DifferentiatedSystem<F::Built<Wide>>>> =
+            values.iter().enumerate().map(|(film, values)| actors(family, film, values, free)).collect();
+        let systems: Vec<F::Built<f64>> = values.iter().map(|values| family.build(values)).collect();
+
+        in_blocks(&mut columns.seen, M, &|i, rows| {
+            let film = self.record.film[i];
+            let set = &point.sets[film];
+            let t = match origin {
+                TimeOrigin::Record => self.record.t[i] * set.pace(),
+                TimeOrigin::Frame => 0.0,
+            };
+            let x = &point.states[i];
+            let rate = systems[film].rates(t, x, &sides_of(&systems[film], t, x));
+            // The parameters of the model are seen through the rate, by a camera that looks at it.
+            let by_rate = self.seen_by_rate(&set.camera, x, &rate);
+            if by_rate.as_flattened().iter().all(|&v| v == 0.0) {
+                return;
+            }
+            for actor in &actors[film] {
+                let x = vector!(Wide, D; k => Wide::constant(x[k]));
+                let rates = rates(&actor.system, Wide::constant(t), &x);
+                for (k, &column) in actor.columns.iter().enumerate() {
+                    for m in 0..M {
+                        let mut moved = -0.0;
+                        for n in 0..D {
+                            moved += by_rate[m][n] * rates[n].d[k];
+                        }
+                        rows[m * p + column] += moved;
+                    }
+                }
+            }
+        });
+
+        in_blocks(&mut columns.state, D, &|i, rows| {
+            if !self.record.linked[i] {
+                return;
+            }
+            let (film, link) = (self.record.film[i], &places[i]);
+            let exact = link.switched && origin == TimeOrigin::Record;
+            if exact {
+                for actor in &actors[film] {
+                    let Some(end) = self.along(point, i, &actor.system) else { continue };
+                    for (k, &column) in actor.columns.iter().enumerate() {
+                        for n in 0..D {
+                            rows[n * p + column] = end[n].d[k];
+                        }
+                    }
+                }
+            }
+            for place in if exact { &[] } else { &link.places[..] } {
+                let t = if origin == TimeOrigin::Record { place.t } else { place.since };
+                for actor in &actors[film] {
+                    let x = vector!(Wide, D; k => Wide::constant(place.state[k]));
+                    let rates = rates(&actor.system, Wide::constant(t), &x);
+                    for (k, &column) in actor.columns.iter().enumerate() {
+                        for n in 0..D {
+                            let mut moved = -0.0;
+                            for m in 0..D {
+                                moved += place.response[(n, m)] * rates[m].d[k];
+                            }
+                            rows[n * p + column] += moved;
+                        }
+                    }
+                }
+            }
+        });
+        columns
+    }
+
+    /// The end of link `i`, followed with its parameters' derivatives.
+    fn along(&self, point: &Unknowns<D>, i: usize, system: &impl System<Wide, D>) -> Option<[Wide; D]> {
+        let (_, start, end) = self.link(point, i)?;
+        let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
+        // The flow went this way already.
+        propagate(system, start, end, x, &self.tolerance).ok()
+    }
+
+    /// The derivatives of what is seen by the state's rate.
+    fn seen_by_rate(&self, camera: &[f64], x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
+        let camera: Vec<Dual<f64, D>> = constants(camera);
+        let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
+        let seen = self.sensor.observe(&camera, &x, &variable(rate));
+        let mut slopes = [[0.0; D]; M];
+        for m in 0..M {
+            slopes[m] = seen[m].d;
+        }
+        slopes
+    }
+}
+
+/// Works on all blocks of so many rows, each given its number.
+fn in_blocks(rows: &mut RowMatrix, many: usize, work: &(dyn Fn(usize, &mut [f64]) + Sync)) {
+    let mut blocks: Vec<&mut [f64]> = rows.blocks_mut(many).collect();
+    in_parts(&mut blocks, TOGETHER, &|first, part| {
+        for (j, block) in part.iter_mut().enumerate() {
+            work(first + j, block);
+        }
+    });
+}
+
+pub(super) fn model(role: Role) -> Option<usize> {
+    if let Role::Model(number) = role { Some(number) } else { None }
+}
+
+pub(super) fn camera(role: Role) -> Option<usize> {
+    if let Role::Camera(number) = role { Some(number) } else { None }
+}
+
+pub(super) fn clock(role: Role) -> Option<usize> {
+    (role == Role::Clock).then_some(0)
+}
+
+/// The columns of those free parameters of one film that play a part, with their numbers in it.
+pub(super) fn acting(
+    free: &[FreeParameter],
+    film: usize,
+    part: fn(Role) -> Option<usize>,
+) -> Vec<(usize, usize)> {
+    let own = free.iter().enumerate().filter(|(_, free)| free.acts_on(film));
+    own.filter_map(|(column, free)| Some((column, part(free.role)?))).collect()
+}
+
+/// The systems of one film that differentiate by all of the model's parameters that are free.
+fn actors<F: Family<D>, const D: usize>(
+    family: &F,
+    film: usize,
+    values: &[f64],
+    free: &[FreeParameter],
+) -> Vec<DifferentiatedSystem<F::Built<Wide>>> {
+    acting(free, film, model)
+        .chunks(WIDTH)
+        .map(|chunk| DifferentiatedSystem {
+            system: family.build(&tagged(values, chunk, 0)),
+            columns: columns_of(chunk),
+        })
+        .collect()
+}
+
+pub(super) fn rates_of<const D: usize>(system: &impl System<f64, D>, t: f64, x: &[f64; D]) -> [f64; D] {
+    system.rates(t, x, &sides_of(system, t, x))
+}
+
+#[inline(always)]
+pub(super) fn rates<const D: usize>(system: &impl System<Wide, D>, t: Wide, x: &[Wide; D]) -> [Wide; D] {
+    system.rates(t, x, &sides_of(system, t, x))
+}

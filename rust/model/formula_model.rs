@@ -1,0 +1,219 @@
+//! A model of the user's own, given as text.
+
+use std::sync::Arc;
+
+use super::{Family, Parameter, Sides, System, parameter};
+use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
+use crate::scalar::{Real, Scalar};
+use crate::unroll::vector;
+
+/// The most intermediate values of an equation; most need few.
+const DEEP: usize = 64;
+const SHALLOW: usize = 8;
+
+/// The equations `x' = f(t, x)` with their numbers. Their kinks are switching surfaces.
+#[derive(Clone, Debug)]
+pub struct Own<S, const D: usize> {
+    equations: Arc<[Expression; D]>,
+    kinks: Arc<Kinks>,
+    deep: bool,
+    parameters: Vec<S>,
+}
+
+impl<S: Scalar, const D: usize> Own<S, D> {
+    /// Over packets, which have their tape, this is asked seldom: not worth compiling their formulas.
+    #[inline(never)]
+    fn lane_by_lane(&self, t: S, x: &[S; D]) -> [S; D] {
+        let mut rates = [S::Real::zero(); D];
+        for lane in 0..S::Real::LANES {
+            let leaf = |leaf| match leaf {
+                Leaf::Number(value) => value,
+                Leaf::Time => t.real().lane(lane),
+                Leaf::State(n) | Leaf::Rate(n) => x[n].real().lane(lane),
+                Leaf::Parameter(i) => self.parameters[i].real().lane(lane),
+            };
+            for n in 0..D {
+                rates[n].set_lane(lane, self.equations[n].value_of(leaf, &mut [0.0; DEEP]));
+            }
+        }
+        vector!(S, D; n => S::lift(rates[n]))
+    }
+
+    #[inline(always)]
+    fn evaluate(
+        &self,
+        formulas: &[Expression],
+        t: S,
+        x: &[S; D],
+        sides: &Sides<S>,
+        (values, stack): (&mut [S], &mut [S]),
+    ) {
+        let place = Place { t, x, rates: &[], parameters: &self.parameters };
+        for (formula, value) in formulas.iter().zip(values) {
+            *value = formula.value_on(&place, sides, stack);
+        }
+    }
+
+    /// The values of some of its formulas.
+    // One function for each kind of number, too: the room for them is written at every place where it is inlined.
+    #[inline(never)]
+    fn values<const N: usize>(&self, formulas: &[Expression], t: S, x: &[S; D], sides: &Sides<S>) -> [S; N] {
+        let mut values = [S::zero(); N];
+        if self.deep {
+            self.evaluate(formulas, t, x, sides, (&mut values, &mut [S::zero(); DEEP]));
+        } else {
+            self.evaluate(formulas, t, x, sides, (&mut values, &mut [S::zero(); SHALLOW]));
+        }
+        values
+    }
+}
+
+impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
+    // Laws with kinks are not run in packets, which then need not be compiled to land.
+    const SMOOTH: bool = S::Real::LANES > 1;
+
+    #[inline]
+    fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
+            self.lane_by_lane(t, x)
+        } else {
+            self.values(&self.equations[..], t, x, sides)
+        }
+    }
+
+    #[inline]
+    fn surfaces(&self) -> usize {
+        self.kinks.surfaces.len()
+    }
+
+    fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
+        // As said above, not called.
+        if const { S::Real::LANES > 1 } {
+            return S::one();
+        }
+        let [value] = self.values(&self.kinks.surfaces[j..=j], t, x, sides);
+        value
+    }
+
+    fn surface_name(&self, j: usize, _side: bool) -> &'static str {
+        if self.kinks.jumps[j] { "jump" } else { "kink" }
+    }
+
+    fn jumps(&self, j: usize) -> bool {
+        self.kinks.jumps[j]
+    }
+}
+
+/// Builds [`Own`].
+///
+/// ```
+/// use udd::model::{Family, OwnFamily, System};
+/// let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+/// let family = OwnFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"])).unwrap();
+/// let system = family.build(&[4.0]);
+/// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; 4]), [1.0, -12.0]);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct FormulaFamily<const D: usize> {
+    equations: Arc<[Expression; D]>,
+    kinks: Arc<Kinks>,
+    deep: bool,
+    parameters: Vec<String>,
+    states: Vec<(String, bool)>,
+}
+
+impl<const D: usize> FormulaFamily<D> {
+    /// Parses the right-hand sides, in the order of the states.
+    ///
+    /// # Errors
+    /// The number of the equation and what is wrong with it, in words that continue "the formula ...".
+    ///
+    /// # Panics
+    /// Where there are not `D` states and equations.
+    pub fn parse(
+        states: &[String],
+        equations: &[&str],
+        parameters: &[String],
+    ) -> Result<Self, (usize, Mistake)> {
+        assert!(states.len() == D && equations.len() == D, "{D} states and equations are needed");
+        let mut parsed = Vec::with_capacity(D);
+        for (n, text) in equations.iter().enumerate() {
+            let wrong = |what: String| Err((n, Mistake(what)));
+            if text.replace("<=", "").replace(">=", "").contains('=') {
+                return wrong("has =, but only the right-hand side is wanted".to_owned());
+            }
+            let one = Expression::parse(text, Names { states, parameters, rates: false });
+            let one = one.map_err(|mistake| (n, mistake))?;
+            if one.depth() > DEEP {
+                return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
+            }
+            parsed.push(one);
+        }
+        let mut kinks = Kinks::default();
+        parsed.iter_mut().for_each(|one| kinks.of(one));
+        let deep = parsed.iter().chain(&kinks.surfaces).any(|one| one.depth() > SHALLOW);
+        let Ok(equations) = <[Expression; D]>::try_from(parsed) else { unreachable!("as many as states") };
+        let states = states.iter().map(|name| (name.clone(), false)).collect();
+        let (equations, kinks) = (Arc::new(equations), Arc::new(kinks));
+        Ok(Self { equations, kinks, deep, parameters: parameters.to_vec(), states })
+    }
+
+    /// These of its states are angles.
+    pub fn with_angles(mut self, names: &[String]) -> Self {
+        self.states.iter_mut().for_each(|(own, angle)| *angle = names.contains(own));
+        self
+    }
+
+    /// The same with idle states up to the number `E`.
+    ///
+    /// # Panics
+    /// Where there are more than `E` states already.
+    pub fn filled<const E: usize>(&self) -> FormulaFamily<E> {
+        let idle = E.checked_sub(D).expect("at least as many states");
+        let equations = self.equations.iter().cloned().chain(vec![Expression::number(0.0); idle]);
+        let Ok(equations) = <[Expression; E]>::try_from(equations.collect::<Vec<_>>()) else {
+            unreachable!("as many as states")
+        };
+        FormulaFamily {
+            equations: Arc::new(equations),
+            kinks: self.kinks.clone(),
+            deep: self.deep,
+            parameters: self.parameters.clone(),
+            states: self.states.clone(),
+        }
+    }
+
+    /// The names of the states that are not idle, and which of them are angles.
+    pub fn states(&self) -> Vec<(String, bool)> {
+        self.states.clone()
+    }
+
+    /// The right-hand sides.
+    pub fn equations(&self) -> &[Expression; D] {
+        &self.equations
+    }
+}
+
+impl<const D: usize> Family<D> for FormulaFamily<D> {
+    type Built<S: Scalar> = Own<S, D>;
+
+    // The usual numbers of states: every one takes its time to compile.
+    const STARTS_IN_PACKETS: bool = matches!(D, 2..=4);
+
+    fn goes_in_packets(&self) -> bool {
+        self.kinks.surfaces.is_empty()
+    }
+
+    fn idle(&self) -> usize {
+        D - self.states.len()
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        self.parameters.iter().map(|name| parameter(name, "")).collect()
+    }
+
+    fn build<S: Scalar>(&self, values: &[S]) -> Own<S, D> {
+        let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
+        Own { equations, kinks, deep: self.deep, parameters: values.to_vec() }
+    }
+}

@@ -1,0 +1,197 @@
+//! How far a Taylor polynomial reaches, and its values.
+
+use super::Jets;
+use crate::integrate::ErrorNorm;
+use crate::scalar::elementary::power_rough;
+use crate::scalar::{InstructionSet, Mask, Packet, Real, Scalar, Work};
+use crate::unroll::{unroll, vector};
+
+/// 2^-600: the square of the largest number times this, over a tolerance, is still a number.
+const SMALL: f64 = f64::from_bits((1023 - 600) << 52);
+
+impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
+    /// The solution at a distance `dt` from where it was expanded.
+    pub fn at(&self, dt: S::Real) -> [S; D] {
+        S::Real::work(self.isa(), Value(self, dt))
+    }
+
+    /// The same without derivatives, of these components; the others are zero.
+    pub fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
+        S::Real::work(self.isa(), RealValue(self, dt, of))
+    }
+
+    /// The same at these parts of a distance.
+    pub fn along<const P: usize>(&self, dt: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; P] {
+        S::Real::work(self.isa(), Along::<S, D, N, P>(self, dt, parts, of))
+    }
+
+    /// The rates of the polynomial at a distance `dt`, without derivatives, with the caller's instructions.
+    #[inline(always)]
+    pub fn slope_here(&self, dt: S::Real) -> [S::Real; D] {
+        vector!(S::Real, D; n => {
+            let c = &self.coefficients()[n];
+            let mut sum = S::Real::zero();
+            for k in (1..=self.order()).rev() {
+                sum = sum * dt + c[k].real().scale(k as f64);
+            }
+            sum
+        })
+    }
+
+    /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
+    #[inline(always)]
+    pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
+        let series = self.coefficients();
+        if const { size_of::<S>() == size_of::<S::Real>() } {
+            return vector!(S, D; n => value(&series[n], order, dt, |c| c));
+        }
+        // Derivatives fill the registers: one component after the other.
+        let mut x = [S::zero(); D];
+        for n in 0..D {
+            x[n] = value(&series[n], order, dt, |c| c);
+        }
+        x
+    }
+
+    #[inline(always)]
+    fn real_values(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
+        let order = self.order();
+        vector!(S::Real, D; n => if of[n] { value(&self.coefficients()[n], order, dt, S::real) } else { S::Real::zero() })
+    }
+
+    /// How far the solution may be followed by the series up to this order: the last two terms are then as small
+    /// as allowed. Not a number where one of these terms is none, or infinite.
+    ///
+    /// À. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99, section 3.2.
+    #[inline(always)]
+    #[allow(clippy::eq_op, reason = "infinite or no number minus itself is no number")]
+    pub fn radius<E: ErrorNorm<S, D>>(&self, order: usize, norm: &E, weights: &E::Weights) -> S::Real {
+        let (series, order) = (self.coefficients(), order.clamp(4, N - 1));
+        let mut sum = S::Real::zero();
+        unroll!(n in 0..D => { sum += series[n][order].real() + series[n][order - 1].real(); });
+        let (last, before) = (self.reach(order, norm, weights), self.reach(order - 1, norm, weights));
+        let mut radius = last.0.min(before.0);
+        // Near a pole the squares of norms are too large for a number long before the terms are.
+        let square = last.1 + before.1;
+        if square.finite().not().any() {
+            radius = S::Real::select(square.finite(), radius, self.short_radius(order, norm, weights));
+        }
+        // Zero, or not a number.
+        radius + (sum - sum)
+    }
+
+    /// The distance at which term `k` is as small as allowed, and the square of its norm.
+    #[inline(always)]
+    fn reach<E: ErrorNorm<S, D>>(&self, k: usize, norm: &E, weights: &E::Weights) -> (S::Real, S::Real) {
+        let series = self.coefficients();
+        let term = vector!(S, D; n => series[n][k]);
+        let square = norm.of_term(&term, weights);
+        (power_rough(square, -0.5 / k as f64), square)
+    }
+
+    /// The [`radius`](Jets::radius) where the terms are large: their norms are those of terms made small. Not a
+    /// number where they carry derivatives, which may have become infinite first.
+    #[cold]
+    #[inline(never)]
+    fn short_radius<E: ErrorNorm<S, D>>(&self, order: usize, norm: &E, weights: &E::Weights) -> S::Real {
+        let series = self.coefficients();
+        if const { size_of::<S>() > size_of::<S::Real>() } {
+            return S::Real::constant(f64::NAN);
+        }
+        let reach = |k: usize| {
+            let term = vector!(S, D; n => series[n][k].scale(SMALL));
+            let square = norm.of_term(&term, weights);
+            power_rough(square, -0.5 / k as f64).scale(SMALL.powf(1.0 / k as f64)) + square.scale(0.0)
+        };
+        let (last, before) = (reach(order), reach(order - 1));
+        last.min(before) + (last + before).scale(0.0)
+    }
+}
+
+/// A component's value at `dt`, of which these are the coefficients; `lift` makes them what the value is to be.
+#[inline(always)]
+fn value<S: Copy, T: Scalar, const N: usize>(
+    series: &[S; N],
+    order: usize,
+    dt: T::Real,
+    lift: impl Fn(S) -> T,
+) -> T {
+    let order = order.min(N - 1);
+    let c = |k: usize| lift(series[k]);
+    let dt2 = dt * dt;
+    let dt4 = dt2 * dt2;
+    // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
+    let rounds = order.div_ceil(4) - 1;
+    let mut sums = [T::zero(); 4];
+    unroll!(r in 0..4 => {
+        let k = 4 * rounds + 1 + r;
+        if k <= order {
+            sums[r] = c(k);
+        }
+    });
+    for round in (0..rounds).rev() {
+        unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused_times(sums[r], dt4); });
+    }
+    // The state itself is added last, which rounds once.
+    let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
+    c(0).fused_times(low.fused_times(high, dt2), dt)
+}
+
+struct Value<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
+
+impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
+    type Output = [S; D];
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> [S; D] {
+        self.0.at_here(self.0.order(), self.1)
+    }
+}
+
+struct RealValue<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real, &'a [bool; D]);
+
+impl<S: Scalar, const D: usize, const N: usize> Work for RealValue<'_, S, D, N> {
+    type Output = [S::Real; D];
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> [S::Real; D] {
+        let Self(jets, dt, of) = self;
+        jets.real_values(dt, of)
+    }
+}
+
+struct Along<'a, S: Scalar, const D: usize, const N: usize, const P: usize>(
+    &'a Jets<S, D, N>,
+    S::Real,
+    &'a [f64],
+    &'a [bool; D],
+);
+
+impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'_, S, D, N, P> {
+    type Output = [[S::Real; D]; P];
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> [[S::Real; D]; P] {
+        let Self(jets, dt, parts, of) = self;
+        let mut states = [[S::Real::zero(); D]; P];
+        if const { S::Real::LANES == 1 && !V::ISA.is_rare() } {
+            // One trajectory: the places side by side, as vector instructions want it.
+            let part = |i: usize| parts.get(i).copied().unwrap_or_default();
+            let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
+            unroll!(n in 0..D => {
+                if of[n] {
+                    let lift = |c: S| Packet::<P, V>::new([c.real().lane(0); P]);
+                    let found = value(&jets.coefficients()[n], jets.order(), places, lift);
+                    for i in 0..P {
+                        states[i][n] = S::Real::constant(found.lane(i));
+                    }
+                }
+            });
+        } else {
+            for i in 0..parts.len() {
+                states[i] = jets.real_values(dt.scale(parts[i]), of);
+            }
+        }
+        states
+    }
+}

@@ -1,0 +1,447 @@
+"""The command line: what it prints, what it writes, what it says of bad input, and its exit codes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import discovered
+import udd
+from udd.cli import main
+
+UDD = [sys.executable, "-m", "udd"]
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A pendulum's record."""
+    path = tmp_path_factory.mktemp("data") / "swing.csv"
+    discovered.pendulum().measurement.to_csv(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A disk's record of 8 s whose header says W and R."""
+    path = tmp_path_factory.mktemp("data") / "disk.csv"
+    discovered.nothing().measurement.slice(0, 8).to_csv(path)
+    return path
+
+
+def failed(argv: list[object], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one sentence that a refused command says."""
+    assert main([str(a) for a in argv]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("udd: error: ")
+    return lines[0].removeprefix("udd: error: ")
+
+
+def data(argv: list[object], capsys: pytest.CaptureFixture[str]) -> dict[str, object]:
+    """What a command says to a machine."""
+    assert main([*(str(a) for a in argv), "--json"]) == 0
+    out, _ = capsys.readouterr()
+    found: dict[str, object] = json.loads(out, parse_constant=lambda x: pytest.fail(f"{x} is not JSON"))
+    return found
+
+
+# --- simulate
+
+
+def test_a_run_is_written_as_a_measurement(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run.csv"
+    argv = ["simulate", "--W", "0.039", "--t", "2", "--dt", "0.04", "--state", "0", "-1e-3", ".04", "0"]
+    assert main([*argv, "--out", str(out)]) == 0
+    assert "finished at t = 2" in capsys.readouterr().out
+    m = udd.read_measurement(out)
+    want = udd.simulate(udd.Disk(0.039), 0.04 * np.arange(51), [0, -1e-3, 0.04, 0]).state
+    np.testing.assert_array_equal(m.values, want[:, 1:])
+    assert m.meta["W"] == 0.039
+
+
+def test_a_run_goes_to_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "--w", "1", "--t", "10", "--dt", "5", "--state=1,1,.01"]) == 0
+    out, err = capsys.readouterr()
+    last = out.splitlines()[-1].split(",")
+    # physics.md's reference state of the DLE at w = 1
+    np.testing.assert_allclose([float(x) for x in last], [10, 0.97664030875, 0.98317480213, 0.04343309237])
+    assert "finished" in err
+
+
+def test_a_run_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    found = data(
+        ["simulate", "--pendulum", "0.5", "--t", "1", "--dt", ".5", "--effect", "quadratic_drag:c=.01"],
+        capsys,
+    )
+    assert found["state_names"] == ["Omega", "theta"]
+    assert found["t"] == [0, 0.5, 1.0]
+    left = data(["simulate", "--W", ".04", "--state", "0", ".01", ".07", "0", "--t", "60"], capsys)
+    assert left["outcome"] == "ejected"
+
+
+# --- lyapunov
+
+
+def test_exponents(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["lyapunov", "--from", "1", "--to", "3.9", "--n", "2", "--t", "2000", "--tol", "0.05"]
+    rows = data(argv, capsys)["exponents"]
+    assert isinstance(rows, list)
+    # 0.2102 and 0.2148 (physics.md), within five of the standard errors found.
+    for row, (w, want) in zip(rows, [(1.0, 0.21016), (3.9, 0.21479)], strict=True):
+        assert row["w"] == w
+        assert abs(row["lambda_1"] - want) < 5 * row["standard_error"] < 0.25
+    assert main(["lyapunov", "1", "--t", "2000", "--tol", "0.05"]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert table[0] == "w,lambda_1,standard_error"
+    assert float(table[1].split(",")[1]) == pytest.approx(rows[0]["lambda_1"], rel=1e-9)
+
+
+def test_an_exponent_that_is_not_sure_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lyapunov", "1", "--t", "200", "--tol", "1e-6"]) == 0
+    assert "udd: warning: 1 of 1 exponents" in capsys.readouterr().err
+
+
+def test_exponents_with_damping_are_those_of_the_function(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["lyapunov", *map(str, range(1, 41)), "--B", "0.2", "--t", "500", "--tol", "1"]
+    rows = data(argv, capsys)["exponents"]
+    assert isinstance(rows, list)
+    values = udd.lyapunov(np.arange(1.0, 41.0), parameters={"B": 0.2}, t=500.0, tol=1.0)
+    assert [row["lambda_1"] for row in rows] == values.tolist()  # to the bit, in whatever portions
+
+
+def test_spectra(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["lyapunov", "1", "10", "--spectrum", "--tol", "5e-3"]
+    chaos, orbit = data(argv, capsys)["spectra"]
+    alone = udd.lyapunov_spectrum(1.0, tol=5e-3)
+    assert [chaos[f"lambda_{k}"] for k in (1, 2, 3)] == alone.exponents.tolist()
+    assert [chaos[f"standard_error_{k}"] for k in (1, 2, 3)] == alone.standard_errors.tolist()
+    assert (chaos["verdict"], chaos["dimension"], chaos["period"]) == ("chaos", alone.dimension, None)
+    assert (orbit["verdict"], orbit["dimension"]) == ("periodic orbit", 1.0)
+    assert orbit["period"] == pytest.approx(3.35832224912, rel=1e-6)  # as in test_spectrum.py
+    assert main(argv) == 0
+    table = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    assert [list(row) for row in table] == [list(chaos), list(orbit)]
+    assert [row["verdict"] for row in table] == ["chaos", "periodic orbit"]
+    assert (table[0]["period"], float(table[1]["period"])) == (
+        "nan",
+        pytest.approx(orbit["period"], rel=1e-9),
+    )
+
+
+@pytest.mark.parametrize("more", [[], ["--spectrum"]])
+def test_a_solution_that_blows_up_has_a_row(more: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lyapunov", "1e300", "1", "--t", "2000", "--tol", "0.1", *more]) == 0
+    out, err = capsys.readouterr()
+    head, first, second = (line.split(",") for line in out.splitlines())
+    assert len(head) == len(first) == len(second)
+    assert first[:3] == ["1e+300", "nan", "nan"]
+    assert float(second[1]) > 0.1
+    assert err == "udd: warning: 1 of 2 solutions blew up and have no exponent\n"
+
+
+# --- fit and discover
+
+
+def test_the_header_knows_and_the_command_line_wins(disk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    by_header = data(["fit", disk, "--free", "k0"], capsys)
+    assert "W=0.042" in str(by_header["model"])
+    by_hand = data(["fit", disk, "--free", "k0", "--W", "0.043", "--R", "0.081"], capsys)
+    assert "W=0.043, R=0.081" in str(by_hand["model"])
+
+
+def test_a_fit_tells_its_numbers(disk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fit", str(disk), "--no-camera"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("converged")
+    assert "k0" in out
+    assert "+-" in out
+    assert "tilt" not in out
+
+
+def test_several_files_are_fitted_together(
+    disk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    later = tmp_path / "later.csv"
+    discovered.nothing().measurement.slice(8, 16).to_csv(later)
+    options = ["--free", "k0,W", "--no-camera"]
+    alone = data(["fit", disk, *options], capsys)
+    both = data(["fit", disk, later, *options], capsys)
+    assert both["file"] == [str(disk), str(later)]
+    assert set(both["parameters"]) == {"k0", "W[0]", "W[1]"}
+    # Twice the data of the same friction.
+    assert both["parameters"]["k0"]["se"] < alone["parameters"]["k0"]["se"]
+    own = data(["fit", disk, later, *options, "--each", "k0,W"], capsys)
+    assert {"k0[0]", "k0[1]"} < set(own["parameters"])
+    assert "absent.csv" in failed(["fit", disk, tmp_path / "absent.csv"], capsys)
+
+
+def test_discover_tells_the_verdict_first(
+    swing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    assert main(["discover", str(swing), "--pendulum", "0.6", "--report", str(page)]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("effect ")
+    assert "quadratic drag" in out
+    assert "noise floor" in out
+    assert "\n  noise: theta 0.0" in out
+    assert out.isascii()  # for terminals of every locale
+    assert err == ""  # no progress where nobody watches
+    written = page.read_text(encoding="utf-8")
+    assert written.startswith("<!DOCTYPE html>")
+    assert "A frame is good to: theta 0.0" in written
+
+
+def test_discover_as_json(swing: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = data(["discover", swing, "--pendulum", "0.6"], capsys)
+    assert found["verdict"] == discovered.pendulum().verdict
+    assert found["effects"]
+    assert [one["name"] for one in found["noise"]] == ["theta"]
+
+
+# --- bad input: one sentence, exit code 1, nothing written
+
+CSV = "t,Y,Z,beta\n" + "".join(f"{i / 25},.01,.02,{i / 10}\n" for i in range(100))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("absent.csv", None, "no such file"),
+        ("absent.mp4", None, "no such file"),
+        ("empty.csv", "", "empty"),
+        ("empty.mp4", "", "empty"),
+        ("text.mp4", "this is no film", "not a film"),
+        ("column.csv", CSV.replace("beta", "gamma"), "no column beta"),
+        ("text.csv", CSV.replace("1.0\n", "one\n", 1), "'one'"),
+        ("nan.csv", CSV.replace(".01,.02", "nan,nan"), "no usable row"),
+        ("unsorted.csv", CSV.replace("\n1.0,", "\n0.5,"), "times must increase"),
+        ("twice.csv", CSV.replace("\n1.0,", "\n0.96,"), "repeats the time"),
+        ("short.csv", "\n".join(CSV.splitlines()[:6]), "too short"),
+        ("brief.csv", "\n".join(CSV.splitlines()[:15]), "at least 20"),
+    ],
+)
+def test_bad_files_are_refused(
+    name: str, content: str | None, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_text(content)
+    before = set(tmp_path.iterdir())
+    sentence = failed(["discover", path, "--W", "0.04", "--report", tmp_path / "page.html"], capsys)
+    assert said in sentence
+    assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--W", "-0.04"], "W must not be below 0"),
+        (["--W", "nan"], "W must be finite"),
+        (["--W", "inf"], "W must be finite"),
+        (["--R", "-1"], "R must be above 0"),
+        (["--R", "0"], "R must be above 0"),
+        (["--R", "inf"], "R must be finite"),
+        (["--k0", "-1"], "k0 must not be below 0"),
+        (["--free", "k9"], "no parameter 'k9'"),
+        (["--effect", "magic"], "no effect is called 'magic'"),
+        (["--effect", "relaxation:b"], "parameter=number"),
+        (["--effect", "quadratic_drag:c=-5"], "c of quadratic_drag must lie between"),
+        (["--pendulum", "0.5"], "--pendulum does not apply"),
+    ],
+)
+def test_bad_options_are_refused(
+    options: list[str], said: str, disk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert said in failed(["fit", disk, *options], capsys)
+
+
+def test_what_is_not_known_is_asked_for(
+    tmp_path: Path, swing: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare = tmp_path / "bare.csv"
+    bare.write_text(CSV)
+    assert "say --W in m/s (--W 0 where" in failed(["fit", bare], capsys)
+    assert "--pendulum LENGTH" in failed(["fit", swing], capsys)
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"anything")
+    assert "say --W in m/s" in failed(["discover", film], capsys)
+    assert "which model" in failed(["simulate"], capsys)
+    assert "at which drives" in failed(["lyapunov"], capsys)
+
+
+def test_places_that_cannot_be_written_to(
+    disk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    absent = tmp_path / "absent" / "x"
+    assert "no folder" in failed(["simulate", "--W", "0", "--t", "1", "--out", absent], capsys)
+    assert "no folder" in failed(["discover", disk, "--report", absent], capsys)
+    assert "is a folder" in failed(["simulate", "--W", "0", "--t", "1", "--out", tmp_path], capsys)
+    (tmp_path / "file").write_text("")
+    assert "cannot be made" in failed(["demo", "--out", tmp_path / "file" / "x"], capsys)
+
+
+def test_numbers_that_make_no_sense(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--t must be above 0" in failed(["simulate", "--W", "0", "--t", "-1"], capsys)
+    assert "too many" in failed(["simulate", "--W", "0", "--dt", "1e-9"], capsys)
+    assert "4 components" in failed(["simulate", "--W", "0", "--state", "1"], capsys)
+    assert "must be numbers" in failed(["simulate", "--W", "0", "--state", "one"], capsys)
+    assert "tol must be above 0" in failed(["lyapunov", "1", "--tol", "0"], capsys)
+    assert "w must not be below 0" in failed(["lyapunov", "-1"], capsys)
+    assert "550x700" in failed(["film", "x.mp4", "--W", "0.04", "--size", "big"], capsys)
+
+
+@pytest.mark.parametrize("argv", [[], ["nonsense"], ["simulate", "--nonsense"], ["fit"], ["film"]])
+def test_wrong_usage_is_two(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(argv)
+    assert left.value.code == 2
+    assert "usage:" in capsys.readouterr().err
+
+
+def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
+    for argv in (["--help"], ["--version"], ["discover", "--help"]):
+        with pytest.raises(SystemExit) as left:
+            main(argv)
+        assert left.value.code == 0
+    assert "--report" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("absent", ["av", "cv2"])
+def test_a_missing_extra_is_named(
+    absent: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, absent, None)
+    film = Path(udd.__file__).parent / "demo" / "sample.mp4"
+    assert "udd[track]" in failed(["track", film], capsys)
+    assert "udd[track]" in failed(["film", tmp_path / "x.mp4", "--W", "0.04", "--t", "1"], capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- as a process
+
+
+def test_nobody_reads_on() -> None:
+    process = subprocess.Popen(
+        [*UDD, "simulate", "--W", "0", "--t", "2000"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr is not None
+    assert b"Traceback" not in process.stderr.read()
+    process.stderr.close()
+    assert process.wait(timeout=60) == 141
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to the whole console")
+@pytest.mark.parametrize(("more", "columns"), [([], 3), (["--spectrum"], 10)])
+def test_ctrl_c_keeps_what_is_finished(more: list[str], columns: int) -> None:
+    process = subprocess.Popen(
+        [*UDD, "lyapunov", "--from", "1", "--to", "8", "--n", "100000", "--t", "500", *more],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    lines = [process.stdout.readline() for _ in range(3)]
+    process.send_signal(signal.SIGINT)
+    start = time.monotonic()
+    out, err = process.communicate(timeout=60)
+    assert time.monotonic() - start < 10  # loose: a busy machine; the core's own answer is tested to 0.2 s
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert "stopped after" in err
+    rows = ("".join(lines) + out).splitlines()[1:]
+    assert all(len(row.split(",")) == columns for row in rows)
+    assert len(rows) >= 2
+
+
+# --- films
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("av", reason="needs the extra 'track'")
+    pytest.importorskip("cv2", reason="needs the extra 'track'")
+    path = tmp_path_factory.mktemp("film") / "film.mp4"
+    assert main(["film", str(path), "--W", "0.03", "--t", "4.01", "--state", "1", ".02", "-.01", "0"]) == 0
+    return path
+
+
+def test_a_film_is_made_and_tracked(film: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "m.csv"
+    assert main(["track", str(film), "--out", str(out), "--W", "0.03"]) == 0
+    assert "written:" in capsys.readouterr().out
+    m = udd.read_measurement(out)
+    assert m.meta["W"] == 0.03
+    truth = udd.simulate(udd.Disk(0.03), m.t, [1, 0.02, -0.01, 0]).state
+    # A tenth of a pixel is 0.06 mm; the contact, from four seconds alone, is found to a millimetre or so.
+    assert np.nanmedian(np.abs(m["Y"] - truth[:, 1])) < 2e-3
+    assert np.nanmedian(np.abs(m["Z"] - truth[:, 2])) < 2e-3
+
+
+def test_a_film_that_is_cut_off(film: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cut = tmp_path / "cut.mp4"
+    whole = film.read_bytes()
+    cut.write_bytes(whole[: len(whole) // 2])
+    sentence = failed(["track", cut, "--out", tmp_path / "m.csv"], capsys)
+    assert "cut off" in sentence
+    assert set(tmp_path.iterdir()) == {cut}
+
+
+def test_a_film_without_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    av = pytest.importorskip("av", reason="needs the extra 'track'")
+    path = tmp_path / "wall.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("h264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 128, 128, "yuv420p"
+        for level in range(20):
+            picture = np.full((128, 128, 3), 100 + level, dtype=np.uint8)
+            picture[40:80, 30:60] = 20
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode(None))
+    assert "no disk with marks" in failed(["discover", path, "--W", "0.04"], capsys)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("null", [False, True])
+def test_the_demonstration(null: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = data(["demo", "--out", tmp_path / "new" / "demo", *(["--null"] if null else [])], capsys)
+    assert Path(str(found["report"])).read_text(encoding="utf-8").count("<img") >= 8
+    assert udd.read_measurement(str(found["measurement"])).meta["W"] == 0.042
+    effects = found["effects"]
+    assert isinstance(effects, list)
+    if null:
+        assert found["verdict"] == "nothing missing"
+        return
+    # The film was made with b = 6 /m. At one drive a slip c Z with c = b W acts identically: both are right.
+    assert [e["name"] for e in effects] in (["relaxation"], ["slip"])
+    ((_, amplitude),) = effects[0]["parameters"].items()
+    b = amplitude["value"] / (1 if effects[0]["name"] == "relaxation" else 0.042)
+    assert b == pytest.approx(6.0, abs=0.3)
+    ratio = found["held_out_ratio"]
+    assert isinstance(ratio, dict)
+    assert ratio["high"] < 0.5
+
+
+def test_the_drive_may_be_said_by_its_wheel(capsys: pytest.CaptureFixture[str]) -> None:
+    run = ["simulate", "--t", "1", "--dt", ".5", "--state", "0", ".01", ".02", "0"]
+    wanted = data([*run, "--W", "0.039"], capsys)
+    assert data([*run, "--rate", "1.3"], capsys) == wanted
+    assert data([*run, "--rate", "1.95:0.02"], capsys) == wanted
+    for bad in ("fast", "1:2:3", "-1", "nan"):
+        with pytest.raises(SystemExit):
+            main([*run, f"--rate={bad}"])
+        assert "rate" in capsys.readouterr().err.splitlines()[-1]

@@ -1,0 +1,111 @@
+"""A search that is given so many seconds, and records of too many or of few frames."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+from test_confirmed import in_air
+from udd.cli.discover import describe
+from udd.discovery import time_budget
+from udd.errors import FitError
+from udd.fitting.thinning import thinned
+
+
+def test_a_search_without_time_says_so_and_claims_nothing(tmp_path):
+    said: list[str] = []
+    found = udd.discover(*in_air(), budget=1e-6, progress=said.append)
+    assert found.effects == [] and found.scans == []
+    assert found.stopped == "scoring candidates" and found.to_dict()["stopped"] == found.stopped
+    assert found.verdict != "nothing missing"
+    assert "The search ended after 1e-06 s, as asked" in describe(found).splitlines()[0]
+    assert said == ["fitting the known model", "fitting the model as found"]
+    found.report(tmp_path / "page.html")
+    assert "as asked" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_a_search_whose_model_explains_its_data_is_not_finished_without_time():
+    measured, model = in_air()
+    right = model.with_effects([udd.effects.quadratic_drag(c=0.02)])
+    found = udd.discover(measured, right, budget=1e-6)
+    assert found.verdict == "search not finished"
+    assert describe(found).startswith("search not finished: Whether something is missing is not known yet")
+
+
+def test_what_passed_before_the_time_was_up_stands(monkeypatch):
+    # The clock stops once a further effect is sought.
+    plain = time_budget.Clock.tell
+
+    def tell(self: time_budget.Clock, text: str) -> None:
+        self.end = 0.0 if "further" in text else np.inf
+        plain(self, text)
+
+    monkeypatch.setattr(time_budget.Clock, "tell", tell)
+    found = udd.discover(*in_air(), budget=100.0)
+    assert [f.title for f in found.effects] == ["quadratic drag"]
+    assert found.stopped == "scoring candidates for a further effect"
+    assert "what else may be missing was not tried" in describe(found).splitlines()[0]
+
+
+@pytest.mark.parametrize("budget", [0.0, -1.0, "soon", float("nan")])
+def test_a_budget_is_a_positive_number(budget):
+    with pytest.raises(FitError, match="the budget must be a positive number of seconds"):
+        udd.discover(*in_air(), budget=budget)
+
+
+def swing(rate: float, noise: float) -> tuple[udd.Measurement, np.ndarray]:
+    """A pendulum's angle over 30 s, so many times a second, and the same without noise."""
+    t = np.arange(0, 30, 1 / rate)
+    theta = udd.simulate(udd.Pendulum(0.5, k0=0.01), t, [0.0, 1.0]).state[:, 1]
+    seen = theta + noise * np.random.default_rng(2).standard_normal(len(t))
+    seen[12000:12500] = np.nan
+    seen[::97] += 0.5
+    return udd.Measurement(t, {"theta": seen}, sigma=np.full((len(t), 1), noise)), theta
+
+
+def test_block_averages_keep_what_a_record_says():
+    measured, theta = swing(1000.0, 5e-3)
+    found = thinned(measured)
+    few = found.measurement
+    assert (found.frames, found.every) == (29500, 8)
+    assert len(few) < 4000
+    assert few.t[0] == measured.t[0] and not few.seen[0]  # from where the model's time counts
+    few = few.rows(np.flatnonzero(few.seen))
+    off = few["theta"] - np.interp(few.t, measured.t, theta)
+    # White noise, whose mean over a block is corrected for the motion's bend: 18 % more variance.
+    assert np.sqrt((off**2).mean()) == pytest.approx(5e-3 / np.sqrt(8) * np.sqrt(1.18), rel=0.1)
+    assert np.median(few["sigma_theta"]) == pytest.approx(5e-3 / np.sqrt(8), rel=0.1)
+    assert abs(off).max() < 6 * 5e-3 / np.sqrt(8)  # neither the odd frames nor the gap left a trace
+    assert off.mean() == pytest.approx(0.0, abs=1e-4)
+
+
+def test_what_needs_its_frames_keeps_them():
+    t = np.arange(20000) / 1000
+    fast = np.sin(2 * np.pi * 100 * t) + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    assert thinned(udd.Measurement(t, {"x": fast})).every == 1
+    slow, _theta = swing(250.0, 5e-3)  # few enough as it is
+    assert thinned(slow).measurement is slow
+
+
+def test_a_discovery_says_what_was_averaged():
+    t = np.arange(0, 40, 0.002)
+    truth = udd.Pendulum(0.6, k0=0.004, effects=[udd.effects.quadratic_drag(c=0.02)])
+    theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
+    noise = 5e-3 * np.random.default_rng(3).standard_normal(len(t))
+    found = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(0.6, k0=0.01))
+    assert [f.title for f in found.effects] == ["quadratic drag"]
+    assert "The record's 20000 frames were averaged over 5 at a time, to 3998" in found.remarks[-1]
+
+
+def test_a_fall_of_a_second_shows_the_air():
+    t = np.arange(60) / 60
+    truth = udd.Model(["x", "v"], ["v", "g - c*abs(v)*v"], {"g": 9.81, "c": 0.3})
+    x = udd.simulate(truth, t, [0.0, 0.0]).state[:, 0]
+    known = udd.Model(["x", "v"], ["v", "g"], {"g": 9.81})
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    for n, verdict in ((60, "effect identified"), (30, "effect present, form not identified")):
+        found = udd.discover(udd.Measurement(t[:n], {"x": (x + noise)[:n]}), known)
+        assert found.verdict == verdict
+    still = udd.simulate(known, t, [0.0, 0.0]).state[:, 0]
+    assert udd.discover(udd.Measurement(t, {"x": still + noise}), known).verdict == "nothing missing"

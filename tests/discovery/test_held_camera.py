@@ -1,0 +1,53 @@
+"""A camera that was held as perfect, and shows all the same; and forms told apart by a film's own scatter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+from udd.fitting.formula_models import typical_noise
+
+
+def filmed(
+    zero: float, *drags: udd.effects.Effect, seconds: float = 40.0, sd: float = 1e-3
+) -> udd.Measurement:
+    """A pendulum's film, whose zero is elsewhere."""
+    t = np.arange(0, seconds, 1 / 25)
+    theta = udd.simulate(udd.Pendulum(0.6, k0=0.004, effects=list(drags)), t, [0.0, 0.9]).state[:, 1]
+    noise = sd * np.random.default_rng(2).standard_normal(len(t))
+    return udd.Measurement(t, {"theta": theta + zero + noise})
+
+
+@pytest.mark.parametrize("zero", [0.01, 0.0])
+def test_what_a_cameras_faults_explain_is_told(zero: float) -> None:
+    """The zero of the angle passes for a constant torque; a camera that is perfect changes nothing."""
+    record = filmed(zero, udd.effects.quadratic_drag(c=0.006))
+    found = udd.discover(record, udd.Pendulum(0.6, k0=0.008), camera=False)
+    said = [remark for remark in found.remarks if "camera=True" in remark]
+    titles = {e.title for e in found.effects}
+    if zero:
+        assert titles == {"constant torque", "quadratic drag"}
+        assert found.verdict == "effect present, form not identified"
+        assert found.excused == ["constant torque"] and "constant torque" in said[0]
+    else:
+        assert titles == {"quadratic drag"} and found.verdict == "effect identified"
+        assert found.excused is None and not said
+
+
+@pytest.mark.slow
+def test_two_drags_are_told_apart_by_the_scatter_that_shows() -> None:
+    """A film is not taken for better than 2.5 mrad, yet shows .6 mrad: by that both are needed."""
+    drags = udd.effects.quadratic_drag(c=0.001), udd.effects.cubic_drag(c=0.0005)
+    record = filmed(0.005, *drags, seconds=100.0, sd=6e-4)
+    found = udd.discover(record, udd.Pendulum(0.6, k0=0.008))
+    assert {e.title for e in found.effects} == {"quadratic drag", "cubic drag"}
+    assert found.fit.parameters["k0"] > 0
+
+
+def test_a_signal_of_few_samples_a_turn_is_no_noise() -> None:
+    """Third differences of nine samples a turn are a thirtieth of the signal, sixth ones a 500th."""
+    t = np.arange(0, 1, 1 / 610)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    found = typical_noise((np.sin(2 * np.pi * 70 * t) + noise)[:, None])
+    assert 0.8e-3 < found[0] < 4e-3  # 37e-3 by third differences alone

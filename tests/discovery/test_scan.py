@@ -1,0 +1,36 @@
+"""Candidates together: what a group explains follows from one solve's gradient and information."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from udd.discovery.scoring.score_scan import Scan, Scored
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_a_group_lowers_chi2_as_least_squares_do(size: int) -> None:
+    rng = np.random.default_rng(4)
+    columns = [[0], [1, 2], [3], [4], [5]]
+    design = rng.standard_normal((60, 6))
+    design[:, 5] = design[:, 4] + 1e-7 * rng.standard_normal(60)  # two candidates that act alike
+    data = design @ [0.0, 2.0, -1.0, 0.5, 0.3, 0.0] + rng.standard_normal(60)
+    scored = [Scored(str(k), 0.0, 1.0, (), (), k == 2, True) for k in range(5)]  # type: ignore[arg-type]
+    found = Scan(scored, design.T @ data, design.T @ design, columns, 2.0).groups(size)
+
+    usable = [0, 1, 3, 4]  # the third is absorbed
+    expected = {}
+    for group in itertools.combinations(usable, size):
+        if {3, 4} <= set(group):
+            continue
+        own = design[:, [c for k in group for c in columns[k]]]
+        left = data - own @ np.linalg.lstsq(own, data, rcond=None)[0]
+        expected[tuple(str(k) for k in group)] = (data @ data - left @ left) / 2.0
+    falls = [fall for _group, fall in found]
+    assert falls == sorted(falls, reverse=True)
+    # Normal equations of well-conditioned columns lose a few digits.
+    assert {tuple(s.candidate for s in group): fall for group, fall in found} == pytest.approx(
+        expected, rel=1e-9
+    )

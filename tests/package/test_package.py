@@ -1,0 +1,43 @@
+"""The package as a whole: its names, its weight on import, its one version."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import udd
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("name", udd.__all__)
+def test_every_public_name_resolves(name: str) -> None:
+    assert getattr(udd, name) is not None
+    assert name in dir(udd)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        udd.no_such_thing  # noqa: B018
+
+
+def test_import_stays_light() -> None:
+    # In a process of its own: here the other tests have imported everything already.
+    code = "import sys, udd; print(*{name.partition('.')[0] for name in sys.modules})"
+    loaded = set(subprocess.check_output([sys.executable, "-c", code], text=True).split())
+    assert "udd" in loaded
+    heavy = {"av", "cv2", "matplotlib", "numpy", "pandas", "pyarrow", "scipy", "xarray"}
+    assert loaded & heavy == set()
+
+
+def test_one_version_everywhere() -> None:
+    cargo = tomllib.loads((ROOT / "Cargo.toml").read_text())["package"]["version"]
+    citation = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert citation is not None
+    assert (version("udd"), citation[1]) == (cargo, cargo)

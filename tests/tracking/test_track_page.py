@@ -1,0 +1,99 @@
+"""The page about a tracked film: all of it there, standing alone, and the same each time."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("av", reason="the tracker's extra is not installed")
+pytest.importorskip("cv2", reason="the tracker's extra is not installed")
+
+import udd
+from udd.cli import main
+from udd.errors import UddError
+from udd.film import Defects
+from udd.report.tracking import calibration, chosen
+from udd.tracking import page, track_in_detail
+from udd.tracking.metric.rolling_check import health
+from udd.tracking.pipeline import Tracking
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    run = udd.simulate(udd.Disk(0.039), np.arange(0, 4, 0.005), [1, 0.02, -0.02, 0.3], dense=True)
+    wrong = Defects(dropped=(30,), repeated=(50,), black=(70,))
+    path = tmp_path_factory.mktemp("page") / "run.mp4"
+    return udd.render(run, path, size=(276, 350), defects=wrong).path
+
+
+@pytest.fixture(scope="module")
+def found(film: Path) -> Tracking:
+    return track_in_detail(film)
+
+
+def test_the_page_holds_all_and_stands_alone(film: Path, found: Tracking, tmp_path: Path) -> None:
+    page(film, found, tmp_path / "page.html", command="udd track run.mp4 --page page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>") and "97 of 99 frames" in text
+    for said in ("What was found", "The camera and the device", "How each frame did", "Does it roll?", "±"):
+        assert said in text
+    for item in found.measurement.meta["calibration"]:
+        assert f'<th scope="row">{item}</th>' in text
+    for flag in (
+        "dup: the frame repeats",
+        "black: the frame shows nothing",
+        "gap: 1 frame is missing before",
+    ):
+        assert flag in text
+    images = re.findall(r'<img src="data:image/(?:png|jpeg);base64,[^"]{1000,}" alt="([^"]+)"', text)
+    # frames with why, then motion, quality, map, rolling
+    assert len(images) == len(chosen(found.measurement)) + 4 and any("black" in alt for alt in images)
+    assert "http" not in text and "<script" not in text and str(film.parent) not in text
+    page(film, found, tmp_path / "again.html", command="udd track run.mp4 --page page.html")
+    assert (tmp_path / "again.html").read_bytes() == (tmp_path / "page.html").read_bytes()
+
+
+def test_values_are_told_to_their_errors(found: Tracking) -> None:
+    rows = {row.name: row for row in calibration(found.measurement)}
+    scale = found.measurement.meta["calibration"]["scale"]
+    assert float(rows["scale"].value) == pytest.approx(scale[0], abs=0.1 * scale[1])
+    assert len(rows["scale"].value) <= 8 and rows["exposure"].unit == "ms"
+
+
+def test_a_table_read_back_makes_a_page_too(film: Path, found: Tracking, tmp_path: Path) -> None:
+    found.measurement.to_csv(tmp_path / "m.csv")
+    page(film, udd.read_measurement(tmp_path / "m.csv"), tmp_path / "page.html")
+    assert "by the place of the middle" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_the_command_writes_it(film: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "page.html"
+    argv = ["track", str(film), "--fast", "--page", str(out), "--out", str(tmp_path / "m.csv")]
+    assert main(argv) == 0, capsys.readouterr().err
+    text = out.read_text(encoding="utf-8")
+    assert "udd track run.mp4 --fast --page page.html" in text
+    assert "udd track film --page" not in text
+    assert main(["track", str(film.parent), "--page", str(out), "--out", str(tmp_path)]) == 1
+    assert "--page is for one film" in capsys.readouterr().err
+
+
+def test_what_is_left_of_rolling_is_noise_here_and_shows_a_wrong_clock(found: Tracking) -> None:
+    m = found.measurement
+    fine = health(m)
+    assert fine is not None and 0.2 < fine.rms / fine.noise < 3  # the model is the maker's own
+    # a disk that slips sideways by 5 mm/s in one direction of turning
+    slip = 0.005 * np.cumsum(np.gradient(m.t) * (np.nan_to_num(np.gradient(m["beta"], m.t)) > 0))
+    values = m.values.copy()
+    values[:, 0] += slip
+    worse = health(udd.Measurement(m.t, values, m.sigma, m.rho, m.flag, m.meta, m.names))
+    assert worse is not None and worse.rms > 5 * fine.rms
+
+
+def test_what_is_no_film_has_no_page(tmp_path: Path, film: Path) -> None:
+    t = np.arange(30) / 25
+    with pytest.raises(UddError, match="was not tracked in a film"):
+        page(film, udd.Measurement(t, {"theta": np.sin(t)}), tmp_path / "page.html")
+    assert list(tmp_path.iterdir()) == []
