@@ -9,13 +9,14 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 use crate::scalar::{DerivativeLanes, InstructionSet, Isa, Scalar};
 
-/// The body for every order `k` below `to`, at most 24, with its number known when the program is compiled.
+/// The body for every order `k` below `to`, a number of coefficients of at most 25, with its number known when the program
+/// is compiled.
 macro_rules! orders {
     ($k:ident below $to:tt => $body:block) => {
         $crate::tape::series::orders!(@ $k $to, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23)
     };
     (@ $k:ident $to:tt, $body:block, $($n:literal)+) => {
-        $(if $crate::unroll::Turn::<0, $n, $to, 24>::RUNS {
+        $(if $crate::unroll::Turn::<0, $n, $to, 25>::RUNS {
             let $k: usize = $n;
             $body
         })+

@@ -12,6 +12,7 @@ import pytest
 import simulated
 import udd
 from udd.cli import main
+from udd.fitting.diagnostics import coarse
 
 E = udd.effects
 DRIVE = 0.042
@@ -156,3 +157,18 @@ def test_an_encoder_has_a_zero_but_no_perspective():
     assert {"theta0", "aside", "above"} <= set(filmed.parameters)
     coded = udd.fit(udd.Measurement(t, seen, meta={"sensor": "encoder"}), udd.Pendulum(0.8))
     assert set(filmed.parameters) - set(coded.parameters) == {"aside", "above"}
+
+
+@pytest.mark.parametrize(("other", "told"), [(0.1, ["Y", "Z"]), (1.0, [])])
+def test_steps_that_no_other_noise_blurs_are_told(other: float, told: list[str]) -> None:
+    """An error of a step of 3 mm is a function of where the disk is, unless noise of 3 mm takes part."""
+    measured, _states = simulated.film(udd.Disk(0.045), np.random.default_rng(3), 20.0)
+    step, rng = 3e-3, np.random.default_rng(4)
+    values = measured.values.copy()
+    for k in range(2):
+        values[:, k] = step * np.round(
+            (values[:, k] + other * step * rng.standard_normal(len(values))) / step
+        )
+    sigma = np.tile([np.hypot(other, 12**-0.5) * step] * 2 + [0.01], (len(values), 1))
+    fitted = udd.fit(udd.Measurement(measured.t, values, sigma=sigma), udd.Disk(0.045))
+    assert [one.name for one in coarse(fitted)] == told

@@ -29,6 +29,7 @@ from udd.fitting import (
     record_of,
     refit,
 )
+from udd.fitting.diagnostics import coarse
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
@@ -178,6 +179,7 @@ def discover(
         or random
         or excused is not None
         or any(is_spline(f.effect) or f.like_a_drift(final.model) for f in found)
+        or (any(f.curve is not None for f in found) and coarse(final))
     ):
         verdict = "effect present, form not identified"
     elif found:

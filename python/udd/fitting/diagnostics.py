@@ -25,6 +25,8 @@ _COLOURED = 1e-8
 _NEARLY = 1
 _OFF = 3.0  # standard deviations from what was stated
 _LEAST = 30  # frames of which innovations tell anything
+#: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
+_COARSE = 2.0
 
 
 @dataclass(frozen=True)
@@ -233,6 +235,11 @@ def readings(fit: Fit) -> list[Reading]:
             noise, memory = float(np.median(sd[own, k])), float(fit.noise.memory[k])
             result.append(Reading(name, known[k] if known else "", noise, step, memory))
     return result
+
+
+def coarse(fit: Fit) -> list[Reading]:
+    """Channels read in steps so coarse that no other noise blurs them: their errors follow the motion."""
+    return [one for one in readings(fit) if one.step > _COARSE * one.noise]
 
 
 def units(fit: Fit) -> dict[str, str]:
