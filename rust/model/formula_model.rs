@@ -107,9 +107,9 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 /// Builds [`Own`].
 ///
 /// ```
-/// use udd::model::{Family, OwnFamily, System};
+/// use udd::model::{Family, FormulaFamily, System};
 /// let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
-/// let family = OwnFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"])).unwrap();
+/// let family = FormulaFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"])).unwrap();
 /// let system = family.build(&[4.0]);
 /// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; 4]), [1.0, -12.0]);
 /// ```
