@@ -76,7 +76,7 @@ class Jobs:
 
     def __init__(self) -> None:
         self.jobs: dict[str, Job] = {}
-        self._queue: asyncio.Queue[Job] = asyncio.Queue()
+        self._queue: asyncio.Queue[Job | None] = asyncio.Queue()
         self._task: asyncio.Task[None] | None = None
 
     def submit(self, asked: dict[str, Any], folder: Path) -> Job:
@@ -118,16 +118,15 @@ class Jobs:
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
         for job in list(self.jobs.values()):
             self.forget(job)
+        if self._task is not None:
+            # Not cancelled: the process of a job that was killed is to be waited for.
+            self._queue.put_nowait(None)
+            await self._task
 
     async def _work(self) -> None:
-        while True:
-            job = await self._queue.get()
+        while (job := await self._queue.get()) is not None:
             if job.state != "waiting":
                 continue
             job.state = "running"
@@ -155,7 +154,8 @@ async def _run(job: Job) -> None:
     )
     assert job.process.stdin is not None and job.process.stdout is not None
     try:
-        await _talk(job, job.process.stdin, job.process.stdout)
+        if job.state == "running":  # it may have been cancelled meanwhile
+            await _talk(job, job.process.stdin, job.process.stdout)
     finally:
         _kill(job)
         await job.process.wait()
