@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from conftest import Opened, until
+from browser_for_tests import Opened, until
 from udd.app.spec import start_of
 from udd.simulation.trajectory import integrated
 

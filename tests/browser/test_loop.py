@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import udd
-from conftest import Opened, until
+from browser_for_tests import Opened, until
 
 SAMPLE = Path(udd.__file__).parent / "demo" / "sample.mp4"
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from conftest import SIZES, Opened
+from browser_for_tests import SIZES, Opened
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
