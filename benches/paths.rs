@@ -58,7 +58,7 @@ fn tolerance(rtol: f64) -> Tolerance {
     Tolerance { rtol, atol: 1e-3 * rtol }
 }
 
-fn with_crew<T>(isa: Isa, work: impl FnOnce(ExecutionContext<'_>) -> T) -> T {
+fn in_context<T>(isa: Isa, work: impl FnOnce(ExecutionContext<'_>) -> T) -> T {
     let (done, stop) = (AtomicUsize::new(0), CancelFlag::new());
     black_box(work(ExecutionContext { threads: 1, isa, done: &done, stop: &stop }))
 }
@@ -92,7 +92,7 @@ fn ensemble<F: Family<3> + 'static>(
         let times = [0.0, f64::from(end)];
         let tolerance = tolerance(rtol);
         let (family, values, starts) = (&family, &values[..], &starts[..]);
-        with_crew(isa, |context| {
+        in_context(isa, |context| {
             Ensemble { family, values, starts, times: &times, tolerance, stepper }.run(context)
         });
     };
@@ -116,7 +116,7 @@ fn exponents<const N: usize>(name: &'static str, rtol: f64, values: Vec<Vec<f64>
     let steps = move || series(wanted.clone(), vec![START], rtol, N, units as f64);
     let work = move |isa| {
         let orbits = Lyapunov { family: &DleFamily, values: &values, starts: &[START], options };
-        with_crew(isa, |context| orbits.run::<N>(context));
+        in_context(isa, |context| orbits.run::<N>(context));
     };
     Path::new(name, units, work).counted(steps)
 }
@@ -151,7 +151,7 @@ fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
         bounded: [true; 3],
         tolerance: tolerance(TIGHT),
     };
-    let found = with_crew(isa, |context| wanted.run(context));
+    let found = in_context(isa, |context| wanted.run(context));
     found.iter().flatten().map(|crossings| crossings.end.0).collect()
 }
 

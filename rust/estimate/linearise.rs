@@ -88,9 +88,10 @@ where
     ) -> Result<Linearisation<D, M>, EstimateError> {
         let Linearisation { mut sights, flow, columns: ParameterJacobian { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
-        let flow = self.flow(point, &laws, flow)?;
-        let timed = self.timed(point);
-        self.own_state_rows(point, &flow, &timed, &mut state)?;
+        let plain = self.plain_laws(point);
+        let flow = self.flow(point, &laws, &plain, flow)?;
+        let timed = self.timed(point, &plain);
+        self.own_state_rows(point, &flow, &plain, &timed, &mut state)?;
         self.sights(point, &laws, &timed, &mut sights, &mut seen);
         Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } })
     }

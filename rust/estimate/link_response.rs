@@ -66,9 +66,9 @@ where
         &self,
         point: &Unknowns<D>,
         laws: &[Law<F::Built<Wide>, Wide>],
+        plain: &[Law<F::Built<f64>, f64>],
         room: Vec<Transition<D>>,
     ) -> Result<Vec<Transition<D>>, EstimateError> {
-        let plain = self.plain_laws(point);
         let zero = zeros();
         let none = Transition { defect: zero, slopes: [[0.0; WIDTH]; D], end_rate: zero };
         let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,

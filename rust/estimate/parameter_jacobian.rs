@@ -74,16 +74,16 @@ where
     C: Sensor<D, M>,
 {
     /// Which films have a law that knows the time, and a free clock that moves it.
-    pub(super) fn timed(&self, point: &Unknowns<D>) -> Vec<bool> {
-        let mut timed = vec![false; point.sets.len()];
-        for (film, law) in self.plain_laws(point).iter().enumerate() {
-            let mut links =
-                (0..self.record.t.len().saturating_sub(1)).filter_map(|i| Some((i, self.link(point, i)?)));
-            timed[film] = self.free.iter().any(|free| free.role == Role::Clock && free.acts_on(film))
-                && links.any(|(i, (of, start, end))| {
-                    let x = vector!(f64, D; k => point.states[i][k]);
-                    of == film && rates_of(&law.system, start, &x) != rates_of(&law.system, end, &x)
-                });
+    pub(super) fn timed(&self, point: &Unknowns<D>, plain: &[Law<F::Built<f64>, f64>]) -> Vec<bool> {
+        let mut timed = vec![false; plain.len()];
+        let clocked = |film| self.free.iter().any(|free| free.role == Role::Clock && free.acts_on(film));
+        let clocked: Vec<bool> = (0..plain.len()).map(clocked).collect();
+        for i in 0..self.record.t.len().saturating_sub(1) {
+            let Some((film, start, end)) = self.link(point, i) else { continue };
+            if clocked[film] && !timed[film] {
+                let (system, x) = (&plain[film].system, vector!(f64, D; k => point.states[i][k]));
+                timed[film] = rates_of(system, start, &x) != rates_of(system, end, &x);
+            }
         }
         timed
     }
@@ -93,6 +93,7 @@ where
         &self,
         point: &Unknowns<D>,
         flow: &[Transition<D>],
+        plain: &[Law<F::Built<f64>, f64>],
         timed: &[bool],
         rows: &mut RowMatrix,
     ) -> Result<(), EstimateError> {
@@ -104,7 +105,6 @@ where
         let films = 0..point.sets.len();
         let models: Vec<_> = films.clone().map(|film| acting(&self.free, film, model)).collect();
         let clocks: Vec<_> = films.map(|film| acting(&self.free, film, clock)).collect();
-        let plain = self.plain_laws(point);
         in_blocks(rows, D, &|i, rows| {
             if self.record.linked[i] {
                 let link = &flow[i];
