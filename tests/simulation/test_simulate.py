@@ -252,7 +252,7 @@ for _ in range(3):
         "udd.ensemble(udd.DLE(1.0), 1e5, np.ones((10_000, 3)))",
         "udd.poincare(udd.DLE(1.0), n=1_000_000, parameters={'w': np.linspace(1, 5, 64)})",
         "udd.bifurcation(udd.DLE(1.0), 'w', np.linspace(1, 9, 4000))",
-        "udd.basins(udd.DLE(6.2), {'omega': np.linspace(-3, 3, 99), 'z': np.linspace(-3, 3, 99)})",
+        "udd.basins(udd.DLE(6.2), {'omega': np.linspace(-3, 3, 300), 'z': np.linspace(-3, 3, 300)})",
         "udd.sweep(udd.SweepSpec('lyapunov', udd.DLE(1.0), {'w': np.linspace(1, 2, 9999)}))",
     ],
 )
