@@ -12,7 +12,7 @@ import pytest
 import simulated
 import udd
 from udd.cli import main
-from udd.fitting.diagnostics import coarse
+from udd.fitting.diagnostics import readings
 
 E = udd.effects
 DRIVE = 0.042
@@ -171,4 +171,4 @@ def test_steps_that_no_other_noise_blurs_are_told(other: float, told: list[str])
         )
     sigma = np.tile([np.hypot(other, 12**-0.5) * step] * 2 + [0.01], (len(values), 1))
     fitted = udd.fit(udd.Measurement(measured.t, values, sigma=sigma), udd.Disk(0.045))
-    assert [one.name for one in coarse(fitted)] == told
+    assert [one.name for one in readings(fitted) if one.coarse] == told

@@ -8,8 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.errors import UddError
+
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def require_xarray() -> Any:
+    """Return xarray, or say in one sentence how to get it."""
+    try:
+        import xarray
+    except ImportError as error:
+        raise UddError(
+            f"labelled arrays need the extra 'scale' ({error}): pip install 'udd[scale]'"
+        ) from None
+    return xarray
 
 
 def dataset(
@@ -23,22 +36,41 @@ def dataset(
 
     Raises
     ------
-    ModuleNotFoundError
+    UddError
         xarray, of the extra ``scale``, is not installed.
     """
-    import xarray as xr
 
     def labelled(
         name: str, values: NDArray[Any], own: Sequence[str]
-    ) -> tuple[Sequence[str], Any, dict[str, str]]:
+    ) -> tuple[Sequence[str], NDArray[Any], dict[str, str]]:
         unit = units.get(name, "")
         return own, np.asarray(values), {"units": unit} if unit else {}
 
-    return xr.Dataset(
+    found: xr.Dataset = require_xarray().Dataset(
         {name: labelled(name, values, dims) for name, values in columns.items()},
         {name: labelled(name, values, [name]) for name, values in coords.items()},
         attrs,
     )
+    return found
+
+
+def of_states(
+    names: Sequence[str],
+    units: Sequence[str],
+    state: NDArray[np.float64],
+    dims: Sequence[str],
+    coords: Mapping[str, NDArray[Any]],
+    **attrs: str,
+) -> xr.Dataset:
+    """States, shape (*dims, dim), as a column for each component.
+
+    Raises
+    ------
+    UddError
+        xarray, of the extra ``scale``, is not installed.
+    """
+    columns = {name: state[..., k] for k, name in enumerate(names)}
+    return dataset(columns, dims, dict(zip(names, units, strict=True)), coords, **attrs)
 
 
 def axes(shape: tuple[int, ...], name: str) -> list[str]:

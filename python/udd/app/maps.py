@@ -33,7 +33,7 @@ SURFACES = {
 }
 
 
-def _crew() -> int:
+def _worker_threads() -> int:
     """Leave a core to the run that is watched."""
     return max(1, (os.cpu_count() or 2) - 1)
 
@@ -51,7 +51,7 @@ def section(start: Start, surface: str, count: int) -> tuple[Array, str]:
             min(count, limits.POINTS),
             state0=list(start.state),
             transient=_TRANSIENT,
-            threads=_crew(),
+            threads=_worker_threads(),
             progress=False,
         )
     return np.ascontiguousarray(found.state), str(found.outcome)
@@ -106,7 +106,7 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
             transient=2 * _TRANSIENT,
             starts=starts,
             extend=6,
-            threads=_crew(),
+            threads=_worker_threads(),
             progress=False,
         )
     points = np.stack([found[state].values[0] for state in model.state_names], axis=-1)
@@ -124,7 +124,7 @@ def _exponents(model: Model, name: str, values: Array) -> Exponents:
             t=time,
             transient=time / 4,
             tol=enough,
-            threads=_crew(),
+            threads=_worker_threads(),
             progress=False,
             with_error=True,
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.labelled import require_xarray
 from udd._util.validation import whole
 from udd.chaos.recurrence import tightness
 from udd.errors import ModelError, interrupted
@@ -28,7 +29,6 @@ from .dataset import (
     of_outcomes,
     of_result,
     of_state,
-    require_xarray,
     time_unit,
 )
 from .matching import mirror_images

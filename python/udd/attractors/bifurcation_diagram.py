@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.labelled import require_xarray
 from udd._util.validation import number, whole
 from udd.chaos.recurrence import SETTLING, tightness
 from udd.errors import ModelError, interrupted
@@ -24,7 +25,6 @@ from .dataset import (
     of_parameter,
     of_result,
     of_state,
-    require_xarray,
     time_unit,
 )
 from .kinds import MOTIONS, kinds_of

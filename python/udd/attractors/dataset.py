@@ -6,24 +6,12 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeAlias
 
-from udd.errors import UddError
 from udd.models import Model
 
 from .section_runs import ALL_OUTCOMES, SectionRunner
 
 Variables: TypeAlias = dict[str, tuple[Any, ...]]
 """Arrays as xarray takes them: dimensions, values, attributes."""
-
-
-def require_xarray() -> Any:
-    """Return xarray, or say in one sentence how to get it."""
-    try:
-        import xarray
-    except ImportError as error:
-        raise UddError(
-            f"labelled arrays need the extra 'scale' ({error}): pip install 'udd[scale]'"
-        ) from None
-    return xarray
 
 
 def of_flags(words: str, names: Sequence[str]) -> dict[str, Any]:

@@ -9,13 +9,13 @@ import numpy as np
 from scipy import optimize
 
 from udd._util.validation import number, whole
-from udd.bifurcations.branch_solutions import solution_at
 from udd.errors import IntegrationError, ModelError
 
 from .bifurcation_functions import FUNCTIONS, test_functions_at
 from .bifurcation_location import frequency_of
 from .branch import AnyCurve, BifurcationPoint
 from .branch_continuation import bounds_of
+from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at

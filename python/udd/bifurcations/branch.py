@@ -165,7 +165,7 @@ class Branch:
 
     def solution(self, i: int) -> Equilibrium | PeriodicOrbit:
         """The equilibrium or cycle of one point of the branch."""
-        from udd.bifurcations.branch_solutions import solution_at
+        from .branch_solutions import solution_at
 
         curve, place = self._places[i]
         return solution_at(curve, place.u)
@@ -176,7 +176,7 @@ class Branch:
 
     def at(self, value: float) -> list[Equilibrium | PeriodicOrbit]:
         """The solutions at a value of the parameter, polished; more than one where the branch folds."""
-        from udd.bifurcations.branch_solutions import solutions_at
+        from .branch_solutions import solutions_at
 
         return solutions_at(self._places, self.values, value)
 

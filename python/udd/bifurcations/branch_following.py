@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from udd.bifurcations.error_bounds import rounding_of
 from udd.errors import IntegrationError
 
 from .bifurcation_functions import FUNCTIONS, TestFunctions, test_functions_at
@@ -17,6 +16,7 @@ from .branch import AnyCurve, BifurcationPoint
 from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
+from .error_bounds import rounding_of
 from .nonsmooth import corner_ahead
 from .periodic_orbits import has_shorter_period, pieces_for
 from .pseudo_arclength import (

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import linalg
 
-from udd.bifurcations.error_bounds import COARSE, rounding_of
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch
 from .equilibrium_curve import expansion
 from .equilibrium_search import equilibrium_at, refined
+from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats, FlowMap
 from .shooting_curve import HELD, PeriodicOrbitCurve
 from .solutions import Equilibrium
@@ -238,10 +238,7 @@ class Problem:
 
     def matrix(self, value: float) -> Floats:
         """The rates' scaled derivative at the equilibrium."""
-        size = self.flow.size
-        by_state = expansion(self.flow, self.values_at(value), self.rest(value)).by_state
-        scaled: Floats = by_state * size / size[:, None]
-        return scaled
+        return self.flow.scaled(expansion(self.flow, self.values_at(value), self.rest(value)).by_state)
 
     def projectors(self, value: float) -> tuple[Floats, Floats]:
         """On the plane of the decaying eigenvectors along that of the growing ones, and the reverse."""
@@ -284,7 +281,7 @@ class Problem:
             matrix, right = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
             for i in range(m):
                 rows = slice(i * r, i * r + r)
-                matrix[rows, rows] = found.by_state[i] * size / size[:, None]
+                matrix[rows, rows] = flow.scaled(found.by_state[i])
                 matrix[rows, (i + 1) * r : (i + 2) * r] = -np.eye(r)
                 matrix[rows, n] = found.by_parameter[i, :, 0] / size * scale
                 right[rows] = x[i + 1] - found.x[i] / size

@@ -15,9 +15,9 @@ from udd.simulation.trajectory import simulate
 
 from .branch_continuation import bounds_of
 from .connecting_orbits import Connection, Problem, found_by
-from .equilibrium_curve import expansion
 from .equilibrium_search import equilibria, refined
 from .flow_map import Floats, FlowMap, flow_of
+from .invariant_manifolds import Eigendirection, direction_alone
 from .periodic_orbits import pieces_for
 
 __all__ = ["Connections", "connections"]
@@ -228,18 +228,13 @@ class _Manifold:
                 return found
         return None
 
-    def alone(self, value: float, rest: Floats) -> tuple[float, Floats, Floats] | None:
-        """The eigenvalue on its own, with its right and left vectors, scaled; none where there is no such."""
-        size = self.flow.size
-        matrix = expansion(self.flow, self.values_at(value), rest).by_state * size / size[:, None]
-        numbers, right = np.linalg.eig(matrix)
-        growing = numbers.real > 0.0
-        for side in (growing, ~growing):
-            if side.sum() == 1 and len(numbers) > 1:
-                k = int(np.flatnonzero(side)[0])
-                vector, left = right[:, k].real, np.linalg.inv(right)[k].real
-                turn = float(np.sign(vector[np.argmax(np.abs(vector))]))
-                return float(numbers[k].real), turn * vector, turn * left
+    def alone(self, value: float, rest: Floats) -> Eigendirection | None:
+        """The eigendirection on its own side, a growing one first; none where there is no such."""
+        values = self.values_at(value)
+        for side in (1.0, -1.0):
+            one = direction_alone(self.flow, values, rest, side)
+            if one is not None:
+                return one
         return None
 
     def curves(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
@@ -258,14 +253,14 @@ class _Manifold:
         x, time = center.copy(), np.ones(count)
         for i, way in enumerate(ways):
             if way is not None:
-                x[i] += size * self.sign * _AWAY * way[1]
-                time[i], left[i] = np.sign(way[0]), way[2]
+                x[i] += size * self.sign * _AWAY * way.vector
+                time[i], left[i] = np.sign(way.number), way.left
         rows = np.tile(flow.values, (count, 1))
         rows[:, self.index] = values
         going = np.array([way is not None for way in ways])
         states, away_at, end = [x.copy()], np.full(count, np.inf), np.zeros(count, dtype=np.intp)
         # Between values that are hardly apart it is seen late on which side an equilibrium is passed.
-        rates = [abs(way[0]) for way in ways if way is not None]
+        rates = [abs(way.number) for way in ways if way is not None]
         lasts = self.longest - float(np.log(_NARROW)) / min(rates, default=1.0)
         for k in range(1, round(_FINE * (_LEAVES + lasts / flow.clock))):
             own = np.flatnonzero(going)
@@ -385,7 +380,7 @@ class _Manifold:
         nodes, span = curve.path[where], float((len(where) - 1) * every * step)
         mirror = flow.mirror if image and flow.mirror is not None else np.ones(flow.dim)
         rest, way = curve.rest, self.alone(curve.value, curve.rest)
-        if way is not None and way[0] < 0.0:
+        if way is not None and way.number < 0.0:
             # Followed backward: the orbit comes from the target.
             nodes, rest = nodes[::-1].copy(), mirror * rest
         values = self.values_at(curve.value)

@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from udd.bifurcations.error_bounds import COARSE, rounding_of
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch
-from .equilibrium_curve import expansion
 from .equilibrium_search import equilibrium_at, refined
+from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats
+from .invariant_manifolds import direction_alone
 from .shooting_curve import HELD, PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
@@ -202,20 +202,16 @@ class _Search:
         rest = refined(self.flow, values, self.guess)
         if rest is None:
             return None
-        size = self.flow.size
-        numbers, right = np.linalg.eig(expansion(self.flow, values, rest).by_state * size / size[:, None])
-        alone = np.flatnonzero(self.time * numbers.real > 0.0)
-        if len(alone) != 1:
+        way = direction_alone(self.flow, values, rest, self.time)
+        if way is None or way.number == 0.0:
             return None
-        vector = right[:, alone[0]].real
-        vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-        return np.asarray(rest + size * self.sign * self.away * vector)
+        return np.asarray(rest + self.flow.size * self.sign * self.away * way.vector)
 
     def _round(self, curve: PeriodicOrbitCurve, u: Floats) -> _Round | None:
         """The cycle, if one multiplier is alone on its side of the unit circle, and positive."""
         flow, size, values = self.flow, self.flow.size, curve.values_at(u)
         nodes, span = curve.nodes(u), curve.span(u) / curve.pieces
-        numbers, left = np.linalg.eig((curve.closing(u) * size / size[:, None]).T)
+        numbers, left = np.linalg.eig(flow.scaled(curve.closing(u)).T)
         across = np.abs(numbers - 1.0) > 1e-6
         outside = across & ((np.abs(numbers) > 1.0) == (self.time > 0.0))
         if outside.sum() != 1 or abs(numbers[outside][0].imag) > 0.0 or numbers[outside][0].real < 0.0:
@@ -225,7 +221,7 @@ class _Search:
         if self.facing is not None and own @ self.facing < 0.0:
             own = -own
         self.facing = own
-        pieces = curve.flight(u).by_state * size / size[:, None]
+        pieces = flow.scaled(curve.flight(u).by_state)
         # The left eigenvector at a node is that at the first, carried back from the end.
         lefts = [own * curve.mirror]
         for matrix in pieces[:0:-1]:
@@ -235,9 +231,8 @@ class _Search:
         for part in range(_PARTS):
             gone = flow.fly(values, nodes, np.full(len(nodes), span * part / _PARTS))
             for i, vector in enumerate(lefts):
-                scaled = gone.by_state[i] * size / size[:, None]
                 states.append(gone.x[i])
-                vectors.append(np.linalg.solve(scaled.T, vector))
+                vectors.append(np.linalg.solve(flow.scaled(gone.by_state[i]).T, vector))
         x, vectors_ = np.array(states), np.array(vectors)
         if curve.symmetric:
             x, vectors_ = np.vstack([x, curve.mirror * x]), np.vstack([vectors_, curve.mirror * vectors_])

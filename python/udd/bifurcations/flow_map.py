@@ -109,6 +109,11 @@ class FlowMap:
         state[..., self.kept] = x
         return state
 
+    def scaled(self, by_state: Floats) -> Floats:
+        """A derivative of states by states, shape (..., dim, dim), in units of their typical sizes."""
+        result: Floats = by_state * self.size / self.size[:, None]
+        return result
+
     def fly(
         self,
         values: Floats,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from udd.bifurcations.branch_solutions import solution_at
 from udd.errors import IntegrationError
 
 from .bifurcation_functions import TestFunctions, test_functions_at
@@ -12,6 +11,7 @@ from .bifurcation_location import location_error, point_at
 from .branch import AnyCurve, BifurcationPoint, Branch
 from .branch_continuation import branch_from
 from .branch_following import BranchTrace
+from .branch_solutions import solution_at
 from .branch_switching import doubled
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at

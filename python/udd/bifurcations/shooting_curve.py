@@ -147,7 +147,7 @@ class PeriodicOrbitCurve:
         ends = found.x * turn
         ends[-1] += self.shift
         gaps = (ends - np.roll(nodes, -1, axis=0)) / size
-        by_state = found.by_state * turn[:, :, None] * size / size[:, None] / weight
+        by_state = self.flow.scaled(found.by_state * turn[:, :, None]) / weight
         by_span = found.rate * turn / size * (self.clock / m)
         by_value = found.by_parameter[:, :, 0] * turn / size * self.scale
         forcing = self.flow.forcing
@@ -198,7 +198,7 @@ class PeriodicOrbitCurve:
         size, found = self.flow.size, self.flight(u)
         turn = np.ones((self.pieces, self.flow.dim))
         turn[-1] = self.mirror
-        scaled = found.by_state * turn[:, :, None] * size / size[:, None]
+        scaled = self.flow.scaled(found.by_state * turn[:, :, None])
         if self.flow.forcing is not None:
             return np.ascontiguousarray(scaled)
         # Where one piece ends the next begins, in the same plane.

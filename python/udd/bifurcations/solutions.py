@@ -123,7 +123,7 @@ class PeriodicOrbit:
     @cached_property
     def period_error(self) -> float:
         """A bound of the period's error: how far it moves when runs are a hundred times less accurate."""
-        from udd.bifurcations.error_bounds import period_error_of
+        from .error_bounds import period_error_of
 
         if self._curve is None or self._unknowns is None:
             return float("nan")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._util.labelled import axes, dataset
+from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
 from udd._util.validation import number, whole
 from udd.errors import IncompleteWarning, ModelError, interrupted
@@ -196,14 +196,10 @@ class Section:
         20
         """
         model = self.model
-        units = dict(zip(model.state_names, model.state_units, strict=True))
-        columns: dict[str, NDArray[Any]] = {
-            name: self.state[..., k] for k, name in enumerate(model.state_names)
-        }
-        columns |= {"t": self.t, "which": self.which}
-        orbits = axes(self.t.shape[:-1], "orbit") if self.t.ndim > 1 else []
-        surfaces = "; ".join(self.section)
-        return dataset(columns, [*orbits, "crossing"], units, {}, model=repr(model), section=surfaces)
+        dims = [*axes(self.t.shape[:-1], "orbit"), "crossing"]
+        attrs = {"model": repr(model), "section": "; ".join(self.section)}
+        found = of_states(model.state_names, model.state_units, self.state, dims, {}, **attrs)
+        return found.assign(t=(dims, self.t), which=(dims, self.which))
 
     def _single(self, what: str) -> None:
         if len(self.section) > 1:

@@ -15,10 +15,12 @@ from udd._util.validation import number, whole
 from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError
 from udd.models import DLE, Disk, Model, require_model
 from udd.models.parameter_batch import default_state
+from udd.models.state_scaling import coordinates_of
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 from udd.simulation.trajectory import initial_state, tolerances
 
 from .largest_exponent import reason, span
+from .recurrence import SETTLING, periods, tightness
 
 if TYPE_CHECKING:
     from .poincare_sections import Section
@@ -253,8 +255,6 @@ def _positive(found: _core._Orbits) -> bool:
 
 def _on_torus(model: Model, found: _core._Orbits) -> bool:
     """Whether distances stay as they are in two directions, and grow in none."""
-    from udd.models.state_scaling import coordinates_of
-
     # Angles that nothing depends on neither grow nor shrink on any motion.
     free = int((~np.isfinite(coordinates_of(model, found["end"]).size)).sum())
     value, zero = found["value"][0], _STAYS / model.slow
@@ -312,10 +312,6 @@ class _Run:
 
     def fate(self, start: _Floats, longest: float = 0.0) -> _Fate:
         """What the orbit does from here on: 600 section points, and more for the time `longest`."""
-        from udd.models.state_scaling import coordinates_of
-
-        from .recurrence import SETTLING, periods, tightness
-
         tight = tightness(self.rtol)
         coordinates = coordinates_of(self.model, start[None])
 

@@ -12,7 +12,6 @@ from udd._util.expressions import Expression
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
-from udd.discovery.thresholds import SAME
 from udd.discovery.validation.camera_faults import camera_shows
 from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
 from udd.discovery.validation.sensor_drift import FORETELLS, as_random
@@ -29,7 +28,7 @@ from udd.fitting import (
     record_of,
     refit,
 )
-from udd.fitting.diagnostics import coarse
+from udd.fitting.diagnostics import readings
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
@@ -39,6 +38,7 @@ from udd.models.formula_model import FormulaModel
 
 from .results import AddedEffect, Discovery, RejectedEffect
 from .search import Search, SearchState, Step
+from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 
 #: The share of the record that effects are sought in; the rest is held out.
@@ -179,7 +179,7 @@ def discover(
         or random
         or excused is not None
         or any(is_spline(f.effect) or f.like_a_drift(final.model) for f in found)
-        or (any(f.curve is not None for f in found) and coarse(final))
+        or (any(f.curve is not None for f in found) and any(one.coarse for one in readings(final)))
     ):
         verdict = "effect present, form not identified"
     elif found:

@@ -12,7 +12,7 @@ from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.held_out_errors import Errors, Ratio, comparison_horizon, lacks_more
 from udd.effects import Effect
 from udd.fitting import Fit
-from udd.fitting.diagnostics import ModelError, Reading, coarse, ran_off, rate_of, readings
+from udd.fitting.diagnostics import ModelError, Reading, ran_off, rate_of, readings
 from udd.fitting.thinning import Thinned
 from udd.measurement import Measurement
 from udd.models import Model
@@ -319,7 +319,8 @@ class Discovery:
             said += [
                 f"{one.name} is read in steps of {one.step:.3g} {one.unit}, coarser than its other noise: "
                 "such errors follow the motion, and a formula may be made of them."
-                for one in coarse(self.fit)
+                for one in readings(self.fit)
+                if one.coarse
             ]
         held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if held:

@@ -12,9 +12,9 @@ from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.coordinates import Coordinate
 from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
-from udd.discovery.thresholds import ALPHA
 from udd.fitting import Fit, with_larger_model_error
 
+from .thresholds import ALPHA
 from .trial_fits import price_of
 
 _LEADS = 2.0  # times the gain of the library's best

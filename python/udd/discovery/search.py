@@ -19,7 +19,6 @@ from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan, Scored
 from udd.discovery.symbolic.formulas import Formula, formulas_for
-from udd.discovery.thresholds import ALPHA, Confirmation, RejectionReason
 from udd.discovery.validation.acceptance_tests import Pair, confirmed_by, same_level
 from udd.discovery.validation.held_out_errors import (
     Errors,
@@ -38,6 +37,7 @@ from udd.fitting.parameters import Free
 
 from .results import Alternative, RejectedEffect
 from .score_rounds import ScoreRound, score_round, states_first, with_surfaces
+from .thresholds import ALPHA, Confirmation, RejectionReason
 from .time_budget import Clock, TimeUpError
 from .trial_fits import (
     TrialFit,

@@ -13,13 +13,13 @@ from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import physical
 from udd.discovery.symbolic.formulas import Formula
-from udd.discovery.thresholds import ALPHA
 from udd.effects.user_defined import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, extend
 from udd.models.formula_model import FormulaModel
 
 from .curve_effects import fit_curve, fit_formula
+from .thresholds import ALPHA
 
 _DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
 

@@ -92,6 +92,11 @@ class Reading:
     memory: float
 
     @property
+    def coarse(self) -> bool:
+        """Whether no other noise blurs the steps: their errors then follow the motion."""
+        return self.step > _COARSE * self.noise
+
+    @property
     def text(self) -> str:
         """In words."""
         unit = f" {self.unit}" if self.unit else ""
@@ -235,11 +240,6 @@ def readings(fit: Fit) -> list[Reading]:
             noise, memory = float(np.median(sd[own, k])), float(fit.noise.memory[k])
             result.append(Reading(name, known[k] if known else "", noise, step, memory))
     return result
-
-
-def coarse(fit: Fit) -> list[Reading]:
-    """Channels read in steps so coarse that no other noise blurs them: their errors follow the motion."""
-    return [one for one in readings(fit) if one.step > _COARSE * one.noise]
 
 
 def units(fit: Fit) -> dict[str, str]:

@@ -17,7 +17,6 @@ from udd._util.progress import thread_count
 from udd._util.validation import array, number
 from udd.chaos.largest_exponent import lyapunov
 from udd.errors import FitError, IntegrationError, ModelError
-from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
 from udd.models import Disk, Model
 from udd.simulation.outcomes import FINISHED
@@ -25,6 +24,7 @@ from udd.simulation.trajectory import method_for
 
 from . import Fit, Record, data_of, predicted, record_of
 from .fit import fit
+from .time_scale import motion_time_scale
 
 __all__ = ["Forecast", "forecast"]
 

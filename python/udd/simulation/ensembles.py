@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._util.labelled import axes, dataset
+from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
 from udd._util.validation import array, number
 from udd.errors import ModelError, interrupted
@@ -70,9 +70,8 @@ class Ensemble:
         {'run': 2, 't': 2}
         """
         model, runs = self.model, axes(self.outcome.shape, "run")
-        units = dict(zip(model.state_names, model.state_units, strict=True))
-        columns = {name: self.state[..., k] for k, name in enumerate(model.state_names)}
-        found = dataset(columns, [*runs, "t"], units, {"t": self.t}, model=repr(model))
+        dims, coords, of_model = [*runs, "t"], {"t": self.t}, repr(model)
+        found = of_states(model.state_names, model.state_units, self.state, dims, coords, model=of_model)
         return found.assign(outcome=(runs, np.asarray(self.outcome)))
 
     def __repr__(self) -> str:

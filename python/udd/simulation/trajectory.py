@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
-from udd._util.labelled import dataset
+from udd._util.labelled import of_states
 from udd._util.validation import array, number
 from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model, require_model
@@ -142,9 +142,8 @@ class Trajectory:
         {'units': 'm'}
         """
         model = self.model
-        units = dict(zip(model.state_names, model.state_units, strict=True))
-        columns = {name: self.state[:, k] for k, name in enumerate(model.state_names)}
-        return dataset(columns, ["t"], units, {"t": self.t}, model=repr(model), outcome=self.outcome)
+        attrs = {"model": repr(model), "outcome": self.outcome}
+        return of_states(model.state_names, model.state_units, self.state, ["t"], {"t": self.t}, **attrs)
 
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
         """The state at any times within the run, as accurate as the method's dense output.

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
-from udd.discovery.scoring.candidate import Candidate
 from udd.models import Disk, Model
 from udd.models.formula_model import FormulaModel
+
+from .candidate import Candidate
 
 
 def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._util import chi_squared
-from udd.discovery.scoring.candidate import Candidate
 from udd.fitting import Fit
 from udd.fitting.time_scale import motion_time_scale
 from udd.models.formula_model import FormulaModel
 
+from .candidate import Candidate
 from .candidates import ripples
 from .coordinates import slots
 from .forcing import responses, score_forcings

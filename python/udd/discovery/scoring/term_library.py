@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from udd import effects
 from udd._util.expressions import Expression, text_of
-from udd.discovery.scoring.candidate import Candidate
 from udd.effects.user_defined import along_of, written
 from udd.errors import ModelError
 from udd.models.formula_model import FormulaModel
 
+from .candidate import Candidate
 from .coordinates import slots
 
 _DEGREE = 3

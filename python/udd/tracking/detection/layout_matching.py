@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.markers.layout import SLACK, Layout, laid, same_colour
-from udd.tracking.detection.colour_blobs import LEAST_CHROMA, Blobs, Sight, agreeing, blobs
 from udd.video.reader import Picture
+
+from .colour_blobs import LEAST_CHROMA, Blobs, Sight, agreeing, blobs
 
 HUE = 0.87  # the same between a pixel and its mark
 STILL = 0.7  # share of the survey in which a patch that stands still is none of the marks
