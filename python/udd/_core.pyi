@@ -1,12 +1,15 @@
 """The compiled core. Internal: use the functions of `udd`."""
 
-from collections.abc import Callable, Sequence
-from typing import TypeAlias, TypedDict, final
+from collections.abc import Sequence
+from typing import TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.fitting.estimator_input import EstimatorInput, FilmParameters
 from udd.models.base import Model
+from udd.simulation.batch import Batch
+from udd.tracking.marks.localization import Appearing, Picture
 
 _Floats = NDArray[np.float64]
 
@@ -103,14 +106,6 @@ class _Solution(TypedDict):
     iterations: int
     linear: Linearised
 
-# Times, what was seen, its information, whether the next frame is linked, the film, how much of its noise a
-# channel remembers; the states, and for every film the model's, the camera's and the clock's parameters;
-# role, index, film, prior mean and standard deviation of each free parameter.
-_Data: TypeAlias = tuple[_Floats, _Floats, _Floats, NDArray[np.bool_], NDArray[np.int64], list[float]]
-_Values: TypeAlias = tuple[list[float], list[float], float]
-_Start: TypeAlias = tuple[_Floats, list[_Values], Linearised | None]
-_Free: TypeAlias = list[tuple[str, int, int | None, float, float]]
-
 @final
 class Linearised: ...
 
@@ -129,18 +124,13 @@ def mark_coverage(
     local: _Floats,
 ) -> _Floats: ...
 def align_marks(
-    codes: NDArray[np.uint8],
-    view: NDArray[np.bool_],
-    lights: _Floats,
-    look: Sequence[float],
-    marks: _Floats,
-    lens: Sequence[float],
+    picture: Picture,
+    disk: Appearing,
     pose: Sequence[float],
     motion: Sequence[float],
     rounds: Sequence[float],
     without: int | None = None,
     keep: bool = False,
-    even: NDArray[np.float32] | None = None,
 ) -> tuple[
     tuple[float, float, float],
     list[
@@ -172,44 +162,11 @@ def simulate(
     method: str,
     dense: bool,
 ) -> _Run: ...
-def ensemble(
-    model: Model,
-    values: _Floats,
-    starts: _Floats,
-    times: _Floats,
-    rtol: float,
-    atol: float,
-    method: str,
-    threads: int,
-    progress: Callable[[int], object] | None = None,
-) -> _Passages: ...
+def ensemble(batch: Batch, times: _Floats, method: str) -> _Passages: ...
 def frames(model: Model, state0: list[float], dt: float, count: int, rtol: float, atol: float) -> _Frames: ...
-def lyapunov(
-    model: Model,
-    values: _Floats,
-    starts: _Floats,
-    all: bool,
-    time: float,
-    transient: float,
-    goal: float,
-    rtol: float,
-    atol: float,
-    threads: int,
-    progress: Callable[[int], object] | None,
-) -> _Orbits: ...
+def lyapunov(batch: Batch, all: bool, time: float, transient: float, goal: float) -> _Orbits: ...
 def sections(
-    model: Model,
-    values: _Floats,
-    starts: _Floats,
-    section: list[str],
-    direction: list[int],
-    skip: int,
-    count: int,
-    t_max: float,
-    rtol: float,
-    atol: float,
-    threads: int,
-    progress: Callable[[int], object] | None = None,
+    batch: Batch, section: list[tuple[str, int]], skip: int, count: int, t_max: float
 ) -> _Crossings: ...
 def shoot(
     model: Model,
@@ -223,42 +180,24 @@ def shoot(
 ) -> _Pieces: ...
 def expansion(model: Model, t: float, x: list[float], all: bool) -> _Expansion: ...
 def floquet(factors: _Floats) -> _Floquet | None: ...
-def solve(
-    model: Model,
-    data: _Data,
-    start: _Start,
-    free: _Free,
-    diffusion: list[float],
-    until: tuple[int, float],
-) -> _Solution: ...
+def solve(problem: EstimatorInput, iterations: int, decrease: float) -> _Solution: ...
 def score(
-    model: Model,
-    data: _Data,
-    start: _Start,
-    free: _Free,
-    diffusion: list[float],
+    problem: EstimatorInput,
     candidates: list[tuple[Model, list[int]]],
 ) -> tuple[_Floats, _Floats, _Floats]: ...
-def score_ripples(
-    model: Model, data: _Data, start: _Start, free: _Free, diffusion: list[float], frequencies: list[float]
-) -> tuple[_Floats, _Floats, _Floats]: ...
-def responses(model: Model, data: _Data, start: _Start) -> tuple[_Floats, _Floats, _Floats]: ...
+def score_ripples(problem: EstimatorInput, frequencies: list[float]) -> tuple[_Floats, _Floats, _Floats]: ...
+def responses(problem: EstimatorInput) -> tuple[_Floats, _Floats, _Floats]: ...
 def score_columns(
-    model: Model,
-    data: _Data,
-    start: _Start,
-    free: _Free,
-    diffusion: list[float],
-    at_end: _Floats,
-    groups: list[int],
+    problem: EstimatorInput, at_end: _Floats, groups: list[int]
 ) -> tuple[_Floats, _Floats, _Floats]: ...
-def filter(
-    model: Model, data: _Data, start: _Start, diffusion: list[float], windows: list[tuple[int, int]]
-) -> tuple[_Floats, _Floats, _Floats]: ...
-def innovations(
-    model: Model, data: _Data, start: _Start, diffusion: list[float], vague: list[float]
-) -> _Floats: ...
+def filter(problem: EstimatorInput, windows: list[tuple[int, int]]) -> tuple[_Floats, _Floats, _Floats]: ...
+def innovations(problem: EstimatorInput, vague: list[float]) -> _Floats: ...
 def predict(
-    model: Model, sets: list[_Values], film: list[int], t0: _Floats, states: _Floats, times: _Floats
+    model: Model,
+    films: Sequence[FilmParameters],
+    film: list[int],
+    t0: _Floats,
+    states: _Floats,
+    times: _Floats,
 ) -> _Floats: ...
 def camera_parameters(kind: str) -> list[tuple[str, str]]: ...

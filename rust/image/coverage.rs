@@ -165,7 +165,6 @@ impl Work for ExposureIntegral<'_> {
 
 /// Adds one copy of the mark.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
 fn add(
     mark: &Mark,
     psf: f64,

@@ -62,7 +62,6 @@ const WIDE: (f64, f64) = (3.0, 0.5); // blur per pixel of tolerance above this: 
 
 /// Moves `pose` onto the picture, each round with its tolerance [pixels] for the places of edges: a large one
 /// reaches further. The mark `without` is left out.
-#[allow(clippy::too_many_arguments)]
 pub fn align(
     plane: Plane<'_>,
     look: &Appearance<'_>,

@@ -438,7 +438,6 @@ impl<S: Scalar, const D: usize> Run<S, D> {
     }
 
     /// Commits the trial where it crosses no target, and deals with the lanes where it does.
-    #[allow(clippy::too_many_arguments, reason = "what a trial of the driver knows")]
     fn on_surfaces<M: System<S, D>>(
         &mut self,
         (law, method): (&M, &mut dyn Course<S, D>),

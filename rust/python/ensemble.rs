@@ -1,15 +1,14 @@
 //! `udd.ensemble`.
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::jobs::{self, Jobs, outcome_code};
-use super::model::{AnyModel, with_wide_model};
+use super::jobs::{self, Batch, outcome_code};
+use super::model::with_wide_model;
 use super::simulate::stepper;
 use crate::analysis::{Ensemble, EnsembleRun, ExecutionContext, rows};
-use crate::integrate::Tolerance;
 use crate::memory;
 use crate::model::Family;
 
@@ -62,36 +61,24 @@ fn collect<F: Family<D>, A: Family<D>, const D: usize>(
     table
 }
 
-/// Runs one model from many states, or with many values of its parameters, on `threads` threads (0 for one
-/// per core).
-///
-/// `values` has one row of parameter values for each run, or a single row for all; `starts` likewise.
-/// `progress` is called with the number of runs done. Returns a dict of columns; on Ctrl-C with what there is.
+/// The states of many runs at these times. Returns a dict of columns; on Ctrl-C with what there is.
 #[pyfunction]
-#[pyo3(signature = (model, values, starts, times, rtol, atol, method, threads, progress = None))]
-#[allow(clippy::too_many_arguments)]
 fn ensemble<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    values: PyReadonlyArray2<'py, f64>,
-    starts: PyReadonlyArray2<'py, f64>,
+    batch: Batch<'py>,
     times: PyReadonlyArray1<'py, f64>,
-    rtol: f64,
-    atol: f64,
     method: &str,
-    threads: usize,
-    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.filled();
-    let (tolerance, stepper) = (Tolerance { rtol, atol }, stepper(method)?);
+    let model = batch.model()?;
+    let (tolerance, stepper) = (batch.tolerance(), stepper(method)?);
     let times = times.as_slice()?.to_vec();
     if times.is_empty() {
         return Err(super::errors::ModelError::new_err("at least one time is needed"));
     }
-    let values = jobs::values(&model, &values)?;
-    let watched = Jobs::new(threads, &progress);
+    let values = batch.rows(&model)?;
+    let watched = batch.jobs();
     let (table, dimension, signal) = with_wide_model!(starts: &model, |family, alone, _values| {
-        let starts = jobs::starts(&starts, family.idle())?;
+        let starts = jobs::starts(&batch.starts, family.idle())?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();
         let table = Table::new(rows::count(&values, &starts), times.len(), dimension)?;

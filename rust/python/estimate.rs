@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::errors::FitError;
-use super::fitted::{Array, Asked, Data, Fitted, fitted, problem};
+use super::fitted::{self, Array, Asked, Data, Fitted, fitted};
 use super::interrupt;
 use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
@@ -15,22 +15,49 @@ use crate::estimate::{
     Options, PLACES_PER_LINK, Role, RowMatrix, Score, Sensor,
 };
 use crate::model::effects::Kind;
-use crate::model::{Effect, Either};
+use crate::model::{DiskFamily, Effect, Either};
 
-/// As [`Data`].
-type DataTuple<'py> = (
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray3<'py, f64>,
-    PyReadonlyArray1<'py, bool>,
-    PyReadonlyArray1<'py, i64>,
-    Vec<f64>,
-);
-/// States; of each film the model's parameters, the camera's, and the clock's error; what a solve left there.
-type Start<'py> = (PyReadonlyArray2<'py, f64>, Vec<SetTuple>, Option<Py<Linearised>>);
-type SetTuple = (Vec<f64>, Vec<f64>, f64);
-/// Role, index, film (none: shared by all), prior mean and standard deviation.
-type FreeTuple = (String, usize, Option<usize>, f64, f64);
+/// As `udd.fitting.estimator_input.Observations`.
+#[derive(FromPyObject)]
+struct Observations<'py> {
+    t: PyReadonlyArray1<'py, f64>,
+    seen: PyReadonlyArray2<'py, f64>,
+    information: PyReadonlyArray3<'py, f64>,
+    linked: PyReadonlyArray1<'py, bool>,
+    film: PyReadonlyArray1<'py, i64>,
+    autocorrelation: Vec<f64>,
+}
+
+/// As `udd.fitting.estimator_input.FilmParameters`.
+#[derive(FromPyObject)]
+struct FilmValues {
+    model: Vec<f64>,
+    camera: Vec<f64>,
+    clock: f64,
+}
+
+/// As `udd.fitting.parameters.Free`.
+#[derive(FromPyObject)]
+struct Free {
+    role: String,
+    index: usize,
+    film: Option<usize>,
+    mean: f64,
+    sd: f64,
+}
+
+/// As `udd.fitting.estimator_input.EstimatorInput`.
+#[derive(FromPyObject)]
+struct EstimatorInput<'py> {
+    model: Bound<'py, PyAny>,
+    observations: Observations<'py>,
+    states: PyReadonlyArray2<'py, f64>,
+    films: Vec<FilmValues>,
+    free: Vec<Free>,
+    diffusion: Vec<f64>,
+    linear: Option<Py<Linearised>>,
+}
+
 /// Three arrays.
 type Three<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
@@ -58,49 +85,62 @@ fn deep(array: &PyReadonlyArray3<'_, f64>) -> Array {
     Array { shape: array.shape().to_vec(), numbers: array.iter().copied().collect() }
 }
 
-fn measured((t, seen, information, linked, film, memory): &DataTuple<'_>) -> Data {
-    Data {
-        t: list(t),
-        seen: wide(seen),
-        information: deep(information),
-        linked: list(linked),
-        film: list(film).into_iter().map(|film| usize::try_from(film).unwrap_or(usize::MAX)).collect(),
-        memory: memory.clone(),
+impl From<&Observations<'_>> for Data {
+    fn from(observed: &Observations<'_>) -> Self {
+        let film = list(&observed.film).into_iter().map(|film| usize::try_from(film).unwrap_or(usize::MAX));
+        Self {
+            t: list(&observed.t),
+            seen: wide(&observed.seen),
+            information: deep(&observed.information),
+            linked: list(&observed.linked),
+            film: film.collect(),
+            autocorrelation: observed.autocorrelation.clone(),
+        }
     }
 }
 
-fn frees(free: &[FreeTuple]) -> PyResult<Vec<FreeParameter>> {
-    let one = |(role, index, film, mean, sd): &FreeTuple| {
-        let role = match role.as_str() {
-            "model" => Role::Model(*index),
-            "camera" => Role::Camera(*index),
+impl From<FilmValues> for FilmParameters {
+    fn from(FilmValues { model, camera, clock }: FilmValues) -> Self {
+        Self { model, camera, clock }
+    }
+}
+
+impl TryFrom<Free> for FreeParameter {
+    type Error = PyErr;
+
+    fn try_from(free: Free) -> PyResult<Self> {
+        let role = match free.role.as_str() {
+            "model" => Role::Model(free.index),
+            "camera" => Role::Camera(free.index),
             "clock" => Role::Clock,
             other => return Err(PyValueError::new_err(format!("unknown role {other:?}"))),
         };
-        Ok(FreeParameter { role, film: *film, mean: *mean, sd: *sd })
-    };
-    free.iter().map(one).collect()
+        Ok(Self { role, film: free.film, mean: free.mean, sd: free.sd })
+    }
 }
 
-fn sets(sets: Vec<SetTuple>) -> Vec<FilmParameters> {
-    sets.into_iter().map(|(model, camera, clock)| FilmParameters { model, camera, clock }).collect()
+fn film_parameters(films: Vec<FilmValues>) -> Vec<FilmParameters> {
+    films.into_iter().map(FilmParameters::from).collect()
 }
 
-/// The problem that is asked of a model.
-fn asked(
-    model: &Bound<'_, PyAny>,
-    data: &DataTuple<'_>,
-    (states, own, linear): Start<'_>,
-    free: &[FreeTuple],
-    diffusion: Option<&[f64]>,
-) -> PyResult<Box<dyn Fitted>> {
-    let (data, states) = (measured(data), wide(&states));
-    let linear = linear.as_ref().map(Py::get);
-    let model = AnyModel::to_fit(model)?;
-    fitted(
-        model,
-        Asked { data: Some(&data), states: &states, sets: sets(own), free: frees(free)?, diffusion, linear },
-    )
+impl EstimatorInput<'_> {
+    /// The problem that is asked of this model, by one who takes it and what is asked.
+    fn with<T>(self, build: impl FnOnce(AnyModel, Asked<'_>) -> PyResult<T>) -> PyResult<T> {
+        let (data, states) = (Data::from(&self.observations), wide(&self.states));
+        let asked = Asked {
+            data: Some(&data),
+            states: &states,
+            sets: film_parameters(self.films),
+            free: self.free.into_iter().map(FreeParameter::try_from).collect::<PyResult<_>>()?,
+            diffusion: &self.diffusion,
+            linear: self.linear.as_ref().map(Py::get),
+        };
+        build(AnyModel::to_fit(&self.model)?, asked)
+    }
+
+    fn fitted(self) -> PyResult<Box<dyn Fitted>> {
+        self.with(fitted)
+    }
 }
 
 /// An array of a shape from its numbers in C order.
@@ -122,22 +162,19 @@ fn arrays<'py>(py: Python<'py>, scores: &[Score], shapes: [&[usize]; 3]) -> PyRe
 #[pyfunction]
 fn solve<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-    free: Vec<FreeTuple>,
-    diffusion: Vec<f64>,
-    until: (usize, f64),
+    problem: EstimatorInput<'py>,
+    iterations: usize,
+    decrease: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let options = Options { iterations: until.0, decrease: until.1 };
-    let fitted = asked(model, &data, start, &free, Some(&diffusion))?;
+    let options = Options { iterations, decrease };
+    let fitted = problem.fitted()?;
     let size = fitted.size();
     let (n, p, d, m) = (size.frames, size.free, size.states, size.channels);
     let s = interrupt::run(py, |stop| fitted.solve(&options, stop))?;
     let result = PyDict::new(py);
     result.set_item("states", array(py, &[n, d], s.states)?)?;
     let sets = s.sets.into_iter().map(|set| (set.model, set.camera, set.clock));
-    result.set_item("sets", sets.collect::<Vec<SetTuple>>())?;
+    result.set_item("sets", sets.collect::<Vec<_>>())?;
     result.set_item("covariance", array(py, &[p, p], s.covariance)?)?;
     result.set_item("state_covariance", array(py, &[n, d, d], s.state_covariance)?)?;
     result.set_item("misfit", array(py, &[n, m], s.misfit)?)?;
@@ -156,14 +193,10 @@ fn solve<'py>(
 #[pyfunction]
 fn score<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-    free: Vec<FreeTuple>,
-    diffusion: Vec<f64>,
+    problem: EstimatorInput<'py>,
     candidates: Vec<(Bound<'py, PyAny>, Vec<usize>)>,
 ) -> PyResult<Three<'py>> {
-    let fitted = asked(model, &data, start, &free, Some(&diffusion))?;
+    let fitted = problem.fitted()?;
     let one = |(model, indices): (Bound<'_, PyAny>, _)| Ok((AnyModel::to_fit(&model)?, indices));
     let candidates = candidates.into_iter().map(one).collect::<PyResult<Vec<_>>>()?;
     let score = interrupt::run(py, |_| fitted.score(candidates))?;
@@ -175,48 +208,40 @@ fn score<'py>(
 #[pyfunction]
 fn score_ripples<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-    free: Vec<FreeTuple>,
-    diffusion: Vec<f64>,
+    problem: EstimatorInput<'py>,
     frequencies: Vec<f64>,
 ) -> PyResult<Three<'py>> {
-    let AnyModel::Four(Either::First(family), values) = AnyModel::to_fit(model)? else {
-        return Err(PyValueError::new_err("only a disk has a drive"));
-    };
+    let scores = problem.with(|model, asked| {
+        let AnyModel::Four(Either::First(family), values) = model else {
+            return Err(PyValueError::new_err("only a disk has a drive"));
+        };
+        let probe = ripple_probe(&family, values.len(), &frequencies);
+        let fit = fitted::problem((family, &values, DiskCamera), |_| None, asked)?;
+        interrupt::run(py, |_| fit.estimator.score_waves(&fit.point, &probe, &frequencies))
+    })?;
+    let n = scores.len();
+    arrays(py, &scores, [&[n, 2], &[n, 2, 2], &[n, 2]])
+}
+
+/// Ripples of the drive at a basis of frequencies, added to a disk that has so many parameters.
+fn ripple_probe(family: &DiskFamily, known: usize, frequencies: &[f64]) -> FrequencyProbe<DiskFamily> {
     let highest = frequencies.iter().copied().fold(0.0, f64::max);
     let basis = std::array::from_fn(|k| highest * (k + 1) as f64 / BASIS as f64);
     let (mut wide, mut more, mut amplitudes) = (family.clone(), Vec::new(), Vec::new());
     for &f in &basis {
         wide.effects.push(Effect::new(Kind::DriveRipple));
-        let first = values.len() + more.len();
+        let first = known + more.len();
         amplitudes.extend([Role::Model(first), Role::Model(first + 1)]);
         more.extend([0.0, 0.0, f]);
     }
-    let probe =
-        FrequencyProbe { candidate: Candidate { family: wide, more, amplitudes }, frequencies: basis };
-    let (states, own, linear) = start;
-    let (data, states) = (measured(&data), self::wide(&states));
-    let (diffusion, linear) = (Some(&diffusion[..]), linear.as_ref().map(Py::get));
-    let (free, sets) = (frees(&free)?, sets(own));
-    let asked = Asked { data: Some(&data), states: &states, sets, free, diffusion, linear };
-    let fit = problem((family, &values, DiskCamera), |_| None, asked)?;
-    let scores = interrupt::run(py, |_| fit.estimator.score_waves(&fit.point, &probe, &frequencies))?;
-    let n = scores.len();
-    arrays(py, &scores, [&[n, 2], &[n, 2, 2], &[n, 2]])
+    FrequencyProbe { candidate: Candidate { family: wide, more, amplitudes }, frequencies: basis }
 }
 
 /// Times (n, q), states (n, q, d) and responses (n, q, d, d) at q places of each of n links: what a unit
 /// forcing of each equation there adds to the state at the link's end.
 #[pyfunction]
-fn responses<'py>(
-    py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-) -> PyResult<Three<'py>> {
-    let fitted = asked(model, &data, start, &[], None)?;
+fn responses<'py>(py: Python<'py>, problem: EstimatorInput<'py>) -> PyResult<Three<'py>> {
+    let fitted = problem.fitted()?;
     let [t, states, responses] = interrupt::run(py, |_| fitted.places())?;
     let (n, q, d) = (t.len() / PLACES_PER_LINK, PLACES_PER_LINK, fitted.size().states);
     Ok((array(py, &[n, q], t)?, array(py, &[n, q, d], states)?, array(py, &[n, q, d, d], responses)?))
@@ -226,18 +251,13 @@ fn responses<'py>(
 /// groups one after the other, the information flat. A column is what its amplitude adds to the state at
 /// every link's end (n - 1, d, c); nothing to what is seen.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 fn score_columns<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-    free: Vec<FreeTuple>,
-    diffusion: Vec<f64>,
+    problem: EstimatorInput<'py>,
     at_end: PyReadonlyArray3<'py, f64>,
     groups: Vec<usize>,
 ) -> PyResult<Three<'py>> {
-    let fitted = asked(model, &data, start, &free, Some(&diffusion))?;
+    let fitted = problem.fitted()?;
     let (n, d, c) = (fitted.size().frames, fitted.size().states, groups.iter().sum::<usize>());
     let at_end = deep(&at_end);
     if at_end.shape != [n - 1, d, c] {
@@ -257,13 +277,10 @@ fn score_columns<'py>(
 #[pyfunction]
 fn filter<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-    diffusion: Vec<f64>,
+    problem: EstimatorInput<'py>,
     windows: Vec<(usize, usize)>,
 ) -> PyResult<Three<'py>> {
-    let fitted = asked(model, &data, start, &[], Some(&diffusion))?;
+    let fitted = problem.fitted()?;
     let (frames, d, n) = (fitted.size().frames, fitted.size().states, windows.len());
     if windows.iter().any(|&(first, last)| first >= last || last >= frames) {
         return Err(PyValueError::new_err("a window reaches beyond the record"));
@@ -277,13 +294,10 @@ fn filter<'py>(
 #[pyfunction]
 fn innovations<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    data: DataTuple<'py>,
-    start: Start<'py>,
-    diffusion: Vec<f64>,
+    problem: EstimatorInput<'py>,
     vague: Vec<f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let fitted = asked(model, &data, start, &[], Some(&diffusion))?;
+    let fitted = problem.fitted()?;
     let size = fitted.size();
     if vague.len() != size.states {
         return Err(PyValueError::new_err(format!("vague must have {} numbers", size.states)));
@@ -297,16 +311,16 @@ fn innovations<'py>(
 fn predict<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,
-    sets: Vec<SetTuple>,
+    films: Vec<FilmValues>,
     film: Vec<usize>,
     t0: PyReadonlyArray1<'py, f64>,
     states: PyReadonlyArray2<'py, f64>,
     times: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (t0, states, films) = (list(&t0), wide(&states), sets.len());
+    let (t0, states, sets) = (list(&t0), wide(&states), film_parameters(films));
+    let films = sets.len();
     let times: Vec<Vec<f64>> = times.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
-    let sets = self::sets(sets);
-    let asked = Asked { data: None, states: &states, sets, free: Vec::new(), diffusion: None, linear: None };
+    let asked = Asked { data: None, states: &states, sets, free: Vec::new(), diffusion: &[], linear: None };
     let fitted = fitted(AnyModel::to_fit(model)?, asked)?;
     let k = film.len().min(t0.len()).min(states.shape[0]);
     if times.len() != k || film.iter().any(|&film| film >= films) {

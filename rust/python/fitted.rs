@@ -37,14 +37,14 @@ impl Array {
 }
 
 /// Frame by frame: time, what was seen, its information, whether the next frame is linked, which film it
-/// belongs to; and how much of the noise each channel remembers.
+/// belongs to; and the autocorrelation of each channel's noise from one frame to the next.
 pub struct Data {
     pub t: Vec<f64>,
     pub seen: Array,
     pub information: Array,
     pub linked: Vec<bool>,
     pub film: Vec<usize>,
-    pub memory: Vec<f64>,
+    pub autocorrelation: Vec<f64>,
 }
 
 /// All that makes a problem beside the model.
@@ -54,8 +54,8 @@ pub struct Asked<'a> {
     pub states: &'a Array,
     pub sets: Vec<FilmParameters>,
     pub free: Vec<FreeParameter>,
-    /// None where it plays no part.
-    pub diffusion: Option<&'a [f64]>,
+    /// Plays no part where nothing was measured.
+    pub diffusion: &'a [f64],
     /// What a solve left at this point.
     pub linear: Option<&'a Linearised>,
 }
@@ -64,16 +64,16 @@ impl Asked<'_> {
     /// Whether all fits together, for so many states and channels, and parameters of the model and of the camera.
     fn check(&self, (d, m): (usize, usize), (model, camera): (usize, usize)) -> PyResult<()> {
         let wrong = |what: String| Err(PyValueError::new_err(what));
-        if self.diffusion.is_some_and(|diffusion| diffusion.len() != d) {
-            return wrong(format!("diffusion must have {d} numbers"));
-        }
         if let Some(data) = self.data {
+            if self.diffusion.len() != d {
+                return wrong(format!("diffusion must have {d} numbers"));
+            }
             if data.information.shape[1..] != [m, m] {
                 return wrong(format!("information must hold {m} x {m} matrices"));
             }
             data.seen.needs_columns(m, "seen")?;
-            if data.memory.len() != m {
-                return wrong("memory: one per channel".into());
+            if data.autocorrelation.len() != m {
+                return wrong("autocorrelation: one per channel".into());
             }
             let n = data.t.len();
             let others =
@@ -212,7 +212,7 @@ where
     let mut record = Record::default();
     if let Some(data) = asked.data {
         (record.t, record.linked, record.film) = (data.t.clone(), data.linked.clone(), data.film.clone());
-        record.memory.copy_from_slice(&data.memory);
+        record.memory.copy_from_slice(&data.autocorrelation);
         for i in 0..data.t.len() {
             record.seen.push(SVector::from_column_slice(&data.seen.numbers[M * i..M * (i + 1)]));
             let information = &data.information.numbers[M * M * i..M * M * (i + 1)];
@@ -220,8 +220,8 @@ where
         }
     }
     let mut diffusion = [1.0; D];
-    if let Some(given) = asked.diffusion {
-        diffusion.copy_from_slice(given);
+    if asked.data.is_some() {
+        diffusion.copy_from_slice(asked.diffusion);
     }
     let point = Unknowns { states: asked.states.numbers.as_chunks().0.to_vec(), sets: asked.sets };
     let tolerance = TOLERANCE;

@@ -62,31 +62,43 @@ type Seen<'py> = (
 type Stepped = ([f64; 3], [[f64; 3]; 3], Vec<[f64; 2]>, Vec<f64>);
 type Aligned<'py> = ((f64, f64, f64), Vec<Option<Seen<'py>>>, Vec<bool>, Option<Stepped>, f64);
 
-/// Moves a pose (u, v, angle) onto a picture by one Gauss-Newton step for each of `rounds` (tolerances, pixels).
-///
-/// `lights` has a row of 256 for each mark: the light of each code; `even` multiplies the light of each pixel.
-/// `look` is psf, noise, gain_slack, rim, the least contrast of a mark, the time between rows; `lens` its
-/// middle, size, curve, tilts, aspect, shear; `motion` shift, turn, bend, twist, rate, spin, bending, twisting. Returns the pose,
-/// what the last round saw of each mark, which it used, the step that it made of them (None: the disk is not
-/// held; NaN: a mark not seen) and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
-#[pyfunction]
-#[pyo3(signature = (codes, view, lights, look, marks, lens, pose, motion, rounds, without = None, keep = false, even = None))]
-#[allow(clippy::too_many_arguments)]
-fn align_marks<'py>(
-    py: Python<'py>,
+/// The codes of a picture's pixels, which of them are in view, and by what the light of each is multiplied.
+#[derive(FromPyObject)]
+struct Picture<'py> {
     codes: PyReadonlyArray2<'py, u8>,
     view: PyReadonlyArray2<'py, bool>,
+    even: Option<PyReadonlyArray2<'py, f32>>,
+}
+
+/// How the disk shows. `lights` has a row of 256 for each mark: the light of each code. `look` is psf, noise,
+/// gain_slack, rim, the least contrast of a mark, the time between rows; `lens` its middle, size, curve, tilts,
+/// aspect, shear.
+#[derive(FromPyObject)]
+struct Appearing<'py> {
     lights: PyReadonlyArray2<'py, f64>,
     look: [f64; 6],
     marks: PyReadonlyArray2<'py, f64>,
     lens: [f64; 8],
+}
+
+/// Moves a pose (u, v, angle) onto a picture by one Gauss-Newton step for each of `rounds` (tolerances, pixels).
+///
+/// `motion` is shift, turn, bend, twist, rate, spin, bending, twisting. Returns the pose, what the last round saw of each mark, which it used, the step that it made of them (None: the disk is not
+/// held; NaN: a mark not seen) and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
+#[pyfunction]
+#[pyo3(signature = (picture, disk, pose, motion, rounds, without = None, keep = false))]
+fn align_marks<'py>(
+    py: Python<'py>,
+    picture: Picture<'py>,
+    disk: Appearing<'py>,
     pose: [f64; 3],
     motion: [f64; 12],
     rounds: Vec<f64>,
     without: Option<usize>,
     keep: bool,
-    even: Option<PyReadonlyArray2<'py, f32>>,
 ) -> PyResult<Aligned<'py>> {
+    let Picture { codes, view, even } = picture;
+    let Appearing { lights, look, marks, lens } = disk;
     let (height, width) = (codes.shape()[0], codes.shape()[1]);
     if view.shape() != codes.shape() {
         return Err(PyValueError::new_err("picture and view must have one shape"));

@@ -11,7 +11,7 @@ use super::errors::ModelError;
 use super::interrupt;
 use super::model::AnyModel;
 use crate::analysis::{ExecutionContext, Outcome};
-use crate::integrate::Failure;
+use crate::integrate::{Failure, Tolerance};
 use crate::scalar::Isa;
 
 /// The outcome of a run as a number: its place in `udd`'s list of outcomes.
@@ -42,6 +42,36 @@ pub fn failure_code(failure: Failure) -> u8 {
     }
 }
 
+/// As `udd.simulation.batch.Batch`.
+#[derive(FromPyObject)]
+pub struct Batch<'py> {
+    model: Bound<'py, PyAny>,
+    values: PyReadonlyArray2<'py, f64>,
+    pub starts: PyReadonlyArray2<'py, f64>,
+    rtol: f64,
+    atol: f64,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+}
+
+impl<'py> Batch<'py> {
+    pub fn model(&self) -> PyResult<AnyModel> {
+        Ok(AnyModel::from_python(&self.model)?.filled())
+    }
+
+    pub fn tolerance(&self) -> Tolerance {
+        Tolerance { rtol: self.rtol, atol: self.atol }
+    }
+
+    pub fn rows(&self, model: &AnyModel) -> PyResult<Vec<Vec<f64>>> {
+        values(model, &self.values)
+    }
+
+    pub fn jobs(&self) -> Jobs<'_, 'py> {
+        Jobs { threads: self.threads, done: AtomicUsize::new(0), progress: &self.progress }
+    }
+}
+
 /// Jobs that Python watches: on so many threads (0 for one per core), each counted when it is done.
 pub struct Jobs<'a, 'py> {
     threads: usize,
@@ -50,15 +80,11 @@ pub struct Jobs<'a, 'py> {
     progress: &'a Option<Bound<'py, PyAny>>,
 }
 
-impl<'a, 'py> Jobs<'a, 'py> {
-    pub fn new(threads: usize, progress: &'a Option<Bound<'py, PyAny>>) -> Self {
-        Self { threads, done: AtomicUsize::new(0), progress }
-    }
-
+impl Jobs<'_, '_> {
     /// As [`interrupt::watch`]: what the work on all threads results in, and a signal that came meanwhile.
     pub fn watch<T: Send>(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         work: impl FnOnce(ExecutionContext<'_>) -> T + Send,
     ) -> PyResult<(T, PyResult<()>)> {
         let (threads, done, progress) = (self.threads, &self.done, self.progress);

@@ -1,11 +1,11 @@
 //! `udd.lyapunov` and `udd.lyapunov_spectrum`.
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::interrupt;
-use super::jobs::{self, Jobs, outcome_code};
+use super::jobs::{self, Batch, outcome_code};
 use super::model::{AnyModel, state, with_wide_model};
 use crate::analysis::{
     CancelFlag, CovariantFrames, ExecutionContext, Exponents, Lyapunov, LyapunovOptions, frames as frames_of,
@@ -90,32 +90,22 @@ fn collect<const D: usize, const N: usize>(orbits: &[Option<Exponents<D, N>>]) -
     table
 }
 
-/// The largest exponent of each orbit, or all of them, on `threads` threads (0 for one per core).
-///
-/// `values` has one row of parameter values for each orbit, or a single row for all; `starts` likewise.
-/// `progress` is called with the number of orbits done. Returns a dict of columns.
+/// The largest exponent of each orbit, or all of them. Returns a dict of columns.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 fn lyapunov<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    values: PyReadonlyArray2<'py, f64>,
-    starts: PyReadonlyArray2<'py, f64>,
+    batch: Batch<'py>,
     all: bool,
     time: f64,
     transient: f64,
     goal: f64,
-    rtol: f64,
-    atol: f64,
-    threads: usize,
-    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.filled();
-    let options = LyapunovOptions { time, transient, goal, tolerance: Tolerance { rtol, atol } };
-    let rows = jobs::values(&model, &values)?;
-    let jobs = Jobs::new(threads, &progress);
+    let model = batch.model()?;
+    let options = LyapunovOptions { time, transient, goal, tolerance: batch.tolerance() };
+    let rows = batch.rows(&model)?;
+    let jobs = batch.jobs();
     let (table, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
-        let starts = jobs::starts(&starts, family.idle())?;
+        let starts = jobs::starts(&batch.starts, family.idle())?;
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
         let dimension = starts[0].len();

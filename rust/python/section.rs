@@ -1,16 +1,15 @@
 //! `udd.poincare`, and what is built upon it.
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::errors::ModelError;
-use super::jobs::{self, Jobs};
-use super::model::{AnyModel, with_wide_model};
+use super::jobs::{self, Batch};
+use super::model::with_wide_model;
 use crate::analysis::{CrossingOutcome, Crossings, ExecutionContext, Section, SectionRun};
 use crate::formula::{Expression, Names};
-use crate::integrate::Tolerance;
 use crate::memory;
 use crate::model::Family;
 
@@ -119,49 +118,35 @@ fn collect<F: Family<D>, const D: usize>(
     table
 }
 
-/// Where trajectories cross surfaces, on `threads` threads (0 for one per core).
+/// Where trajectories cross surfaces.
 ///
-/// `values` has one row of parameter values for each trajectory, or a single row for all; `starts`
-/// likewise. A section is the zero of an expression of the state, its rates, the time and the parameters,
-/// crossed where it rises (direction 1), falls (-1), or either (0). The first `skip` crossings are left out.
-/// `progress` is called with the number of trajectories done. Returns a dict of columns; on Ctrl-C with
-/// what there is.
+/// A section is the zero of an expression of the state, its rates, the time and the parameters, crossed
+/// where it rises (direction 1), falls (-1), or either (0). The first `skip` crossings are left out. Returns a
+/// dict of columns; on Ctrl-C with what there is.
 #[pyfunction]
-#[pyo3(signature = (model, values, starts, section, direction, skip, count, t_max, rtol, atol, threads, progress = None))]
-#[allow(clippy::too_many_arguments)]
 fn sections<'py>(
     py: Python<'py>,
-    model: &Bound<'py, PyAny>,
-    values: PyReadonlyArray2<'py, f64>,
-    starts: PyReadonlyArray2<'py, f64>,
-    section: Vec<String>,
-    direction: Vec<i32>,
+    batch: Batch<'py>,
+    section: Vec<(String, i32)>,
     skip: usize,
     count: usize,
     t_max: f64,
-    rtol: f64,
-    atol: f64,
-    threads: usize,
-    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.filled();
-    if section.is_empty() || section.len() > usize::from(u8::MAX) || section.len() != direction.len() {
-        let (sections, directions) = (section.len(), direction.len());
-        let message = format!("{sections} sections with {directions} directions cannot be used");
-        return Err(ModelError::new_err(message));
+    let model = batch.model()?;
+    if section.is_empty() || section.len() > usize::from(u8::MAX) {
+        return Err(ModelError::new_err(format!("{} sections cannot be used at once", section.len())));
     }
     if count == 0 {
         return Err(ModelError::new_err("at least one point must be asked for"));
     }
     let (names, angles): (Vec<String>, Vec<bool>) = model.states().into_iter().unzip();
-    let rows = jobs::values(&model, &values)?;
-    let watched = Jobs::new(threads, &progress);
+    let rows = batch.rows(&model)?;
+    let watched = batch.jobs();
     let (table, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
         let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
-        let pairs = section.iter().zip(&direction);
-        let surfaces = pairs.map(|(text, &direction)| parse(text, direction, &names, &parameters));
+        let surfaces = section.iter().map(|(text, direction)| parse(text, *direction, &names, &parameters));
         let surfaces = surfaces.collect::<PyResult<Vec<_>>>()?;
-        let starts = jobs::starts(&starts, family.idle())?;
+        let starts = jobs::starts(&batch.starts, family.idle())?;
         jobs::agree(rows.len(), starts.len())?;
         let dimension = starts[0].len();
         let table = Table::new(rows.len().max(starts.len()), count, dimension)?;
@@ -174,7 +159,7 @@ fn sections<'py>(
             count,
             end: t_max,
             bounded: std::array::from_fn(|n| angles.get(n) == Some(&false)),
-            tolerance: Tolerance { rtol, atol },
+            tolerance: batch.tolerance(),
         };
         let (table, signal) = watched.watch(py, |context| collect(&sections, table, context))?;
         (table, dimension, signal)

@@ -20,7 +20,6 @@ use crate::model::Family;
 /// `values` has one row of parameter values for each piece, `starts` likewise; each begins at time `t` and
 /// lasts `spans`. Returns a dict of arrays.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 fn shoot<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,

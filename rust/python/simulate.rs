@@ -169,7 +169,6 @@ impl Dense {
 /// accepted step. Returns a dict.
 #[pyfunction]
 #[pyo3(signature = (model, times, end, state0, rtol, atol, method, dense))]
-#[allow(clippy::too_many_arguments)]
 fn simulate<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,

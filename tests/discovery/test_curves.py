@@ -159,7 +159,7 @@ def test_forcings_score_as_the_effects_of_the_library(null):
     for score, effect in zip(scores, effects, strict=True):
         wider = null.model.with_effects([effect])
         index = list(wider.parameters).index(f"{effect.name}.{effect.amplitudes[0]}")
-        gradient, information, _alone = _core.score(*null.problem.arguments(null.point), [(wider, [index])])
+        gradient, information, _alone = _core.score(null.problem.at(null.point), [(wider, [index])])
         scale = max(null.scatter, 1.0)
         # Gauss' rule with a few places per frame.
         assert score.information[0, 0] == pytest.approx(information[0, 0] / scale, rel=2e-3)

@@ -14,6 +14,7 @@ import simulated
 import udd
 from udd.errors import FitError
 from udd.fitting import fit_record, model_error_schedule, record_of, widened
+from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.fit import _afresh
 from udd.fitting.parameters import Free
 from udd.fitting.solve import solve
@@ -228,7 +229,9 @@ def test_what_a_solve_left_counts_only_where_it_was_left():
         replace(fitted.problem, free=fitted.problem.free[1:]),
         replace(wider, free=(*wider.free, Free("slip.c", "model", 6, 0.0, np.inf))),
     ):
-        sets = tuple(([*v, 0.0][: len(problem.models[0].parameters)], c, k) for v, c, k in left.sets)
+        sets = tuple(
+            FilmParameters([*v, 0.0][: len(problem.models[0].parameters)], c, k) for v, c, k in left.sets
+        )
         ends = [solve((measured,), problem, replace(p, sets=sets), 1) for p in (left, bare)]
         assert ends[0].chi2 == ends[1].chi2
         assert ends[0].parameters == ends[1].parameters

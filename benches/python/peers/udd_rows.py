@@ -41,12 +41,13 @@ def spectrum(rtol: float = 2.8e-8) -> tuple[str, Any]:
     """The setting, and ``run(start, t)``: the exponents and the state at t."""
     import udd
     from udd import _core
+    from udd.simulation.batch import Batch
 
     model, row = udd.DLE(1.0), np.array([[1.0, 0.0]])
 
     def run(start: Any, t: float) -> Any:
         # What udd.lyapunov_spectrum calls, for a given time without a transient.
-        found = _core.lyapunov(model, row, start[None], True, t, 0.0, 0.0, rtol, 1e-3 * rtol, 1, None)
+        found = _core.lyapunov(Batch(model, row, start[None], rtol, 1e-3 * rtol), True, t, 0.0, 0.0)
         return found["value"][0], found["end"][0]
 
     return f"Taylor, rtol {rtol:g}", run
@@ -56,13 +57,15 @@ def sweep(rtol: float = 3.9e-5) -> tuple[str, Any]:
     """The setting, and ``run(w, starts, transient, t)``: the exponents and the states at t."""
     import udd
     from udd import _core
+    from udd.simulation.batch import Batch
 
     model = udd.DLE(1.0)
 
     def run(w: Any, starts: Any, transient: float, t: float) -> Any:
         # What udd.lyapunov calls, from given starts.
         rows = np.column_stack([w, np.zeros(len(w))])
-        found = _core.lyapunov(model, rows, starts, False, t, transient, 0.0, rtol, 1e-3 * rtol, 2, None)
+        batch = Batch(model, rows, starts, rtol, 1e-3 * rtol, threads=2)
+        found = _core.lyapunov(batch, False, t, transient, 0.0)
         return found["value"][:, 0], found["end"]
 
     return f"Taylor, rtol {rtol:g}", run

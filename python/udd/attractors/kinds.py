@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from udd import _core
 from udd.chaos.recurrence import APERIODIC
 from udd.models.state_scaling import Floats
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 
 from .classification import Classification, MotionClassifier, decided
@@ -55,19 +56,9 @@ def kinds_of(
         if not len(open_):
             break
         time = share * float(np.nanmedian(np.ptp(found.t[open_], axis=1)))
-        got = _core.lyapunov(
-            runner.model,
-            np.ascontiguousarray(rows[open_]),
-            np.ascontiguousarray(found.end[open_]),
-            True,
-            time,
-            0.0,
-            1e-300,
-            runner.rtol,
-            runner.atol,
-            runner.threads,
-            None,
-        )
+        values, starts = np.ascontiguousarray(rows[open_]), np.ascontiguousarray(found.end[open_])
+        batch = Batch(runner.model, values, starts, runner.rtol, runner.atol, runner.threads)
+        got = _core.lyapunov(batch, True, time, 0.0, 1e-300)
         growth = got["value"] * got["time"][:, None]
         done = got["outcome"] == FINISHED
         chaos = done & (growth.max(axis=1) > _PARTS)

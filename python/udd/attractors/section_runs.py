@@ -12,6 +12,7 @@ from udd import _core
 from udd.models import Model
 from udd.models.parameter_batch import outside_domain
 from udd.models.state_scaling import Floats
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import OUTCOMES
 
 START_OUTSIDE = len(OUTCOMES)
@@ -78,19 +79,10 @@ class SectionRunner:
         )
         runs = np.flatnonzero(~outside)
         if len(runs):
-            got = _core.sections(
-                self.model,
-                np.ascontiguousarray(values[runs]),
-                np.ascontiguousarray(starts[runs]),
-                list(self.section),
-                list(self.direction),
-                skip,
-                count,
-                self.t_each * (skip + count),
-                self.rtol,
-                self.atol,
-                self.threads,
-            )
+            own, first = np.ascontiguousarray(values[runs]), np.ascontiguousarray(starts[runs])
+            batch = Batch(self.model, own, first, self.rtol, self.atol, self.threads)
+            surfaces = list(zip(self.section, self.direction, strict=True))
+            got = _core.sections(batch, surfaces, skip, count, self.t_each * (skip + count))
             columns = got["t"].shape[1]  # fewer after Ctrl-C
             found.points[runs, :columns], found.t[runs, :columns] = got["points"], got["t"]
             found.outcome[runs], found.end[runs], found.t_end[runs] = got["outcome"], got["end"], got["t_end"]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd.errors import IncompleteWarning, ModelError
+from udd.simulation.batch import Batch
 from udd.simulation.trajectory import simulate
 
 from .equilibrium_curve import EquilibriumCurve
@@ -33,7 +34,7 @@ def orbit_states(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
     rows = curve.values_at(u)[np.newaxis]
     if flow.forcing is None:
         method = "auto" if _core.has_series(model) else "dop853"
-        found = _core.ensemble(model, rows, starts, times, 1e-10, 1e-13, method, 1)["states"]
+        found = _core.ensemble(Batch(model, rows, starts, 1e-10, 1e-13), times, method)["states"]
     else:
         tight: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-13, "method": "auto"}
         each = zip(curve.begins(u), starts, strict=True)

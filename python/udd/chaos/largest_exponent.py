@@ -15,6 +15,7 @@ from udd._util.validation import number
 from udd.errors import ConvergenceWarning, IntegrationError, ModelError
 from udd.models import DLE, Model
 from udd.models.parameter_batch import default_state, parameter_batch
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 from udd.simulation.trajectory import initial_state, tolerances
 
@@ -177,9 +178,8 @@ def lyapunov(
         for first in range(0, n, PORTION):
             part = slice(first, min(first + PORTION, n))
             rows = orbits.rows(part)
-            found = _core.lyapunov(
-                model, rows, start[None, :], False, time, skipped, goal, rtol, atol, workers, show(first)
-            )
+            batch = Batch(model, rows, start[None, :], rtol, atol, workers, show(first))
+            found = _core.lyapunov(batch, False, time, skipped, goal)
             done = found["outcome"] == FINISHED
             exponents[part] = np.where(done, found["value"][:, 0], np.nan)
             if with_error:

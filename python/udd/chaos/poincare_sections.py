@@ -18,6 +18,7 @@ from udd._util.validation import number, whole
 from udd.errors import IncompleteWarning, ModelError, interrupted
 from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import OUTCOMES
 from udd.simulation.trajectory import tolerances
 
@@ -319,20 +320,8 @@ def poincare(
         end = number("t_max", t_max, above=0.0)
     jobs = max(len(rows), len(starts))
     with progress_bar(jobs, "orbit", progress) as since:
-        found = _core.sections(
-            model,
-            rows,
-            starts,
-            list(surfaces),
-            list(ways),
-            skipped,
-            count,
-            end,
-            rtol,
-            atol,
-            thread_count(threads),
-            since(0),
-        )
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), since(0))
+        found = _core.sections(batch, list(zip(surfaces, ways, strict=True)), skipped, count, end)
     names = np.array(OUTCOMES)[found["outcome"]]
     numbers = found["found"].astype(np.int64)
     columns = found["t"].shape[1]  # as many as were asked for, or were found until Ctrl-C

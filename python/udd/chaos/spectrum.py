@@ -16,6 +16,7 @@ from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError
 from udd.models import DLE, Disk, Model, require_model
 from udd.models.parameter_batch import default_state
 from udd.models.state_scaling import coordinates_of
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 from udd.simulation.trajectory import initial_state, tolerances
 
@@ -289,9 +290,8 @@ class _Run:
 
     def __call__(self, start: _Floats, time: float, skipped: float, goal: float) -> _core._Orbits:
         row = np.array([list(self.model.parameters.values())])
-        found = _core.lyapunov(
-            self.model, row, start[None, :], True, time, skipped, goal, self.rtol, self.atol, 1, None
-        )
+        batch = Batch(self.model, row, start[None, :], self.rtol, self.atol)
+        found = _core.lyapunov(batch, True, time, skipped, goal)
         outcome = int(found["outcome"][0])
         if outcome != FINISHED:
             raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome])}")

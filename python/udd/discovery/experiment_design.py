@@ -17,6 +17,7 @@ from udd.discovery.scoring.candidates import renamed
 from udd.effects import Effect
 from udd.errors import UddError
 from udd.fitting import Fit, Record
+from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
 from udd.models import Disk, Model, Pendulum
@@ -240,7 +241,7 @@ class _Pair:
         model = problem.models[0]
         forms = [_still(self.chosen), _still(Candidate(self.other.effect, self.other.title))]
         _gradient, information, _alone = _core.score(
-            *problem.arguments(point), [(c.added_to(model), c.amplitude_indices(model)) for c in forms]
+            problem.at(point), [(c.added_to(model), c.amplitude_indices(model)) for c in forms]
         )
         k = len(self.chosen.amplitude_names)
         mine, others = np.arange(k), np.arange(k, len(information))
@@ -254,7 +255,7 @@ class _Pair:
         fit, problem = self.fit, self.fit.problem
         models = tuple(self._without(m) for m in fit.models)
         sets = [
-            (list(m.parameters.values()), camera, clock)
+            FilmParameters(list(m.parameters.values()), camera, clock)
             for m, (_values, camera, clock) in zip(models, fit.point.sets, strict=True)
         ]
         if more is None:
@@ -269,7 +270,7 @@ class _Pair:
             own = self._without(film.model)
             free = _for_films(free, models, own)
             models = (*models, own)
-            sets.append((list(own.parameters.values()), list(sets[0][1]), sets[0][2]))
+            sets.append(sets[0]._replace(model=list(own.parameters.values())))
         noise = replace(problem.noise, weight=weight)
         longer = replace(problem, models=models, record=record, free=free, noise=noise)
         return longer, Point(np.concatenate([fit.states, states]), tuple(sets))

@@ -14,6 +14,7 @@ from udd import _core
 from udd._util import chi_squared
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, fit_record, record_of
+from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.model_error_schedule import reduce_model_error
 from udd.fitting.parameters import Free
 from udd.fitting.solve import solve
@@ -283,7 +284,7 @@ class _Pruning:
             values = list(model)
             for name in places.keys() & start.keys():
                 values[places[name]] = start[name]
-            sets.append((values, camera, clock))
+            sets.append(FilmParameters(values, camera, clock))
         problem = replace(fitted.problem, free=free)
         try:
             return solve(
@@ -300,7 +301,7 @@ class _Pruning:
         if not held:
             return None
         gradient, information, _alone = _core.score(
-            *current.problem.arguments(current.point), [(current.model, [f.index]) for f in held]
+            current.problem.at(current.point), [(current.model, [f.index]) for f in held]
         )
         own = np.maximum(np.diag(information), 1e-300)
         # With each one in turn, nearly fitted: what could go then?

@@ -15,7 +15,7 @@ from .fit import (
     widened,
 )
 from .model_error_schedule import at_level, eased, held, with_larger_model_error
-from .problem import Fit, data_of
+from .problem import Fit
 from .record import Record, record_of
 from .solve import filtered, frame_costs, predicted, within
 
@@ -26,7 +26,6 @@ __all__ = [
     "as_stated",
     "at_level",
     "checked_units",
-    "data_of",
     "eased",
     "extend",
     "filtered",

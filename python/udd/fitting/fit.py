@@ -14,6 +14,7 @@ from udd.measurement import Measurement
 from udd.models import Disk, Model, Pendulum
 from udd.models.formula_model import FormulaModel
 
+from .estimator_input import FilmParameters
 from .formula_models import levels_of
 from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
 from .noise import estimated, stated
@@ -147,7 +148,7 @@ def fit_record(
         schedule = levels(kind)[: SEARCHED.get(kind) if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
     sets = tuple(
-        (list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
+        FilmParameters(list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
         for own, film in zip(models, measurements, strict=True)
     )
     return _anneal(measurements, problem, Point(record.states, sets))
@@ -244,7 +245,7 @@ def _loosest(measurements: Sequence[Measurement], models: Sequence[Model], free:
         tuple(models), record, parameters, stated(record), schedule, schedule[0], likeliest=False
     )
     sets = tuple(
-        (list(own.parameters.values()), known_camera(own.kind, film.meta), 0.0)
+        FilmParameters(list(own.parameters.values()), known_camera(own.kind, film.meta), 0.0)
         for own, film in zip(models, measurements, strict=True)
     )
     return _anneal(tuple(measurements), problem, Point(record.states, sets)).evidence
@@ -277,7 +278,9 @@ def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) ->
     known = len(fitted.model.parameters)
     more = [value for effect in effects for value in effect.values]
     end = (start or fitted).point
-    sets = tuple(([*values[:known], *more], camera, clock) for values, camera, clock in end.sets)
+    sets = tuple(
+        FilmParameters([*values[:known], *more], camera, clock) for values, camera, clock in end.sets
+    )
     return replace(fitted.problem, models=models), Point(end.states, sets)
 
 
@@ -379,7 +382,7 @@ def _afresh(fitted: Fit) -> Point:
     Where states follow the frames a law that bends with the speed, as the friction's does, may come out
     flat, and would then stay so.
     """
-    sets = [([*values], camera, clock) for values, camera, clock in fitted.point.sets]
+    sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fitted.point.sets]
     for free in fitted.problem.free:
         if free.role == "model" and np.isfinite(free.sd):
             for values, _camera, _clock in sets if free.film is None else [sets[free.film]]:

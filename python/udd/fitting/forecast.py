@@ -19,10 +19,12 @@ from udd.chaos.largest_exponent import lyapunov
 from udd.errors import FitError, IntegrationError, ModelError
 from udd.measurement import Measurement
 from udd.models import Disk, Model
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED
 from udd.simulation.trajectory import method_for
 
-from . import Fit, Record, data_of, predicted, record_of
+from . import Fit, Record, predicted, record_of
+from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .fit import fit
 from .time_scale import motion_time_scale
 
@@ -251,7 +253,7 @@ def forecast(
     scale = max(fitted.scatter, 1.0) ** 0.5
     models, cameras, states = _starts(fitted, film, part, asked, scale, rng)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
-    clock_error = fitted.point.sets[film][2]
+    clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
     runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, rng)
     shown = [fitted.channels.index(name) for name in measurement.names]
@@ -337,8 +339,8 @@ def _starts(
     fitted: Fit, film: int, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
-    data = data_of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
-    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], list(fitted.problem.diffusion)
+    seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
+    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
     own = fitted.models[film]
     order = list(own.parameters)
     window = [(0, len(part.t) - 1)]
@@ -355,8 +357,9 @@ def _starts(
                 camera[free.index] = draw[free.name]
         model = own.with_parameters(values)
         try:
-            sets = [(list(model.parameters.values()), camera, clock)]
-            _first, last, spread = _core.filter(model, data, (part.states, sets, None), diffusion, window)
+            films = [FilmParameters(list(model.parameters.values()), camera, clock)]
+            held = EstimatorInput(model, seen, part.states, films, (), diffusion)
+            _first, last, spread = _core.filter(held, window)
         except ValueError as error:
             raise FitError(f"the state cannot be filtered from the window: {error}") from error
         models.append(model)
@@ -413,9 +416,8 @@ def _runs(
         if not who.size:
             break
         times = np.unique(np.concatenate([[a], t[inside], [b]]))
-        found = _core.ensemble(
-            models[0], rows[who], current[who], times, _RTOL, _ATOL, method, thread_count(None)
-        )
+        batch = Batch(models[0], rows[who], current[who], _RTOL, _ATOL, thread_count(None))
+        found = _core.ensemble(batch, times, method)
         result[np.ix_(who, inside)] = found["states"][:, np.searchsorted(times, t[inside])]
         current[who] = found["states"][:, -1]
         alive[who] = found["outcome"] == FINISHED
@@ -436,7 +438,7 @@ def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: 
     seen = []
     for model, camera, run in zip(models, cameras, runs, strict=True):
         there = np.isfinite(run).all(axis=1)
-        sets = [(list(model.parameters.values()), camera, clock)]
+        sets = [FilmParameters(list(model.parameters.values()), camera, clock)]
         film = np.zeros(int(there.sum()), dtype=np.int64)
         shown = predicted([model], sets, film, t[there], run[there], t[there, None])[:, 0]
         full = np.full((len(t), shown.shape[1]), np.nan)

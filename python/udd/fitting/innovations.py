@@ -62,9 +62,8 @@ def innovations(fit: Fit) -> Innovations:
     that the fit assumed.
     """
     problem = replace(fit.problem, noise=fit.noise)
-    model, data, start, _free, diffusion = problem.arguments(fit.point)
     vague = np.ptp(fit.states, axis=0).tolist()
-    values = _core.innovations(model, data, start, diffusion, vague)
+    values = _core.innovations(replace(problem.at(fit.point), free=()), vague)
     seen = [k for k, name in enumerate(fit.channels) if name in fit.measurement.names]
     names = tuple(fit.channels[k] for k in seen)
     return Innovations(names, float(np.median(np.diff(fit.record.t))), values[:, seen])

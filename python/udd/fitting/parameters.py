@@ -64,11 +64,6 @@ class Free:
     sd: float
     film: int | None = None
 
-    @property
-    def core(self) -> tuple[str, int, int | None, float, float]:
-        """As the core takes it."""
-        return self.role, self.index, self.film, self.mean, self.sd
-
 
 def free_parameters(
     models: Sequence[Model],

@@ -13,6 +13,7 @@ from udd import _core
 from udd.measurement import Measurement
 from udd.models import Model
 
+from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .noise import Noise, colour
 from .parameters import Free
 from .record import Record
@@ -58,14 +59,6 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(q / _FRAME**0.5 for q in level) for level in SCHEDULE[kind])
 
 
-#: What holds for a film, as the core takes it: the model's parameters, the camera's, and the clock's error.
-Values = tuple[list[float], list[float], float]
-#: A record as the core takes it.
-Data = tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.int64], list[float]]
-#: A point as the core takes it.
-Start = tuple[Array, list[Values], _core.Linearised | None]
-
-
 @dataclass(frozen=True)
 class Problem:
     """Measurements laid out for a model, with everything that a solve needs but its start.
@@ -90,23 +83,12 @@ class Problem:
         """The same with the model held this tightly: its assumed error, per square root of a second."""
         return replace(self, diffusion=diffusion)
 
-    def arguments(
-        self, point: Point
-    ) -> tuple[Model, Data, Start, list[tuple[str, int, int | None, float, float]], list[float]]:
-        """What the core takes to describe a problem at a point."""
-        return (
-            self.models[0],
-            data_of(self.record, self.noise, point.states[:, 0]),
-            (point.states, list(point.sets), point.linear),
-            [f.core for f in self.free],
-            list(self.diffusion),
+    def at(self, point: Point) -> EstimatorInput:
+        """The problem at a point, as the core's estimator reads it."""
+        observations = Observations.of(self.record, self.noise, point.states[:, 0])
+        return EstimatorInput(
+            self.models[0], observations, point.states, point.sets, self.free, self.diffusion, point.linear
         )
-
-
-def data_of(record: Record, noise: Noise, omega: Array) -> Data:
-    """A record with its noise, as the core takes it."""
-    information = noise.information(record, omega)
-    return record.t, record.seen, information, record.linked, record.film, noise.memory.tolist()
 
 
 @dataclass(frozen=True)
@@ -121,7 +103,7 @@ class Point:
     """
 
     states: Array
-    sets: tuple[Values, ...]
+    sets: tuple[FilmParameters, ...]
     linear: _core.Linearised | None = field(default=None, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:

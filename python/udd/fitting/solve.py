@@ -13,7 +13,8 @@ from udd.errors import FitError, ModelError
 from udd.measurement import Measurement
 from udd.models import Model
 
-from .problem import Fit, Point, Problem, Values, data_of
+from .estimator_input import EstimatorInput, FilmParameters, Observations
+from .problem import Fit, Point, Problem
 from .record import Record
 
 Array = NDArray[np.float64]
@@ -38,12 +39,13 @@ def solve(
     Done when a step promises to lower chi2 by less than `decrease`.
     """
     try:
-        found = _core.solve(*problem.arguments(point), (iterations, decrease))
+        found = _core.solve(problem.at(point), iterations, decrease)
     except ValueError as error:
         raise SolveError(_said(error, problem)) from error
     record = problem.record
     names = [f.name for f in problem.free]
-    end = Point(found["states"], tuple(found["sets"]), found["linear"])
+    sets = tuple(FilmParameters(*own) for own in found["sets"])
+    end = Point(found["states"], sets, found["linear"])
     try:
         models = tuple(
             model.with_parameters(dict(zip(model.parameters, values, strict=True)))
@@ -96,7 +98,7 @@ def _said(error: ValueError, problem: Problem) -> str:
 
 def predicted(
     models: Sequence[Model],
-    sets: Sequence[Values],
+    sets: Sequence[FilmParameters],
     film: NDArray[np.int64],
     t0: Array,
     states: Array,
@@ -108,7 +110,7 @@ def predicted(
     ----------
     models : sequence of Model
         One per film, alike but for their parameters' values, for which `sets` count.
-    sets : sequence of Values
+    sets : sequence of FilmParameters
         As a fit's ``point.sets``.
     film : ndarray of int (k,)
         Of each start.
@@ -119,7 +121,7 @@ def predicted(
     -------
     ndarray (k, h, m)
     """
-    return _core.predict(models[0], list(sets), film.tolist(), t0, states, times)
+    return _core.predict(models[0], sets, film.tolist(), t0, states, times)
 
 
 def filtered(
@@ -129,11 +131,9 @@ def filtered(
 
     All parameters are a fit's.
     """
-    data = data_of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
-    pairs = [(int(a), int(b)) for a, b in windows]
-    return _core.filter(
-        fitted.model, data, (record.states, list(fitted.point.sets), None), list(diffusion), pairs
-    )
+    seen = Observations.of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
+    held = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
+    return _core.filter(held, [(int(a), int(b)) for a, b in windows])
 
 
 def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:

@@ -11,6 +11,7 @@ import numpy as np
 from udd._util.validation import number
 from udd.errors import FitError
 
+from .estimator_input import FilmParameters
 from .problem import Point
 from .solve import solve
 
@@ -187,7 +188,7 @@ def _moved(fit: Fit, name: str, by: float) -> NDArray[np.float64]:
     problem = fit.problem
     order = list(fit.model.parameters).index(name)
     models = tuple(own.with_parameters({name: own.parameters[name] + by}) for own in problem.models)
-    sets = [([*values], camera, clock) for values, camera, clock in fit.point.sets]
+    sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fit.point.sets]
     for values, _camera, _clock in sets:
         values[order] += by
     again = solve(fit.measurements, replace(problem, models=models), Point(fit.states, tuple(sets)))

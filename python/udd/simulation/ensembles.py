@@ -17,6 +17,7 @@ from udd.errors import ModelError, interrupted
 from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
 
+from .batch import Batch
 from .outcomes import OUTCOMES
 from .trajectory import method_for, tolerances
 
@@ -166,9 +167,8 @@ def ensemble(
     if stepper == "rodas":
         raise ModelError('method="rodas" is for single runs, by udd.simulate')
     with progress_bar(runs, "run", progress) as since:
-        found = _core.ensemble(
-            model, rows, starts, times, rtol, atol, stepper, thread_count(threads), since(0)
-        )
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), since(0))
+        found = _core.ensemble(batch, times, stepper)
     names = np.array(OUTCOMES)[found["outcome"]]
     states = found["states"][:, wanted]
     made = Ensemble(

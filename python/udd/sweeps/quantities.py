@@ -20,6 +20,7 @@ from udd.chaos.largest_exponent import span
 from udd.errors import IntegrationError, ModelError
 from udd.models import DLE, Model
 from udd.models.parameter_batch import outside_domain
+from udd.simulation.batch import Batch
 from udd.simulation.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED, OUTCOMES
 from udd.simulation.trajectory import integrated, method_for, tolerances
 
@@ -103,8 +104,8 @@ def _spectrum(
     model: Model, rows: Floats, states: Floats, options: Options, threads: int, all: bool = True
 ) -> Found:
     time = options["t"], options["transient"], options["tol"]
-    accuracy = options["rtol"], options["atol"]
-    found = _core.lyapunov(model, rows, states, all, *time, *accuracy, threads, None)
+    batch = Batch(model, rows, states, options["rtol"], options["atol"], threads)
+    found = _core.lyapunov(batch, all, *time)
     done = found["outcome"] == FINISHED
     return {
         "value": np.where(done[:, None], found["value"], np.nan),
@@ -155,7 +156,7 @@ def _ended(model: Model, rows: Floats, states: Floats, options: Options, threads
     if "bristle" in model.state_names:
         return _ended_one_by_one(model, rows, states, times, rtol, atol)
     method = method_for(model, "auto", rtol)
-    found = _core.ensemble(model, rows, states, times, rtol, atol, method, threads)
+    found = _core.ensemble(Batch(model, rows, states, rtol, atol, threads), times, method)
     if (found["outcome"] == INTERRUPTED).any():
         raise KeyboardInterrupt
     return {name: found[name] for name in ("t_end", "end", "outcome")}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,9 +82,8 @@ class Responses:
 
 def responses(fit: Fit) -> Responses:
     """How a fitted motion answers to forcings."""
-    model, data, start, _free, _diffusion = fit.problem.arguments(fit.point)
     linked = fit.record.linked
-    t, states, response = _core.responses(model, data, start)
+    t, states, response = _core.responses(replace(fit.problem.at(fit.point), free=()))
     # Between frames that are not linked nothing moves; any state will do there.
     t = np.where(linked[:, None], t, fit.record.t[:-1, None])
     states = np.where(linked[:, None, None], states, fit.states[:-1, None])
@@ -106,15 +105,15 @@ def score_forcings(fit: Fit, columns: Sequence[Array], known: bool = False) -> l
     known : bool
         Whether the free parameters are taken as known instead of refitted.
     """
-    model, data, start, free, diffusion = fit.problem.arguments(fit.point)
+    problem = fit.problem.at(fit.point)
+    if known:
+        problem = replace(problem, free=())
     scatter = max(fit.scatter, 1.0)
     scores: list[Score] = []
     for some in _batches(columns):
         sizes = [c.shape[-1] for c in some]
         at_end = np.ascontiguousarray(np.concatenate(some, axis=-1))
-        gradient, information, alone = _core.score_columns(
-            model, data, start, [] if known else free, diffusion, at_end, sizes
-        )
+        gradient, information, alone = _core.score_columns(problem, at_end, sizes)
         own, square = 0, 0
         for k in sizes:
             block = information[square : square + k * k].reshape(k, k) / scatter

@@ -128,7 +128,7 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
     """Score candidates around a fit."""
     problem, model = fit.problem, fit.model
     gradient, information, alone = _core.score(
-        *problem.arguments(fit.point),
+        problem.at(fit.point),
         [(c.added_to(model), c.amplitude_indices(model)) for c in candidates],
     )
     scatter = max(fit.scatter, 1.0)
@@ -165,7 +165,7 @@ def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
     if not candidates:
         return []
     frequencies = [c.effect.parameters["f"] for c in candidates]
-    scores = _core.score_ripples(*fit.problem.arguments(fit.point), frequencies)
+    scores = _core.score_ripples(fit.problem.at(fit.point), frequencies)
     scatter = max(fit.scatter, 1.0)
     return [_score(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,23 @@ Box = tuple[int, int, int, int]  # rows from, to, columns from, to
 
 FAINT = 0.04  # of full light: a mark that differs by less from the disk is none
 MISFIT = 0.12  # pixels by which edges of real marks, lenses and codecs differ from the ideal shape
+
+
+class Picture(NamedTuple):
+    """A picture as the core reads it: codes (h, w), which pixels are in view, factors of their light."""
+
+    codes: NDArray[np.uint8]
+    view: Bools
+    even: NDArray[np.float32] | None
+
+
+class Appearing(NamedTuple):
+    """How the disk shows, as the core reads it: see `align_marks` there."""
+
+    lights: Array
+    look: tuple[float, ...]
+    marks: Array
+    lens: Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -90,18 +108,13 @@ def locate(
     """
     numbers = [look.psf, look.noise, gain_slack, look.rim, FAINT * float(look.light[-1])]
     at, found, used, step, moved = _core.align_marks(
-        y,
-        view,
-        look.lights,
-        (*numbers, look.readout / y.shape[0]),
-        look.table,
-        look.lens.row,
+        Picture(y, view, look.even),
+        Appearing(look.lights, (*numbers, look.readout / y.shape[0]), look.table, look.lens.row),
         (pose.centre.real, pose.centre.imag, pose.angle),
         (*motion.row, *motion.rolling),
         rounds,
         without,
         keep,
-        look.even,
     )
     return at, [None if s is None else _sighting(*s) for s in found], used, step, moved
 

@@ -1,0 +1,86 @@
+"""What the core's estimator reads, each by the names of its attributes: record, point and unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from udd._core import Linearised
+    from udd.models import Model
+
+    from .noise import Noise
+    from .parameters import Free
+    from .record import Record
+
+Array = NDArray[np.float64]
+
+
+class FilmParameters(NamedTuple):
+    """What holds for one film: values of the model's and the camera's parameters, and the clock's error."""
+
+    model: list[float]
+    camera: list[float]
+    clock: float
+
+
+@dataclass(frozen=True)
+class Observations:
+    """A record with its noise.
+
+    Attributes
+    ----------
+    t : ndarray (n,)
+        Times of the frames, s.
+    seen : ndarray (n, m)
+    information : ndarray (n, m, m)
+        The inverse of each frame's noise covariance; zero where nothing was seen.
+    linked : ndarray of bool (n - 1,)
+        Whether the model leads from a frame to the next.
+    film : ndarray of int (n,)
+    autocorrelation : list of float (m,)
+        Of each channel's noise from one frame to the next.
+    """
+
+    t: Array
+    seen: Array
+    information: Array
+    linked: NDArray[np.bool_]
+    film: NDArray[np.int64]
+    autocorrelation: list[float]
+
+    @classmethod
+    def of(cls, record: Record, noise: Noise, omega: Array) -> Observations:
+        """A record with this noise, which may grow with the angular speed `omega` (n,), rad/s."""
+        information = noise.information(record, omega)
+        return cls(record.t, record.seen, information, record.linked, record.film, noise.memory.tolist())
+
+
+@dataclass(frozen=True)
+class EstimatorInput:
+    """A weighted least-squares problem at a point.
+
+    Attributes
+    ----------
+    model : Model
+    observations : Observations
+    states : ndarray (n, d)
+    films : sequence of FilmParameters
+    free : sequence of Free
+    diffusion : sequence of float (d,)
+        The model's assumed error, per square root of a second.
+    linear : Linearised, optional
+        What a solve left at this point.
+    """
+
+    model: Model
+    observations: Observations
+    states: Array
+    films: Sequence[FilmParameters]
+    free: Sequence[Free]
+    diffusion: Sequence[float]
+    linear: Linearised | None = None

@@ -1,0 +1,38 @@
+"""A batch of runs, as the core reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.models.base import Model
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Runs of one model from many states or with many values of its parameters, on several threads.
+
+    Attributes
+    ----------
+    model : Model
+    values : ndarray (n or 1, p)
+        The parameters' values, a row for each run or one for all.
+    starts : ndarray (n or 1, d)
+        The initial states, likewise.
+    rtol, atol : float
+    threads : int
+        0 for one per core.
+    progress : callable, optional
+        Called with the number of runs that are done.
+    """
+
+    model: Model
+    values: NDArray[np.float64]
+    starts: NDArray[np.float64]
+    rtol: float
+    atol: float
+    threads: int = 1
+    progress: Callable[[int], object] | None = None
