@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 pytest.importorskip("starlette")
 pytest.importorskip("httpx2")
@@ -21,6 +22,7 @@ from starlette.testclient import TestClient
 import udd
 from app_for_tests import CHAOS, SOCKET, client
 from udd.app import jobs, limits, report_parts, uploads, worker
+from udd.report.document import Column, Figure, Gallery, Head, Image, Report, Section, Table
 
 __all__ = ["client"]
 
@@ -248,17 +250,15 @@ def test_the_marks_are_told_while_a_film_is_tracked(tmp_path: Path) -> None:
     assert red > 2 * max(blue, green)
 
 
-def test_a_report_is_taken_apart(tmp_path: Path) -> None:
+def test_the_parts_of_a_report_are_files(tmp_path: Path) -> None:
     pixel = base64.b64encode(b"PNG").decode()
-    report = tmp_path / "report.html"
-    report.write_text(
-        f'<h2>One &amp; all</h2><img src="data:image/png;base64,{pixel}" alt="A dot">'
-        "<table><tr><th>a</th><td>1,5 <b>mm</b></td></tr></table>"
-    )
-    made = report_parts.split(report, tmp_path)
+    dot = Figure(Image(f"data:image/png;base64,{pixel}", "A dot", 100), "A caption")
+    numbers = Table("One & all", (Column("a"),), ((Markup("1,5 <b>mm</b>"),),))
+    report = Report(Head("", ""), (Section("One", (Gallery((dot,)), numbers)),))
+    made = report_parts.save_parts(report, tmp_path)
     assert made[3:] == [
         {"name": "picture-1.png", "title": "A dot"},
         {"name": "table-1.csv", "title": "Table: One & all"},
     ]
     assert (tmp_path / "picture-1.png").read_bytes() == b"PNG"
-    assert (tmp_path / "table-1.csv").read_text() == 'a,"1,5 mm"\n'
+    assert (tmp_path / "table-1.csv").read_text() == 'a\n"1,5 mm"\n'

@@ -103,11 +103,11 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
         model = Disk(float(W), R=float(R))
     found = discover(measurement, model, progress=lambda text: tell({"say": text}))
     tell({"say": "drawing the report"})
-    found.report(OUT / "report.html", film=file if film else None, source=file)
+    report = found.report(OUT / "report.html", film=file if film else None, source=file)
     (OUT / "discovery.json").write_text(as_json(found.to_dict()), encoding="utf-8")
     from . import report_parts, result
 
-    return {**result.of(found), "parts": report_parts.split(OUT / "report.html", OUT)}
+    return {**result.of(found), "parts": report_parts.save_parts(report, OUT)}
 
 
 def _tracked(file: Path, radius: float, tell: Tell) -> Any:

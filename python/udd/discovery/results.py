@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
@@ -19,6 +19,9 @@ from udd.models import Model
 
 from .experiment_design import NextExperiment, hints
 from .thresholds import Confirmation, RejectionReason
+
+if TYPE_CHECKING:
+    from udd.report.document import Report
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
@@ -365,8 +368,8 @@ class Discovery:
             "fit": self.fit.numbers(),
         }
 
-    def report(self, path: str | os.PathLike[str], **details: Any) -> None:
+    def report(self, path: str | os.PathLike[str], **details: Any) -> Report:
         """Write a page that a person reads: pictures first, one file. See :func:`udd.report.write`."""
         from udd.report import write
 
-        write(self, path, **details)
+        return write(self, path, **details)

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from .page import write
+from .page import report_of, write
 
-__all__ = ["write"]
+__all__ = ["report_of", "write"]

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,12 @@ from udd.plot.frame_overlay import MARKS
 from udd.plot.style import AFTER, BEFORE, MEASURED
 
 from . import runs
+from .document import Movie
+
+if TYPE_CHECKING:
+    from udd.discovery.results import Discovery
+    from udd.measurement import Measurement
+    from udd.models import Model
 
 Array = NDArray[np.float64]
 
@@ -31,31 +37,6 @@ _MARK_PLACE, _MARK_SIDE = 65 / 80, 16 / 80  # of the radius: the LEGO disk's
 
 
 @dataclass(frozen=True)
-class Movie:
-    """A moving picture that loops.
-
-    Attributes
-    ----------
-    uri : str
-        A film (``data:video/mp4``), or a drawing that moves (``data:image/svg+xml``).
-    titles : list of str
-        Of its panels, from the left.
-    alt : str
-    start, seconds : float
-        Time at which the models are let go, and for how long they are shown, s.
-    filmed : bool
-        Whether the first panel is the film itself.
-    """
-
-    uri: str
-    titles: list[str]
-    alt: str
-    start: float
-    seconds: float
-    filmed: bool
-
-
-@dataclass(frozen=True)
 class Panel:
     """One motion: its title, its colour, and what is seen of it in every frame, (n, m)."""
 
@@ -64,7 +45,7 @@ class Panel:
     seen: Array
 
 
-def side_by_side(discovery: Any, film: str | os.PathLike[str] | None) -> Movie:
+def side_by_side(discovery: Discovery, film: str | os.PathLike[str] | None) -> Movie:
     """Measured and modelled motion from the first held-out frame on: the film itself where there is one."""
     fit = discovery.fit
     times, measured, modelled = runs.side_by_side(discovery, _SECONDS[discovery.measurement.kind])
@@ -72,15 +53,15 @@ def side_by_side(discovery: Any, film: str | os.PathLike[str] | None) -> Movie:
     if len(modelled) > 1:
         panels.append(Panel("with the added effect", AFTER, modelled[1]))
     if discovery.measurement.kind == "disk":
-        panels = [Panel(p.title, p.colour, _within(p.seen, fit.model.R)) for p in panels]
+        panels = [Panel(p.title, p.colour, _within(p.seen, fit.model.parameters["R"])) for p in panels]
     start, seconds = float(times[0]), float(times[-1] - times[0])
     if film is None:
         uri = _data("image/svg+xml", _svg(panels, fit.model, seconds * _SLOWER).encode())
     else:
         uri = _data("video/mp4", _mp4(panels, times, discovery.measurement, Path(film)))
-    titles = [p.title for p in panels]
+    titles = tuple(p.title for p in panels)
     alt = f"A moving picture, over and over: {', '.join(titles)}, side by side"
-    return Movie(uri, titles, alt, start, seconds, film is not None)
+    return Movie(uri, alt, _PANEL * len(panels), titles, start, seconds, film is not None)
 
 
 def _held(seen: Array) -> Array:
@@ -104,7 +85,7 @@ def _data(kind: str, content: bytes) -> str:
 # --- a drawing that moves
 
 
-def _svg(panels: list[Panel], model: Any, seconds: float) -> str:
+def _svg(panels: list[Panel], model: Model, seconds: float) -> str:
     """Panels side by side, moved by the file itself: no script, and some tens of kilobytes."""
     size, n = _PANEL, len(panels)
     frames = max(len(p.seen) for p in panels)
@@ -135,10 +116,11 @@ def _animated(kind: str, values: list[str], seconds: float) -> str:
     )
 
 
-def _disk(panel: Panel, model: Any, seconds: float, frames: int) -> str:
+def _disk(panel: Panel, model: Model, seconds: float, frames: int) -> str:
     unit = _PANEL / 2 / _REACH  # of the radius
     seen = _padded(panel.seen, frames)
-    x, y = unit * seen[:, 0] / model.R, -unit * seen[:, 1] / model.R
+    radius = model.parameters["R"]
+    x, y = unit * seen[:, 0] / radius, -unit * seen[:, 1] / radius
     moves = [f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True)]
     turns = [f"{math.degrees(beta):.1f}" for beta in seen[:, 2]]
     path = " ".join(moves)
@@ -157,7 +139,7 @@ def _disk(panel: Panel, model: Any, seconds: float, frames: int) -> str:
     )
 
 
-def _pendulum(panel: Panel, model: Any, seconds: float, frames: int) -> str:
+def _pendulum(panel: Panel, model: Model, seconds: float, frames: int) -> str:
     theta = _padded(panel.seen, frames)[:, 0]
     most = float(np.abs(theta).max())
     # One that never rises hangs from the top of its panel, as long as its swings leave room for.
@@ -180,7 +162,7 @@ def _padded(seen: Array, frames: int) -> Array:
 # --- a film
 
 
-def _mp4(panels: list[Panel], t: Array, measurement: Any, film: Path) -> bytes:
+def _mp4(panels: list[Panel], t: Array, measurement: Measurement, film: Path) -> bytes:
     """The film's own frames beside drawn disks, at the scale of the film."""
     from udd.video.writer import require_video, write_film
 
@@ -195,7 +177,9 @@ def _mp4(panels: list[Panel], t: Array, measurement: Any, film: Path) -> bytes:
         return target.read_bytes()
 
 
-def _composed(panels: list[Panel], t: Array, measurement: Any, film: Path) -> Iterator[NDArray[np.uint8]]:
+def _composed(
+    panels: list[Panel], t: Array, measurement: Measurement, film: Path
+) -> Iterator[NDArray[np.uint8]]:
     import cv2
 
     from udd.tracking import pictures_between, pixels

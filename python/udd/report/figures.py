@@ -3,52 +3,33 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from udd import plot
 from udd.measurement import Measurement
 from udd.plot import fits
-from udd.plot.inputs import first_film
 from udd.plot.style import AFTER, BEFORE, CHANNELS, EQUATIONS, MEASURED, label, scale, tidy
 
-from . import animation, runs
-from .images import Image, blank, embedded, png, svg
-from .loose_fit import loosest
+from . import runs
+from .document import Image
+from .images import blank, embedded, png, svg
 
 if TYPE_CHECKING:
-    pass
+    from matplotlib.axes import Axes
+
+    from udd.discovery.nonparametric.curve_scan import Curve
+    from udd.discovery.results import Discovery
+    from udd.fitting import Fit
+    from udd.fitting.innovations import Innovations
+    from udd.tracking.metric.pixels_to_metres import Pixels
 
 _FRAMES = 4  # of the film
 
 
-def draw(discovery: Any, film: str | os.PathLike[str] | None, innovations: list[Any]) -> dict[str, Any]:
-    """All pictures of a discovery; what cannot be shown is absent."""
-    # Motions are shown of the first film, where several were fitted together.
-    one = replace(discovery, baseline=first_film(discovery.baseline), fit=first_film(discovery.fit))
-    loose = [loosest(discovery.baseline)]
-    if discovery.effects:
-        loose.append(loosest(discovery.fit))
-    result: dict[str, Any] = {
-        "movie": animation.side_by_side(one, film),
-        "film": frames(one, film) if film is not None else None,
-        "orbit": orbits(one),
-        "forecast": forecast(one),
-        "map": residual_map(loose),
-        "residuals": residuals(loose),
-        "whiteness": whiteness(innovations),
-        "curves": [curve(found.curve) for found in discovery.effects if getattr(found, "curve", None)],
-        "evidence": [evidence(discovery, stage) for stage in range(len(discovery.scans))],
-        "errors": errors(discovery),
-        "friction": friction(discovery.fit),
-        "misfit": misfits(one.fit),
-    }
-    return result
-
-
-def orbits(discovery: Any) -> Image:
+def orbits(discovery: Discovery) -> Image:
     """The orbit as measured, and as the models run."""
     runs_shown = [("the known model alone", discovery.baseline, BEFORE)]
     if discovery.effects:
@@ -81,7 +62,7 @@ def orbits(discovery: Any) -> Image:
     )
 
 
-def forecast(discovery: Any) -> Image:
+def forecast(discovery: Discovery) -> Image:
     """The first seconds of the held-out data, and what the models make of them."""
     found = runs.forecast(discovery)
     name = "Z" if discovery.measurement.kind == "disk" else "theta"
@@ -108,7 +89,7 @@ def forecast(discovery: Any) -> Image:
     )
 
 
-def residual_map(loose: list[Any]) -> Image:
+def residual_map(loose: Sequence[Fit]) -> Image:
     """What each equation leaves over along each coordinate, before and after."""
     rows = len(loose[0].model.state_names)
     figure, ((ax,),) = blank(9.4, 0.95 * rows + 0.55, left=1.05, bottom=0.5, top=0.05)
@@ -116,7 +97,7 @@ def residual_map(loose: list[Any]) -> Image:
     return svg(figure, "Mean residual of every equation along every coordinate, with bands of two errors")
 
 
-def residuals(loose: list[Any]) -> Image:
+def residuals(loose: Sequence[Fit]) -> Image:
     """The clearest of these patterns frame by frame, before and after."""
     columns = list(zip(("the known model", "with the added effect"), loose, (BEFORE, AFTER), strict=False))
     equation, against = fits.clearest(loose[0])
@@ -137,14 +118,14 @@ def residuals(loose: list[Any]) -> Image:
     return png(figure, "The residual of one equation, frame by frame, along one coordinate")
 
 
-def curve(found: Any) -> Image:
+def curve(found: Curve) -> Image:
     """A curve that was located without a formula."""
     figure, ((ax,),) = blank(6.4, 3.4, top=0.45)
     plot.curve(found, ax)
     return svg(figure, f"{found.title}, with its band")
 
 
-def evidence(discovery: Any, stage: int) -> Image:
+def evidence(discovery: Discovery, stage: int) -> Image:
     """The evidence for each candidate at one stage of the search."""
     scan = [s for s in discovery.scans[stage] if not s.absorbed][:12]
     longest = max((len(s.candidate.title) for s in scan), default=10)
@@ -154,14 +135,14 @@ def evidence(discovery: Any, stage: int) -> Image:
     return svg(figure, "Bars: the evidence for each candidate effect; dashed: what chance hardly reaches")
 
 
-def errors(discovery: Any) -> Image:
+def errors(discovery: Discovery) -> Image:
     """Held-out errors against the horizon."""
     figure, ((ax,),) = blank(6.4, 3.8, top=0.4)
     plot.errors(discovery, ax)
     return svg(figure, "Median error on held-out data against the time since the model was let go")
 
 
-def whiteness(found: list[Any]) -> Image:
+def whiteness(found: Sequence[Innovations]) -> Image:
     """Autocorrelation of the innovations, before and after."""
     names = found[0].names
     figure, grid = blank(max(3.1 * len(names), 8.0), 2.7, columns=len(names), top=0.4)
@@ -179,7 +160,7 @@ def whiteness(found: list[Any]) -> Image:
     return svg(figure, "Autocorrelation of the innovations against the lag, with the band of white noise")
 
 
-def friction(fit: Any) -> Image:
+def friction(fit: Fit) -> Image:
     """The friction that was found."""
     figure, ((ax,),) = blank(6.4, 3.2)
     plot.friction(fit, ax)
@@ -188,7 +169,7 @@ def friction(fit: Any) -> Image:
     )
 
 
-def misfits(fit: Any) -> Image:
+def misfits(fit: Fit) -> Image:
     """What was seen less what was fitted, per channel."""
     names = fit.measurement.names
     figure, grid = blank(9.0, 1.55 * len(names) + 0.7, rows=len(names))
@@ -204,7 +185,7 @@ def misfits(fit: Any) -> Image:
     return png(figure, "Measured less fitted, over time, with a band for the noise that was found")
 
 
-def frames(discovery: Any, film: str | os.PathLike[str]) -> Image:
+def frames(discovery: Discovery, film: str | os.PathLike[str]) -> Image:
     """Some frames of the film with the fitted disk drawn over them."""
     from udd.tracking import pictures_between, pixels
 
@@ -222,14 +203,14 @@ def frames(discovery: Any, film: str | os.PathLike[str]) -> Image:
     return embedded(figure, "jpeg", "Frames of the film with the fitted disk drawn over them", dpi=130)
 
 
-def _look_at(geometry: Any, shape: tuple[int, ...], ax: Any) -> None:
+def _look_at(geometry: Pixels, shape: tuple[int, ...], ax: Axes) -> None:
     """Show what the disk can reach, as far as the picture goes."""
     (u, v), reach = geometry.pivot, 2.1 * geometry.radius
     ax.set_xlim(max(u - reach, -0.5), min(u + reach, shape[1] - 0.5))
     ax.set_ylim(min(v + reach, shape[0] - 0.5), max(v - reach, -0.5))
 
 
-def _fitted(fit: Any) -> Measurement:
+def _fitted(fit: Fit) -> Measurement:
     """The measurement as the fit says it should have been, where it was seen."""
     measurement = fit.measurement
     rest = np.where(np.isfinite(fit.residuals), fit.residuals, 0.0)

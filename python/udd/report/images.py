@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import base64
 import io
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from .document import Image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-@dataclass(frozen=True)
-class Image:
-    """A picture with what it shows in words, and its width on the page in pixels."""
-
-    uri: str
-    alt: str
-    width: int
 
 
 def blank(

@@ -7,50 +7,45 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from udd._util.atomic_files import write_whole
 from udd._util.html_templates import templates
 from udd.errors import UddError
 from udd.fitting.innovations import innovations
 
-from . import figures, formula_model, tables, wording
+from . import discovery_report, formula_report, wording
+from .document import Report
 
 if TYPE_CHECKING:
-    from jinja2 import Template
+    from udd.discovery.results import Discovery
 
 
-def write(
-    discovery: Any,
-    path: str | os.PathLike[str],
+def report_of(
+    discovery: Discovery,
     *,
     film: str | os.PathLike[str] | None = None,
     source: str | os.PathLike[str] | None = None,
     command: str | None = None,
-) -> None:
-    """Write a discovery as one HTML page that stands alone: pictures first, no script, no links.
+) -> Report:
+    """A discovery as a report: sections of text, figures and tables.
 
     Parameters
     ----------
     discovery : Discovery
-    path : path
-        Of the page; an older one is replaced once the new one is complete.
     film : path, optional
         The film that the measurement was tracked in; a stretch of it is shown beside the models.
     source : path, optional
-        The file that the analysis began with, named on the page with its SHA-256; by default the film.
+        The file that the analysis began with, named with its SHA-256; by default the film.
     command : str, optional
-        How the page was made, for those who want to make it again; by default what `udd discover` takes for
+        How the report was made, for those who want to make it again; by default what `udd discover` takes for
         the same analysis with its usual options.
 
     Raises
     ------
     UddError
-        The page cannot be written there, or the film is not the one that was tracked.
+        The film is not the one that was tracked.
     """
-    target = Path(path)
-    if target.is_dir():
-        raise UddError(f"{target} is a folder, not a page to write to")
     origin = film if source is None else source
     of_own = discovery.fit.model.kind == "own"
     if of_own and film is not None:
@@ -59,30 +54,68 @@ def write(
     surprises = [innovations(fit) for fit in fits]
     with ThreadPoolExecutor(1) as beside:  # what to film next is for the core, pictures are Python's
         beside.submit(lambda: discovery.hints)
-        pictures = (
-            formula_model.draw(discovery, surprises) if of_own else figures.draw(discovery, film, surprises)
-        )
-    page = template("own.html" if of_own else "page.html").render(
-        d=discovery,
-        words=wording,
-        tables=tables,
-        own=formula_model,
-        pictures=pictures,
-        innovations=surprises,
-        numbers=wording.headline(discovery),
-        command=command or wording.command(discovery, None if origin is None else Path(origin).name),
-        version=version_of("udd"),
-        versions=versions()[1],
-        source=identity(origin),
+        if of_own:
+            sections = formula_report.sections(discovery, surprises)
+        else:
+            sections = discovery_report.sections(discovery, film, surprises)
+    first = formula_report.formula_head(discovery) if of_own else discovery_report.disk_head(discovery)
+    usual = wording.command(discovery, None if origin is None else Path(origin).name)
+    return Report(first, sections, identity(origin), command or usual)
+
+
+def write(
+    discovery: Discovery,
+    path: str | os.PathLike[str],
+    *,
+    film: str | os.PathLike[str] | None = None,
+    source: str | os.PathLike[str] | None = None,
+    command: str | None = None,
+) -> Report:
+    """Write a discovery as one HTML page that stands alone: pictures first, no script, no links.
+
+    Parameters
+    ----------
+    discovery : Discovery
+    path : path
+        Of the page; an older one is replaced once the new one is complete.
+    film, source, command
+        As of :func:`report_of`.
+
+    Returns
+    -------
+    Report
+        What the page shows.
+
+    Raises
+    ------
+    UddError
+        The page cannot be written there, or the film is not the one that was tracked.
+    """
+    refuse_folder(path)
+    report = report_of(discovery, film=film, source=source, command=command)
+    write_page(report, path)
+    return report
+
+
+def refuse_folder(path: str | os.PathLike[str]) -> None:
+    """Refuse to write a page where a folder stands, before the work."""
+    if Path(path).is_dir():
+        raise UddError(f"{Path(path)} is a folder, not a page to write to")
+
+
+def write_page(report: Report, path: str | os.PathLike[str]) -> None:
+    """Write a report as one HTML page."""
+    version, all_versions = versions()
+    page = templates("udd.report").get_template("report.html")
+    html = page.render(
+        head=report.head,
+        sections=report.sections,
+        source=report.source,
+        command=report.command,
+        version=version,
+        versions=all_versions,
     )
-    write_whole(target, page.encode())
-
-
-def template(name: str) -> Template:
-    """One of the report's templates, which share their pieces and the words of these."""
-    environment = templates("udd.report")
-    environment.filters["pretty"] = wording.pretty
-    return environment.get_template(name)
+    write_whole(Path(path), html.encode())
 
 
 def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:

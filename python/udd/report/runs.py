@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,10 @@ from scipy.interpolate import CubicHermiteSpline
 from udd.errors import IntegrationError
 from udd.fitting import predicted
 from udd.simulation.trajectory import Trajectory, integrated
+
+if TYPE_CHECKING:
+    from udd.discovery.results import Discovery
+    from udd.fitting import Fit
 
 Array = NDArray[np.float64]
 
@@ -42,7 +46,7 @@ class Forecast:
     after: Array
 
 
-def free_run(fit: Any) -> Trajectory | None:
+def free_run(fit: Fit) -> Trajectory | None:
     """The fitted model from the first fitted state on, for as long as the record; None where it diverges."""
     t = fit.record.t
     times = np.arange(t[0], t[-1], _STEP)
@@ -52,7 +56,7 @@ def free_run(fit: Any) -> Trajectory | None:
         return None
 
 
-def smooth(fit: Any) -> Any:
+def smooth(fit: Fit) -> SimpleNamespace:
     """The fitted states with a curve through them, whose slopes are the model's."""
     t = fit.record.t
     curve = CubicHermiteSpline(t, fit.states, fit.model.rates(t, fit.states))
@@ -63,7 +67,7 @@ def smooth(fit: Any) -> Any:
     return SimpleNamespace(t=fine, state=state, model=fit.model)
 
 
-def forecast(discovery: Any) -> Forecast:
+def forecast(discovery: Discovery) -> Forecast:
     """From the first held-out frame on: a disk's first seconds, a pendulum's last ones of the whole run."""
     fit, m = discovery.fit, discovery.measurement
     t = fit.record.t
@@ -82,7 +86,7 @@ def forecast(discovery: Any) -> Forecast:
     return Forecast(start, shown.t, seen, times_seen, before[late], after[late])
 
 
-def side_by_side(discovery: Any, seconds: float) -> tuple[Array, Array, list[Array]]:
+def side_by_side(discovery: Discovery, seconds: float) -> tuple[Array, Array, list[Array]]:
     """Times of frames from the first held-out one on, what was measured, and what the models make of it.
 
     The known model comes first, then the one with the added effects if there are any.
@@ -98,7 +102,7 @@ def side_by_side(discovery: Any, seconds: float) -> tuple[Array, Array, list[Arr
     return times + fit.record.origin, seen, [_predicted(each, first, times) for each in fits]
 
 
-def _predicted(fit: Any, first: int, times: Array) -> Array:
+def _predicted(fit: Fit, first: int, times: Array) -> Array:
     start = fit.record.t[first : first + 1]
     states = fit.states[first : first + 1]
     result: Array = predicted(

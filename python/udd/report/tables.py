@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
@@ -12,14 +13,19 @@ from udd.plot.whiteness import shown_lags
 
 from . import wording
 
+if TYPE_CHECKING:
+    from udd.discovery.results import Discovery
+    from udd.fitting import Fit
+    from udd.fitting.innovations import Innovations
 
-def parameters(discovery: Any) -> list[dict[str, str]]:
+
+def parameters(discovery: Discovery) -> list[dict[str, str]]:
     """The model's free parameters: name, meaning, before, after, unit."""
     hidden, own = _knots(discovery), discovery.fit.model.parameters
     return _rows(discovery, lambda name: _base(name) in own and _base(name) not in hidden)
 
 
-def camera(discovery: Any) -> list[dict[str, str]]:
+def camera(discovery: Discovery) -> list[dict[str, str]]:
     """What the camera got wrong, likewise."""
     own = discovery.fit.model.parameters
     return _rows(discovery, lambda name: _base(name) not in own, share=("%", 100.0))
@@ -36,13 +42,15 @@ def _of_film(name: str) -> str:
     return f" (film {int(film) + 1})" if film else ""
 
 
-def _knots(discovery: Any) -> set[str]:
+def _knots(discovery: Discovery) -> set[str]:
     """The parameters of curves, which a picture shows better."""
     curves = [e for e in discovery.fit.model.effects if wording.is_spline(e)]
     return {f"{e.name}.{p}" for e in curves for p in e.parameters}
 
 
-def _rows(discovery: Any, wanted: Any, share: tuple[str, float] = ("", 1.0)) -> list[dict[str, str]]:
+def _rows(
+    discovery: Discovery, wanted: Callable[[str], bool], share: tuple[str, float] = ("", 1.0)
+) -> list[dict[str, str]]:
     known = units(discovery.fit)
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
@@ -59,7 +67,7 @@ def _rows(discovery: Any, wanted: Any, share: tuple[str, float] = ("", 1.0)) -> 
     return rows
 
 
-def fixed(discovery: Any) -> list[dict[str, str]]:
+def fixed(discovery: Discovery) -> list[dict[str, str]]:
     """The model's parameters that were taken as known: name, meaning, value, unit."""
     model = discovery.fit.model
     rows = []
@@ -77,7 +85,7 @@ def fixed(discovery: Any) -> list[dict[str, str]]:
     return rows
 
 
-def _value(fit: Any, name: str, factor: float) -> str:
+def _value(fit: Fit, name: str, factor: float) -> str:
     if name not in fit.parameters:
         return "–"
     return wording.with_error(factor * fit.parameters[name], factor * fit.errors[name])
@@ -93,7 +101,7 @@ def _shown(unit: str) -> tuple[str, float]:
     }.get(unit, (unit, 1.0))
 
 
-def _meaning(name: str, discovery: Any) -> str:
+def _meaning(name: str, discovery: Discovery) -> str:
     effect, dot, parameter = name.partition(".")
     if not dot:
         if name == "k0" and discovery.measurement.kind == "pendulum":
@@ -103,15 +111,16 @@ def _meaning(name: str, discovery: Any) -> str:
     return f"{found.title if found else effect}: {wording.pretty(parameter)}"
 
 
-def units(fit: Any) -> dict[str, str]:
+def units(fit: Fit) -> dict[str, str]:
     """The SI unit of every free parameter."""
     known = fit.model.units | dict(_core.camera_parameters(fit.measurement.kind))
     return {name: known.get(_base(name), "") for name in fit.parameters}
 
 
-def measured(discovery: Any) -> Markup:
+def measured(discovery: Discovery) -> Markup:
     """What was measured, in a few sentences."""
-    m, model = discovery.measurement, discovery.baseline.model
+    m, fitted = discovery.measurement, discovery.baseline.model.parameters
+    stated = discovery.baseline.problem.models[0].parameters
     several = len(discovery.fit.measurements)
     usable = int(m.seen.sum())
     rate = 1.0 / float(np.median(np.diff(m.t)))
@@ -125,11 +134,11 @@ def measured(discovery: Any) -> Markup:
     noise = ", ".join(each[:-1]) + (" and " if len(each) > 1 else "") + each[-1]
     if m.kind == "disk":
         what = (
-            f"The centre and the orientation of a disk of radius {100 * model.R:g}\u00a0cm that two wheels "
-            f"lift at {100 * discovery.baseline.problem.models[0].W:.3g}\u00a0cm/s (as stated)"
+            f"The centre and the orientation of a disk of radius {100 * fitted['R']:g}\u00a0cm that two "
+            f"wheels lift at {100 * stated['W']:.3g}\u00a0cm/s (as stated)"
         )
     else:
-        what = f"The angle of a pendulum of {100 * discovery.baseline.problem.models[0].length:.4g}\u00a0cm"
+        what = f"The angle of a pendulum of {100 * stated['length']:.4g}\u00a0cm"
     if several > 1:
         what = f"{several} records, fitted together; the pictures of the motion show the first. {what}"
     return Markup(
@@ -138,7 +147,7 @@ def measured(discovery: Any) -> Markup:
     )
 
 
-def whiteness(innovations: list[Any]) -> list[dict[str, str]]:
+def whiteness(innovations: Sequence[Innovations]) -> list[dict[str, str]]:
     """What remains in the innovations, channel by channel, before and after."""
     rows = []
     for k, name in enumerate(innovations[0].names):
@@ -157,7 +166,7 @@ def whiteness(innovations: list[Any]) -> list[dict[str, str]]:
     return rows
 
 
-def noise(fit: Any) -> list[dict[str, str]]:
+def noise(fit: Fit) -> list[dict[str, str]]:
     """The noise that was found: channel, at rest, growth with the speed, what the measurement states."""
     rows = []
     for k, name in enumerate(fit.measurement.names):
@@ -175,7 +184,7 @@ def noise(fit: Any) -> list[dict[str, str]]:
     return rows
 
 
-def errors(discovery: Any) -> list[dict[str, str]]:
+def errors(discovery: Discovery) -> list[dict[str, str]]:
     """Held-out errors at every horizon."""
     before, after = discovery.error_before, discovery.error_after
     rows = []
@@ -200,7 +209,7 @@ def _interval(e: tuple[float, float, float, float], unit: str) -> str:
     return f"{wording.length(e[0], unit)} ({low} to {high})"
 
 
-def curves(discovery: Any, stage: int, most: int = 6) -> list[dict[str, str]]:
+def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, str]]:
     """The best of the curves that were tried."""
     scans = getattr(discovery, "curves", [])
     return [
@@ -209,7 +218,7 @@ def curves(discovery: Any, stage: int, most: int = 6) -> list[dict[str, str]]:
     ]
 
 
-def candidates(discovery: Any, stage: int, most: int = 12) -> list[dict[str, str]]:
+def candidates(discovery: Discovery, stage: int, most: int = 12) -> list[dict[str, str]]:
     """What the score said of the best candidates."""
     rows = []
     found = {f.tried or f.title for f in discovery.effects}

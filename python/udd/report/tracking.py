@@ -6,23 +6,39 @@ import base64
 import math
 import os
 from collections import Counter
-from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 
-from udd._util.atomic_files import write_whole
 from udd.errors import UddError
 from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
 
 from . import wording
-from .images import Image, blank, png
-from .page import identity, template, versions
+from .document import (
+    Column,
+    Figure,
+    Gallery,
+    Head,
+    Image,
+    Number,
+    Paragraph,
+    Report,
+    Section,
+    Table,
+    Text,
+    parts,
+    table,
+)
+from .images import blank, png
+from .page import identity, refuse_folder, write_page
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from udd.measurement import Measurement
     from udd.tracking import Tracking
+    from udd.tracking.metric.rolling_check import Health
 
 FRAMES = 6  # of the film
 WIDTH = 300  # pixels of each
@@ -42,37 +58,98 @@ def write_tracked(
     from udd.tracking.metric.rolling_check import health
     from udd.tracking.pipeline import Tracking
 
-    target = Path(path)
-    if target.is_dir():
-        raise UddError(f"{target} is a folder, not a page to write to")
+    refuse_folder(path)
     detail = found if isinstance(found, Tracking) else None
     m: Measurement = found.measurement if isinstance(found, Tracking) else found
     if "calibration" not in m.meta or not m.quality:
         raise UddError("the measurement was not tracked in a film, so there is no page about it")
     checked = health(m) if m.kind == "disk" else None
-    udd_version, all_versions = versions()
-    page = template("tracked.html").render(
-        m=m,
-        headline=headline(m),
-        numbers=numbers(m, checked),
-        calibration=calibration(m),
-        flags=flags(m),
-        health=checked,
-        mm=lambda x: wording.length(x, "m"),
-        pictures={
-            "frames": frames(video, m),
-            "motion": motion(m),
-            "quality": quality(m),
-            "map": picture_map(m, detail),
-            "health": None if checked is None else rolling(checked),
-        },
-        per_mark=detail is not None,
-        version=udd_version,
-        versions=all_versions,
-        command=command,
-        source=identity(video),
+    sections = [_found(video, m), _calibrated(m), _each_frame(m, detail)]
+    if m.kind == "disk":
+        sections.append(_rolls(checked))
+    write_page(Report(_head(m, checked), tuple(sections), identity(video), command), path)
+
+
+def _head(m: Measurement, checked: Health | None) -> Head:
+    missing = m.meta.get("frames_missing")
+    cut = f"{missing} frames that the file promises are missing: it may be cut off."
+    notes = (Paragraph(cut, "warn"),) if missing else ()
+    return Head("What the film shows", headline(m), numbers=numbers(m, checked), notes=notes)
+
+
+def _found(video: str | os.PathLike[str], m: Measurement) -> Section:
+    drawn = (
+        "the fitted rim, the marks where the fit has them, and the contact (cross)"
+        if m.kind == "disk"
+        else "the bob, and the pivot (cross)"
     )
-    write_whole(target, page.encode())
+    shown = (
+        Gallery(frames(video, m)),
+        Paragraph(f"Drawn upon frames of the film: {drawn}; nothing is drawn where nothing is known."),
+        Figure(motion(m), "The motion. Strips in red: frames that hold no position."),
+    )
+    return Section("What was found", shown)
+
+
+def _calibrated(m: Measurement) -> Section:
+    said = (
+        "What the film itself says of them, with standard errors. Scale and contact are common to all "
+        "positions; what was said by hand is “given”."
+    )
+    columns = {
+        "name": Column("", names=True),
+        "value": Column("value", number=True),
+        "error": Column("standard error", number=True),
+        "unit": Column("unit"),
+        "how": Column("how"),
+    }
+    title = "The camera and the device"
+    return Section(title, (Paragraph(said), table(title, columns, calibration(m))))
+
+
+def _each_frame(m: Measurement, detail: Tracking | None) -> Section:
+    off = (
+        "Residual: r.m.s. distance of the marks from where the rigid body has them. In view: share of the "
+        "marks' edges that is seen. "
+        if m.kind == "disk"
+        else "Residual: distance of the bob from its circle. In view: its area against the usual one. "
+    )
+    where = (
+        ", by the place of the middle."
+        if detail is None
+        else ", mark by mark; arrows are means. Arrows that agree over a region point to a lens, a tilt or "
+        "an edge that the model of the camera lacks."
+    )
+    said = flags(m)
+    columns = (Column("flag", names=True), Column("frames", number=True), Column("first at", number=True))
+    rows = tuple((flag, str(count), first) for flag, count, first in said)
+    caption = "Flags; gap and degraded are remarks on frames that hold a position"
+    shown = parts(
+        Figure(quality(m), f"{off}Blur: how far it moves while the shutter is open."),
+        Table("Flags", columns, rows, caption) if said else Paragraph("No frame has a flag."),
+        Figure(picture_map(m, detail), f"Residual over the picture{where}"),
+    )
+    return Section("How each frame did", shown)
+
+
+def _rolls(checked: Health | None) -> Section:
+    if checked is None:
+        said = (
+            "This motion does not determine contact and drive (it is short, or a steady rotation), so "
+            "nothing can be said."
+        )
+        return Section("Does it roll?", (Paragraph(said),))
+    left, noise = (wording.length(x, "m") for x in (checked.rms, checked.noise))
+    said = (
+        "Where the wheels hold the disk it turns about one point while it is driven past it: dY/dT = Z Ω, "
+        f"dZ/dT = −Y Ω + W. Over stretches of 1.5 s that leaves {left} r.m.s.; the frames' own errors would "
+        f"leave {noise}. Much more than that is slip, a wrong clock, a camera that is not what it was taken "
+        "for, or a law that is not quite this one."
+    )
+    caption = (
+        "What is left of the rolling constraint, with a band of two standard errors of the frames' noise."
+    )
+    return Section("Does it roll?", (Paragraph(said), Figure(rolling(checked), caption)))
 
 
 def headline(m: Measurement) -> str:
@@ -85,27 +162,28 @@ def headline(m: Measurement) -> str:
     return f"{share} of this film {'says' if usable == len(m) else 'say'} where {what} is{rest}"
 
 
-def numbers(m: Measurement, checked: Any) -> list[tuple[str, str, str]]:
-    """What stands at the top: (what, value, remark)."""
+def numbers(m: Measurement, checked: Health | None) -> tuple[Number, ...]:
+    """What stands at the top."""
     out = []
     if m.sigma is not None:
         for k, name in enumerate(m.names):
             unit = "rad" if name in ("beta", "theta") else "m"
             spread = wording.length(float(np.nanmedian(m.sigma[:, k])), unit)
-            out.append((f"standard error of {wording.pretty(name)}, typical", spread, ""))
+            out.append(Number(Markup("standard error of {}, typical").format(wording.pretty(name)), spread))
     if m.kind == "disk":
         value, sigma, _ = m.meta["calibration"]["W"]
         said = "–" if value is None else f"{100 * value:.4g} cm/s"
-        out.append(("drive W, as it is seen", said, "" if not sigma else f"± {100 * sigma:.1g} cm/s"))
+        error = "" if not sigma else f"± {100 * sigma:.1g} cm/s"
+        out.append(Number("drive W, as it is seen", said, error))
     if checked is not None:
         noise = f"noise alone: {wording.length(checked.noise, 'm')}"
-        out.append(("left of the rolling constraint", wording.length(checked.rms, "m"), noise))
-    return out
+        out.append(Number("left of the rolling constraint", wording.length(checked.rms, "m"), noise))
+    return tuple(out)
 
 
-def calibration(m: Measurement) -> list[SimpleNamespace]:
+def calibration(m: Measurement) -> list[dict[str, Text]]:
     """The self-calibration: item, value, standard error, how."""
-    rows = []
+    rows: list[dict[str, Text]] = []
     for name, (value, sigma, how) in m.meta["calibration"].items():
         factor, unit = _unit(name, m.kind)
         if value is None:
@@ -116,11 +194,14 @@ def calibration(m: Measurement) -> list[SimpleNamespace]:
         else:
             shown, error = _digits(factor * value, sigma and factor * sigma), _error(sigma, factor)
         rows.append(
-            SimpleNamespace(
-                name=name, value=shown.replace("-", "−"), error=error, unit=unit if value is not None else "",
-                how=how,
-            )
-        )  # fmt: skip
+            {
+                "name": name,
+                "value": shown.replace("-", "−"),
+                "error": error,
+                "unit": unit if value is not None else "",
+                "how": how,
+            }
+        )
     return rows
 
 
@@ -179,7 +260,7 @@ def chosen(m: Measurement) -> list[tuple[int, str]]:
     return sorted(picked.items())[:FRAMES]
 
 
-def frames(video: str | os.PathLike[str], m: Measurement) -> list[tuple[Image, str]]:
+def frames(video: str | os.PathLike[str], m: Measurement) -> tuple[Figure, ...]:
     """These frames with what was found drawn upon them."""
     import cv2
 
@@ -196,8 +277,8 @@ def frames(video: str | os.PathLike[str], m: Measurement) -> list[tuple[Image, s
             drawn = np.asarray(cv2.resize(drawn, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA))
         _, coded = cv2.imencode(".jpg", drawn[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
         uri = f"data:image/jpeg;base64,{base64.b64encode(coded.tobytes()).decode()}"
-        out.append((Image(uri, f"Frame {k}, {why}", WIDTH), f"{m.t[k]:.2f} s: {why}"))
-    return out
+        out.append(Figure(Image(uri, f"Frame {k}, {why}", WIDTH), f"{m.t[k]:.2f} s: {why}"))
+    return tuple(out)
 
 
 def motion(m: Measurement) -> Image:
@@ -214,7 +295,7 @@ def motion(m: Measurement) -> Image:
     return png(figure, "What was measured over time; red strips are frames without a position")
 
 
-def _strips(ax: Any, m: Measurement) -> None:
+def _strips(ax: Axes, m: Measurement) -> None:
     """Where nothing is known."""
     half = 0.5 * float(np.median(np.diff(m.t)))
     lost = np.flatnonzero(~m.seen)
@@ -292,7 +373,7 @@ def picture_map(m: Measurement, detail: Tracking | None) -> Image:
     return png(figure, "Residual over the picture; the cross is the contact")
 
 
-def rolling(checked: Any) -> Image:
+def rolling(checked: Health) -> Image:
     """What is left of the rolling constraint over time."""
     figure, grid = blank(9.0, 3.4, rows=2)
     for k, ((ax,), name) in enumerate(zip(grid, ("Y", "Z"), strict=True)):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
 
@@ -14,6 +15,11 @@ from udd.discovery.thresholds import SAME as IDENTICAL
 from udd.discovery.validation.held_out_errors import at_the_floor as floor_reached
 from udd.effects.user_defined import is_spline as is_spline
 from udd.fitting.parameter_meanings import MEANINGS as MEANINGS
+
+if TYPE_CHECKING:
+    from udd.discovery.results import AddedEffect, Alternative, Discovery
+    from udd.effects import Effect
+    from udd.models import Model
 
 _SYMBOLS = (
     (r"\bOmega\b", "Ω"),
@@ -65,12 +71,12 @@ _ENTERS = {
 }
 
 
-def enters(effect: Any) -> list[str]:
+def enters(effect: Effect) -> list[str]:
     """The equations that an effect changes."""
     return [_ENTERS[slot] for slot in effect.slots if slot in _ENTERS]
 
 
-def verdict(discovery: Any) -> str:
+def verdict(discovery: Discovery) -> str:
     """The whole result in a sentence, and a second where the search was not finished."""
     said = _verdict(discovery)
     if discovery.stopped is None:
@@ -81,7 +87,7 @@ def verdict(discovery: Any) -> str:
     )
 
 
-def _verdict(discovery: Any) -> str:
+def _verdict(discovery: Discovery) -> str:
     said = "; and ".join(_counted(["; or ".join(_meanings(f, discovery)) for f in discovery.effects]))
     if discovery.verdict == "fits the first part, not confirmed":
         titles = list(dict.fromkeys(near.title for near in discovery.refused if near.why == "unconfirmed"))
@@ -118,7 +124,7 @@ def _counted(sentences: list[str]) -> list[str]:
     ]
 
 
-def refused(discovery: Any) -> list[str]:
+def refused(discovery: Discovery) -> list[str]:
     """What comes nearest where nothing passes, and why it does not."""
     sentences = []
     for near in discovery.refused:
@@ -139,13 +145,13 @@ def refused(discovery: Any) -> list[str]:
     return sentences
 
 
-def at_the_floor(discovery: Any) -> bool:
+def at_the_floor(discovery: Discovery) -> bool:
     """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
     e = discovery.error_before
     return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
 
 
-def _meanings(found: Any, discovery: Any) -> list[str]:
+def _meanings(found: AddedEffect, discovery: Discovery) -> list[str]:
     """What was found, and what acts on the disk identically."""
     same = [
         a.effect
@@ -153,7 +159,7 @@ def _meanings(found: Any, discovery: Any) -> list[str]:
         if a.likeness > IDENTICAL and a.instead_of == found.effect.name
     ]
     sentences = [effect_sentence(e) for e in [found.effect, *same]]
-    if getattr(found, "curve", None) is not None:  # the meaning says where, the curve says with what
+    if found.curve is not None:  # the meaning says where, the curve says with what
         sentences[0] += f", depending on {' and '.join(along(c.name) for c in found.curve.coordinates)}"
     return list(dict.fromkeys(sentences))
 
@@ -172,7 +178,7 @@ def along(name: str) -> str:
     }.get(name, name)
 
 
-def values_of(found: Any, units: dict[str, str]) -> Markup:
+def values_of(found: AddedEffect, units: dict[str, str]) -> Markup:
     """An effect's numbers in a sentence."""
     texts = []
     for name, value in found.parameters.items():
@@ -182,13 +188,13 @@ def values_of(found: Any, units: dict[str, str]) -> Markup:
     return Markup(", ").join(texts)
 
 
-def effect_sentence(effect: Any) -> str:
+def effect_sentence(effect: Effect) -> str:
     """What an effect does, as a clause."""
     meaning = str(effect.meaning).rstrip(".")
     return f"there is {meaning}" if meaning.startswith(("a ", "an ", "dry ")) else meaning
 
 
-def headline(discovery: Any) -> Headline:
+def headline(discovery: Discovery) -> Headline:
     """The held-out errors on which the decision rests."""
     h = discovery.horizon
     before, after = discovery.error_before, discovery.error_after
@@ -210,7 +216,7 @@ def headline(discovery: Any) -> Headline:
     )
 
 
-def noise(discovery: Any) -> str:
+def noise(discovery: Discovery) -> str:
     """What the frames of each channel are good to, and the steps that they were read in."""
     said = "; ".join(one.text for one in discovery.noise)
     averaged = discovery.thinned and discovery.thinned[0].every > 1
@@ -265,7 +271,7 @@ def probability(p: float) -> str:
     return f"{min(p, 1.0):.2g}"
 
 
-def borne_out(effect: Any) -> str:
+def borne_out(effect: AddedEffect) -> str:
     """What the frames that no fit saw say of an effect."""
     value, low, high = effect.ratio
     told = (
@@ -287,12 +293,12 @@ def unit_words(unit: str) -> str:
     return {"1/m": "per metre", "1/s": "per second", "": ""}.get(unit, pretty(unit))
 
 
-def title_of(discovery: Any, name: str) -> str:
+def title_of(discovery: Discovery, name: str) -> str:
     """What a reader calls one of the effects that were found."""
     return next((f.effect.title for f in discovery.effects if f.effect.name == name), name)
 
 
-def limit(other: Any) -> str:
+def limit(other: Alternative) -> str:
     """Why one alternative stays open."""
     if other.likeness > IDENTICAL and other.effect.slots[0].endswith("'"):
         return "On these data the two act identically."
@@ -310,20 +316,21 @@ def limit(other: Any) -> str:
     )
 
 
-def command(discovery: Any, source: str | None) -> str | None:
+def command(discovery: Discovery, source: str | None) -> str | None:
     """What `udd discover` takes to do the same; None where the file is not known."""
     known = discovery.baseline.problem.models[0]
     if source is None or known.effects or known.kind == "own" or len(discovery.fit.measurements) > 1:
         return None
-    usual = type(known)(*([known.W] if discovery.measurement.kind == "disk" else [known.length]))
     given = {"disk": ["W"], "pendulum": ["length"]}[discovery.measurement.kind]
+    made: Callable[[float], Model] = type(known)
+    usual = made(known.parameters[given[0]])
     given += [name for name, value in known.parameters.items() if value != usual.parameters[name]]
     names = {"length": "pendulum"}
     options = (f"--{names.get(name, name)} {known.parameters[name]!r}" for name in dict.fromkeys(given))
     return f"udd discover {shlex.quote(source)} {' '.join(options)} --report report.html"
 
 
-def short_limits(discovery: Any) -> list[str]:
+def short_limits(discovery: Discovery) -> list[str]:
     """What must stand beside the verdict, lest it says too much."""
     same = [a for a in discovery.alternatives if a.likeness > IDENTICAL]
     if not same:
@@ -334,7 +341,7 @@ def short_limits(discovery: Any) -> list[str]:
     return [f"At one drive speed it cannot be told from {names}: a film at a second drive would tell."]
 
 
-def limits(discovery: Any) -> list[str]:
+def limits(discovery: Discovery) -> list[str]:
     """What holds for every such page."""
     result = []
     if discovery.verdict == "nothing missing":

@@ -1,0 +1,240 @@
+"""A report as data: sections of text, figures and tables, for the page and the app."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from markupsafe import Markup
+
+Text = str | Markup  #: Plain text, or text with HTML in it that was made here.
+
+
+def plain(text: Text) -> str:
+    """Without the HTML."""
+    return text.striptags() if isinstance(text, Markup) else text
+
+
+@dataclass(frozen=True)
+class Image:
+    """A picture, as a data URI, with what it shows in words, and its width on the page in pixels."""
+
+    uri: str
+    alt: str
+    width: int
+
+    @property
+    def ending(self) -> str:
+        """What the name of its file ends in."""
+        kind = self.uri.removeprefix("data:").partition(";")[0]
+        return {"image/svg+xml": "svg"}.get(kind, kind.partition("/")[2])
+
+    @property
+    def content(self) -> bytes:
+        """The file."""
+        return base64.b64decode(self.uri.partition(";base64,")[2])
+
+
+@dataclass(frozen=True)
+class Movie(Image):
+    """A moving picture that loops.
+
+    Attributes
+    ----------
+    uri : str
+        A film (``data:video/mp4``), or a drawing that moves (``data:image/svg+xml``).
+    titles : tuple of str
+        Of its panels, from the left.
+    start, seconds : float
+        Time at which the models are let go, and for how long they are shown, s.
+    filmed : bool
+        Whether the first panel is the film itself.
+    """
+
+    titles: tuple[str, ...]
+    start: float
+    seconds: float
+    filmed: bool
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph; `style` is a class of the page's style sheet."""
+
+    kind: ClassVar[str] = "paragraph"
+    text: Text
+    style: str = ""
+
+
+@dataclass(frozen=True)
+class Subheading:
+    """A heading within a section."""
+
+    kind: ClassVar[str] = "subheading"
+    text: Text
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list."""
+
+    kind: ClassVar[str] = "bullets"
+    entries: tuple[Text, ...]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture with its caption."""
+
+    kind: ClassVar[str] = "figure"
+    image: Image
+    caption: Text
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Small pictures side by side."""
+
+    kind: ClassVar[str] = "gallery"
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: its heading, and whether it holds numbers or the rows' names."""
+
+    title: Text
+    number: bool = False
+    names: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes
+    ----------
+    title : str
+        What it is called where it stands alone.
+    columns : tuple of Column
+    rows : tuple of tuple of str
+    caption : str
+    summary : str
+        Where it can be folded away, what is shown of it then.
+    open : bool
+        Whether it begins unfolded.
+    marked : frozenset of int
+        The rows that stand out.
+    """
+
+    kind: ClassVar[str] = "table"
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Text, ...], ...]
+    caption: Text = ""
+    summary: Text = ""
+    open: bool = False
+    marked: frozenset[int] = frozenset()
+
+    def plain(self) -> list[list[str]]:
+        """Its cells without HTML, the headings first."""
+        return [[plain(c.title) for c in self.columns], *([plain(cell) for cell in row] for row in self.rows)]
+
+
+Part = Paragraph | Subheading | Bullets | Figure | Gallery | Table
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands under it."""
+
+    heading: Text
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True)
+class Number:
+    """One of the numbers at the top: what it is, its value, a remark, and a class of the style sheet."""
+
+    what: Text
+    value: Text
+    remark: Text = ""
+    style: str = ""
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands first.
+
+    Attributes
+    ----------
+    kicker, title : str
+    verdict : str
+        In a word or two, after the kicker.
+    said : tuple of Paragraph
+    numbers : tuple of Number
+    notes : tuple of Paragraph
+        After the numbers.
+    """
+
+    kicker: str
+    title: Text
+    verdict: str = ""
+    said: tuple[Paragraph, ...] = ()
+    numbers: tuple[Number, ...] = ()
+    notes: tuple[Paragraph, ...] = ()
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report.
+
+    Attributes
+    ----------
+    head : Head
+    sections : tuple of Section
+    source : tuple of str, optional
+        The name of the file that it began with, and its SHA-256.
+    command : str, optional
+        How it was made.
+    """
+
+    head: Head
+    sections: tuple[Section, ...]
+    source: tuple[str, str] | None = None
+    command: str | None = None
+
+    def parts(self) -> Iterator[Part]:
+        """All parts in their order, those of galleries too."""
+        for section in self.sections:
+            for part in section.parts:
+                yield from part.figures if isinstance(part, Gallery) else (part,)
+
+    @property
+    def images(self) -> list[Image]:
+        """All pictures."""
+        return [part.image for part in self.parts() if isinstance(part, Figure)]
+
+    @property
+    def tables(self) -> list[Table]:
+        """All tables."""
+        return [part for part in self.parts() if isinstance(part, Table)]
+
+
+def table(
+    title: str, columns: Mapping[str, Column], rows: Iterable[Mapping[str, Text]], caption: Text = ""
+) -> Table:
+    """A table of these columns from rows by name."""
+    cells = tuple(tuple(row[name] for name in columns) for row in rows)
+    return Table(title, tuple(columns.values()), cells, caption)
+
+
+def parts(*given: Part | Sequence[Part] | None) -> tuple[Part, ...]:
+    """Those that there are, one after the other."""
+    result: list[Part] = []
+    for one in given:
+        if one is not None:
+            result += one if isinstance(one, Sequence) else [one]
+    return tuple(result)

@@ -1,0 +1,214 @@
+"""The report of a search for what a user's own model lacks: its states and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+
+from udd.models.formula_model import FormulaModel
+from udd.plot.style import AFTER as ADDED
+from udd.plot.style import BEFORE as KNOWN
+from udd.plot.style import MEASURED, tidy
+
+from . import figures, wording
+from .discovery_report import (
+    BEFORE,
+    errors_heading,
+    errors_table,
+    head,
+    nearest,
+    reasons,
+    round_heading,
+    tried_heading,
+    whiteness,
+)
+from .document import (
+    Bullets,
+    Column,
+    Figure,
+    Head,
+    Image,
+    Paragraph,
+    Part,
+    Section,
+    Subheading,
+    Text,
+    parts,
+    table,
+)
+from .images import blank, png, svg
+from .runs import side_by_side
+
+if TYPE_CHECKING:
+    from udd.discovery.results import Discovery
+    from udd.fitting import Fit
+    from udd.fitting.innovations import Innovations
+
+_SHOWN = 8.0  # longest horizons of the held-out errors that the free runs are shown for
+
+
+def formula_head(discovery: Discovery) -> Head:
+    """What stands first."""
+    said = []
+    for found in discovery.effects:
+        values = Markup("")
+        if not wording.is_spline(found.effect):
+            values = Markup(" &ensp;with ") + wording.values_of(found, {})
+        said.append(Paragraph(Markup("{}").format(found.equation) + values, "formula"))
+    return head(discovery, "What the model lacks", said, ", in units of the motion's spread")
+
+
+def sections(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[Section, ...]:
+    """What follows: the motion, the model, the errors, the candidates, the innovations and the numbers."""
+    made = [_measured(discovery), _known(discovery), _errors(discovery), _tried(discovery)]
+    if discovery.effects:
+        made.append(_others(discovery))
+    made.append(Section("The surprises", whiteness(discovery, surprises)))
+    return (*made, _numbers(discovery))
+
+
+def _measured(discovery: Discovery) -> Section:
+    caption = (
+        "Where the data held back from the search begin, each model is let go from its own best estimate of "
+        "the state; then it sees no more data."
+    )
+    shown = (Paragraph(measured(discovery)), Figure(_free_runs(discovery), caption))
+    return Section("What was measured", shown)
+
+
+def _known(discovery: Discovery) -> Section:
+    shown = tuple(Paragraph(equation, "formula") for equation in equations(discovery))
+    return Section("The known model", shown)
+
+
+def _errors(discovery: Discovery) -> Section:
+    caption = (
+        f"Median error over {len(discovery.error_before.samples)} starts, with 95 % intervals. Dotted: the "
+        "noise floor, which noise in the data and in the starting state alone would leave to a faultless "
+        "model."
+    )
+    shown = (Figure(figures.errors(discovery), caption), errors_table(discovery))
+    return Section(errors_heading(discovery), shown)
+
+
+def _tried(discovery: Discovery) -> Section:
+    rule = (
+        "One was added only if chance would hardly do as well (less than 0.1 % over all of them together), "
+        "and if the data held back bear it out."
+        if discovery.effects
+        else "None passed: chance must hardly do as well (less than 0.1 % over all of them together), and "
+        "the data held back must bear it out."
+    )
+    said = (
+        "Terms made of the states were tried in every equation, and so were waves of every frequency, smooth "
+        f"curves and surfaces. {rule}"
+    )
+    caption = (
+        "What is missing, as a curve that the data alone draw, without a formula; the band holds it with "
+        "95 %."
+    )
+    drawn = [
+        Figure(figures.curve(f.curve), caption)
+        for f in discovery.effects
+        if f.curve is not None and wording.is_spline(f.effect)
+    ]
+    bars = "The longer the bar, the more the fit would improve; the scale is logarithmic."
+    rounds: list[Part] = []
+    for stage in range(len(discovery.scans)):
+        rounds += [Subheading(round_heading(stage)), Figure(figures.evidence(discovery, stage), bars)]
+    shown = parts(Paragraph(said), nearest(discovery), reasons(discovery), drawn, rounds)
+    return Section(tried_heading(discovery), shown)
+
+
+def _others(discovery: Discovery) -> Section:
+    listed: list[Text] = [
+        Markup(
+            "<strong>{}</strong> ({}) instead of {}: worse by {:.1f} units of log-likelihood; a form is "
+            "excluded from 10 on."
+        ).format(
+            other.title, other.effect.expression, wording.title_of(discovery, other.instead_of), other.nats
+        )
+        for other in discovery.alternatives
+    ]
+    none = "Nothing else that was tried explains these data as well."
+    return Section("What else it could be", (Bullets(tuple(listed) or (none,)),))
+
+
+def _numbers(discovery: Discovery) -> Section:
+    columns = {"name": Column("", names=True), "before": Column(BEFORE, number=True)}
+    if discovery.effects:
+        columns["after"] = Column("with what was added", number=True)
+    caption = "Parameters, with standard errors"
+    shown = (
+        table("The numbers", columns, parameters(discovery), caption),
+        Figure(_misfits(discovery.fit), "Measured less fitted. The band holds 95 % of honest noise."),
+    )
+    return Section("The numbers", shown)
+
+
+def parameters(discovery: Discovery) -> list[dict[str, Text]]:
+    """Every free parameter, before and after."""
+    rows: list[dict[str, Text]] = []
+    for name in discovery.fit.parameters:
+        before, after = (
+            wording.with_error(fit.parameters[name], fit.errors[name]) if name in fit.parameters else "–"
+            for fit in (discovery.baseline, discovery.fit)
+        )
+        rows.append({"name": name, "before": before, "after": after})
+    return rows
+
+
+def equations(discovery: Discovery) -> list[str]:
+    """The known model."""
+    model = discovery.baseline.model
+    assert isinstance(model, FormulaModel)
+    return [f"{name}' = {text}" for name, text in model.equations.items()]
+
+
+def measured(discovery: Discovery) -> str:
+    """What was measured, in a sentence."""
+    m, fit = discovery.measurement, discovery.fit
+    sd = np.median(fit.noise.sd(fit.record, fit.states[:, 0]), axis=0)
+    seen = [(name, s) for name, s in zip(fit.channels, sd, strict=True) if np.isfinite(s)]
+    noise = ", ".join(f"{s:.2g} in {name}" for name, s in seen)
+    hidden = [name for name in fit.channels if name not in m.names]
+    what = f"{', '.join(m.names)} in {len(m)} frames over {m.duration:.4g} s"
+    rest = f" Not seen: {', '.join(hidden)}." if hidden else ""
+    return f"{what}; noise as the record shows it: {noise}.{rest}"
+
+
+def _free_runs(discovery: Discovery) -> Image:
+    names = [name for name in discovery.fit.channels if name in discovery.measurement.names]
+    t, seen, found = side_by_side(discovery, _SHOWN * discovery.error_before.horizons[-1])
+    figure, grid = blank(9.0, 1.7 * len(names) + 0.9, rows=len(names), top=0.4)
+    said = (("the known model", KNOWN), ("with what was added", ADDED))
+    for (ax,), name in zip(grid, names, strict=True):
+        k = discovery.fit.channels.index(name)
+        ax.plot(t, seen[:, k], ".", color=MEASURED, markersize=3, label="measured")
+        for values, (label, colour) in zip(found, said, strict=False):
+            ax.plot(t, values[:, k], color=colour, linewidth=1.4, label=label)
+        low, high = np.nanmin(seen[:, k]), np.nanmax(seen[:, k])
+        ax.set_ylim(low - 0.3 * (high - low), high + 0.3 * (high - low))
+        ax.set_ylabel(name)
+        tidy(ax)
+    grid[-1][0].set_xlabel("t")
+    grid[0][0].legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    return svg(figure, "The states over time: measured, and free runs of the models")
+
+
+def _misfits(fit: Fit) -> Image:
+    names = [name for name in fit.channels if name in fit.measurement.names]
+    figure, grid = blank(9.0, 1.5 * len(names) + 0.7, rows=len(names))
+    sd = fit.noise.sd(fit.record, fit.states[:, 0])
+    for (ax,), name in zip(grid, names, strict=True):
+        k = fit.channels.index(name)
+        ax.plot(fit.record.clock, fit.misfit[:, k], ".", color=MEASURED, markersize=2)
+        band = 1.96 * float(np.median(sd[np.isfinite(sd[:, k]), k]))
+        ax.axhspan(-band, band, color=ADDED, alpha=0.15)
+        ax.set_ylabel(name)
+        tidy(ax)
+    grid[-1][0].set_xlabel("t")
+    return png(figure, "Measured less fitted, with a band for the noise that was found")
