@@ -57,10 +57,10 @@ def test_the_page_holds_all_and_stands_alone(film: Path, found: Tracking, tmp_pa
 
 
 def test_values_are_told_to_their_errors(found: Tracking) -> None:
-    rows = {row.name: row for row in calibration(found.measurement)}
+    rows = {row["name"]: row for row in calibration(found.measurement)}
     scale = found.measurement.meta["calibration"]["scale"]
-    assert float(rows["scale"].value) == pytest.approx(scale[0], abs=0.1 * scale[1])
-    assert len(rows["scale"].value) <= 8 and rows["exposure"].unit == "ms"
+    assert float(rows["scale"]["value"]) == pytest.approx(scale[0], abs=0.1 * scale[1])
+    assert len(rows["scale"]["value"]) <= 8 and rows["exposure"]["unit"] == "ms"
 
 
 def test_a_table_read_back_makes_a_page_too(film: Path, found: Tracking, tmp_path: Path) -> None:
