@@ -62,7 +62,7 @@ def homoclinic_orbits() -> list[float]:
         rests = udd.equilibria(udd.DLE(2.5, B=B))
         start = next(rest for rest in rests if rest.state[0] > 1e-3)
         hopf = udd.continuation(start, "w", (0.5, 30.0)).find("Hopf")[0]
-        one = udd.connection(udd.continuation(hopf, period=16.0))
+        one = udd.connection(udd.continuation(hopf, max_period=16.0))
         known = homoclinic(Decimal(one.value), Decimal(B))
         found.append(row(f"homoclinic orbit at B = {B:g}", one.value, known, one.error))
     return found

@@ -140,7 +140,7 @@ def forced_and_conservative() -> None:
     three = udd.Model(["a", "b", "c", "p", "q", "r"], equations, {"k": 0.2})
     family, seconds = timed(
         lambda: udd.continuation(
-            udd.periodic_orbit(three, [1.0] * 3 + [0.0] * 3, period=6.7), "period", (6.3, 12.0)
+            udd.periodic_orbit(three, [1.0] * 3 + [0.0] * 3, max_period=6.7), "period", (6.3, 12.0)
         )
     )
     k = len(family) // 2

@@ -45,7 +45,7 @@ def beside_what_repels() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, s
         udd.continuation(max(udd.equilibria(lorenz), key=lambda one: one.state[0]), "r", (18.0, 30.0)).find(
             "Hopf"
         )[0],
-        period=2.0,
+        max_period=2.0,
     )
     long = branch.solution(len(branch) - 1)
     near = np.full(3, 1e-6)

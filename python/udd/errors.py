@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import warnings
 from typing import Any
@@ -80,4 +81,14 @@ def interrupted(result: Any, message: str, partial: bool) -> None:
     """Raise :class:`Interrupted`, or warn whoever asked for a partial result."""
     if not partial:
         raise Interrupted(message, result) from None
-    warnings.warn(IncompleteWarning(message, interrupted=True), stacklevel=3)
+    warnings.warn(IncompleteWarning(message, interrupted=True), stacklevel=outside())
+
+
+def outside() -> int:
+    """The `stacklevel` at which a warning of the caller names the line that called the package."""
+    package, level = __name__.partition(".")[0], 1
+    frame = inspect.currentframe()
+    frame = frame.f_back if frame is not None else None
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
+        frame, level = frame.f_back, level + 1
+    return level

@@ -141,7 +141,7 @@ def test_above_the_hopf_bifurcation_rotation_has_a_finite_basin() -> None:
     # The chaos beside it is a transient with a mean lifetime of 26800. A sixth of the 1024 orbits begin in it
     # and are followed from 400 points to 900, through 1600 time units, before it could pass for an attractor:
     # ten are expected to end meanwhile, and that none does has a probability of 3e-5.
-    found = udd.basins(model, square(3, 32), state0=[0, 1, 0], transient=300, extend=4)
+    found = udd.basins(model, square(3, 32), state0=[0, 1, 0], transient=300, max_extension=4)
     assert found["kind"].to_numpy().tolist() == [0, 0]
     orbits = np.stack([found[f"orbit_{name}"].to_numpy()[:, 0] for name in ("omega", "y", "z")], axis=1)
     expected = np.sqrt(3.7) * np.array([[1, 1, 0], [-1, -1, 0]])
@@ -159,7 +159,7 @@ def test_below_the_hopf_bifurcation_nothing_comes_to_rest() -> None:
 
 def test_the_trap_at_4_5_is_no_attractor() -> None:
     # physics.md: a window 3e-5 wide, after a chaotic transient of mean length 8200.
-    found = udd.basins(udd.DLE(4.5), square(2, 8), state0=[0, 0.5, 0], extend=16)
+    found = udd.basins(udd.DLE(4.5), square(2, 8), state0=[0, 0.5, 0], max_extension=16)
     assert (found["kind"] == 1).all()
     assert float(found["fraction"].sel(ending="undecided")) > 0
 
@@ -210,7 +210,7 @@ def test_one_component_is_enough_and_four_are_too_many() -> None:
         ({"z": [2.0, 1.0]}, {}, "must increase"),
         ({"z": [np.nan]}, {}, "must be finite"),
         ({"z": [1.0]}, {"n": 3}, "n must be a whole number of at least 12"),
-        ({"z": [1.0]}, {"extend": 0}, "extend must be a whole number of at least 1"),
+        ({"z": [1.0]}, {"max_extension": 0}, "max_extension must be a whole number of at least 1"),
         ({"z": [1.0]}, {"state0": [1.0]}, "must have the 3 components"),
     ],
 )

@@ -165,9 +165,10 @@ def test_attractors_have_a_kind() -> None:
     found = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 6.0, 9.0])
     assert kinds(found) == ["chaos", "cycle", "cycle"]
     # Rotation is stable from w = 10/3 on at B = 0.2; at B = 0.9 the disk comes to rest at z = 1/B.
-    steady = udd.bifurcation(udd.DLE(1.0, B=0.2), "w", [3.7, 5.0], starts=[2.0, 2.0, 0.1])
+    steady = udd.bifurcation(udd.DLE(1.0, B=0.2), "w", [3.7, 5.0], initial_states=[2.0, 2.0, 0.1])
     assert kinds(steady) == ["rotating_state"] * 2
-    assert kinds(udd.bifurcation(udd.DLE(1.0, B=0.9), "w", [5.0], starts=[0.0, 0.0, 0.1])) == ["equilibrium"]
+    calm = udd.bifurcation(udd.DLE(1.0, B=0.9), "w", [5.0], initial_states=[0.0, 0.0, 0.1])
+    assert kinds(calm) == ["equilibrium"]
     # From the edge of the wheels at W = 0.055 the disk leaves.
     assert kinds(udd.bifurcation(udd.Disk(0.06), "W", [0.055, 0.088])) == ["left", "cycle"]
 
@@ -183,7 +184,7 @@ def test_a_motion_of_two_frequencies_is_a_torus() -> None:
         },
         {"mu": 0.2, "s": 0.3037},
     )
-    found = udd.bifurcation(model, "mu", [-0.2, 0.2], starts=[0.5, 0.2, 0.3, 0.1])
+    found = udd.bifurcation(model, "mu", [-0.2, 0.2], initial_states=[0.5, 0.2, 0.3, 0.1])
     assert kinds(found) == ["cycle", "torus"]
 
 
@@ -208,10 +209,10 @@ def test_the_duration_of_periods() -> None:
 
 def test_the_transient_near_the_symmetry_breaking_is_seen_through() -> None:
     # physics.md: at w = 7.1 transients decay with time 2250, more than 400 points take.
-    short = udd.bifurcation(udd.DLE(1.0), "w", [7.1], extend=1)
+    short = udd.bifurcation(udd.DLE(1.0), "w", [7.1], max_extension=1)
     assert short["period"].to_numpy().ravel().tolist() == [-1]
     assert short["outcome"].attrs["flag_meanings"].split()[int(short["outcome"].squeeze())] == "undecided"
-    long = udd.bifurcation(udd.DLE(1.0), "w", [7.1], extend=64)
+    long = udd.bifurcation(udd.DLE(1.0), "w", [7.1], max_extension=64)
     assert long["period"].to_numpy().ravel().tolist() == [2]
     assert long["symmetric"].to_numpy().ravel().tolist() == [1]
     assert float(long["period_time"].squeeze()) == pytest.approx(3.98808575286, abs=1e-5)
@@ -231,12 +232,12 @@ def test_hysteresis_where_a_second_attractor_lives() -> None:
     # physics.md: several attractors coexist at w = 7.445-7.829 (given to the last digit shown).
     start = second_orbit()
     step = 0.01
-    up = udd.bifurcation(udd.DLE(1.0), "w", np.arange(7.6, 7.9, step), path="both", starts=start)
+    up = udd.bifurcation(udd.DLE(1.0), "w", np.arange(7.6, 7.9, step), path="both", initial_states=start)
     ((first, last),) = up["hysteresis_interval"].to_numpy()
     assert first == 7.6
     assert last == pytest.approx(7.829, abs=step)
     assert up["hysteresis"].sum() == round((last - first) / step) + 1
-    down = udd.bifurcation(udd.DLE(1.0), "w", np.arange(7.4, 7.605, step), path="both", starts=start)
+    down = udd.bifurcation(udd.DLE(1.0), "w", np.arange(7.4, 7.605, step), path="both", initial_states=start)
     ((first, last),) = down["hysteresis_interval"].to_numpy()
     assert first == pytest.approx(7.445, abs=step)
     # Both ways have the figure-eight in common, under one label.
@@ -268,7 +269,7 @@ def test_the_disk_has_the_period_that_the_full_model_should() -> None:
 
 def test_a_disk_that_leaves_the_wheels_is_an_outcome() -> None:
     starts = [[0.0, 1e-3, 0.04, 0.0], [0.0, 0.08, 0.01, 0.0]]
-    found = udd.bifurcation(udd.Disk(0.039), "W", [0.036, 0.039], starts=starts, n=40)
+    found = udd.bifurcation(udd.Disk(0.039), "W", [0.036, 0.039], initial_states=starts, n=40)
     names = found["outcome"].attrs["flag_meanings"].split()
     assert {names[k] for k in found["outcome"].sel(start=0).to_numpy().ravel()} == {"ejected"}
     assert {names[k] for k in found["outcome"].sel(start=1).to_numpy().ravel()} == {"start_outside"}
@@ -319,7 +320,7 @@ def test_it_says_what_it_is_of() -> None:
         ({"transient": -1}, "transient must be a whole number of at least 0"),
         ({"path": "sideways"}, "path must be one of"),
         ({"component": "x"}, "the state has no 'x'"),
-        ({"starts": [[1.0, 2.0]]}, "must have the 3 components"),
+        ({"initial_states": [[1.0, 2.0]]}, "must have the 3 components"),
         ({"section": "z +"}, "section"),
         ({"section": "q"}, "section"),
         ({"section": ["z", "y"]}, "section must be one expression"),

@@ -23,7 +23,7 @@ def test_equilibria_of_models_of_all_sizes(dim: int) -> None:
     assert states.shape[1] == dim
     for wanted in (0.5, 2.0):
         assert np.abs(states - wanted).max(axis=1).min() < 1e-9
-    near = udd.equilibria(ring(dim), near=np.full(dim, 0.5), starts=1)
+    near = udd.equilibria(ring(dim), near=np.full(dim, 0.5), initial_states=1)
     assert np.abs(np.array([rest.state for rest in near]) - 0.5).max(axis=1).min() < 1e-9
     # Of d/dx at 0.5: a ring of 1.5, whose eigenvalues are 1.5 times the roots of one.
     rest = min(found, key=lambda rest: float(np.abs(rest.state - 0.5).max()))
@@ -33,7 +33,7 @@ def test_equilibria_of_models_of_all_sizes(dim: int) -> None:
 
 
 def test_a_search_says_where_it_was() -> None:
-    none = udd.equilibria(udd.Model(["x", "v"], ["v", "1 + x^2"]), near=[3.0, 30.0], starts=16)
+    none = udd.equilibria(udd.Model(["x", "v"], ["v", "1 + x^2"]), near=[3.0, 30.0], initial_states=16)
     assert none == []
     wanted = "Powell's method from 16 states within |x| <= 30, |v| <= 300 and 1 given: others may exist"
     assert none.search == wanted and wanted in repr(none)

@@ -23,7 +23,7 @@ def test_lorenz_has_his_homoclinic_orbit() -> None:
 
 def test_the_dle_has_those_that_another_integrator_has() -> None:
     # About one with a saddle-focus there are others, of more rounds, which take longer.
-    found = udd.connections(udd.DLE(3.4), "w", (3.34, 3.42), n=40, longest=11.0)
+    found = udd.connections(udd.DLE(3.4), "w", (3.34, 3.42), n=40, t_max=11.0)
     assert all(one.wild and one.error < 1e-11 for one in found)
     (one,) = (one for one in found if one.kind == "homoclinic")
     assert one.value == pytest.approx(3.3768624337325, abs=1e-9)
@@ -65,7 +65,7 @@ def test_what_is_found_does_not_hang_on_the_grid() -> None:
     # Pairs so near to each other that coarse grids stepped over both, and fine ones saw no change.
     known = [6.46524562656, 6.465246585675]
     for n in (4, 12):
-        found = udd.connections(udd.DLE(6.0), "w", (6.3, 6.6), n=n, longest=12.0)
+        found = udd.connections(udd.DLE(6.0), "w", (6.3, 6.6), n=n, t_max=12.0)
         np.testing.assert_allclose([one.value for one in found], known, atol=1e-11)
         assert found.search.endswith("longer ones may exist")
 

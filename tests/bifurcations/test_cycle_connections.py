@@ -13,7 +13,7 @@ from udd.errors import ModelError
 def branch_of(model: udd.Model, parameter: str, bounds: tuple[float, float], period: float) -> udd.Branch:
     rest = max(udd.equilibria(model), key=lambda one: one.state[0])
     hopf = udd.continuation(rest, parameter, bounds).find("Hopf")[0]
-    return udd.continuation(hopf, period=period)
+    return udd.continuation(hopf, max_period=period)
 
 
 def saddle_of(model: udd.Model) -> udd.Equilibrium:

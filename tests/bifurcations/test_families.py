@@ -78,7 +78,7 @@ def test_three_pendulums_on_springs() -> None:
     equations = ["p", "q", "r", "-sin(a)+k*(b-a)", "-sin(b)+k*(a+c-2*b)", "-sin(c)+k*(b-c)"]
     model = udd.Model(["a", "b", "c", "p", "q", "r"], equations, {"k": k})
     family = udd.continuation(
-        udd.periodic_orbit(model, [1.0] * 3 + [0.0] * 3, period=6.7), "period", (6.3, 9.0)
+        udd.periodic_orbit(model, [1.0] * 3 + [0.0] * 3, max_period=6.7), "period", (6.3, 9.0)
     )
     # All as one: each swings as a pendulum alone.
     energy = family.states[:, 3] ** 2 / 2 - np.cos(family.states[:, 0])

@@ -27,7 +27,7 @@ DOUBLING = 5.394713224
 @pytest.fixture(scope="module")
 def figure_eight() -> udd.Branch:
     """The symmetric figure-eight of the DLE over the drive."""
-    return udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (5.0, 300.0), longest=1.0)
+    return udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (5.0, 300.0), ds_max=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -175,11 +175,11 @@ def test_a_step_off_a_bifurcation_does_not_jump_over_the_next() -> None:
     state = [0.6415522621501002, -4.139594982525741, 7.896287533019794e-18]
     orbit = udd.periodic_orbit(udd.DLE(4.500018), state, period=53.11554)
     branch = udd.continuation(
-        orbit, "w", (4.4999, 4.51), direction="down", step=1e-6, longest=1e-3, until="symmetry breaking"
+        orbit, "w", (4.4999, 4.51), direction="down", ds=1e-6, ds_max=1e-3, until="symmetry breaking"
     )
     (breaking,) = branch.points
     assert breaking.value == pytest.approx(4.500013676, abs=1e-9)
-    born = udd.continuation(breaking, bounds=(4.49, 4.51), most=20)
+    born = udd.continuation(breaking, bounds=(4.49, 4.51), max_points=20)
     assert [point.kind for point in born.points] == ["period doubling"]
     assert 4.49999 < born.points[0].value < breaking.value
     assert born.stable[0] and not born.stable[-1]
@@ -257,7 +257,7 @@ def test_the_bound_of_where_doublings_accumulate_holds() -> None:
 
 def test_the_bound_of_a_connection_is_not_zero(rotation: udd.Branch) -> None:
     hopf = rotation.find("Hopf")[0]
-    a, b = (udd.connection(udd.continuation(hopf, period=period)) for period in (12.0, 18.0))
+    a, b = (udd.connection(udd.continuation(hopf, max_period=period)) for period in (12.0, 18.0))
     # Two that were found from cycles of different length, with pieces of their own.
     assert 0.0 < abs(a.value - b.value) + 1e-15 < a.error + b.error < 1e-11
 
@@ -279,14 +279,14 @@ def test_the_first_lyapunov_coefficient(rotation: udd.Branch) -> None:
 
 def test_cycles_are_born_at_the_hopf_bifurcation(rotation: udd.Branch) -> None:
     (hopf,) = rotation.find("Hopf")
-    cycles = udd.continuation(hopf, bounds=(0.5, 20.0), period=20.0)
+    cycles = udd.continuation(hopf, bounds=(0.5, 20.0), max_period=20.0)
     # Subcritical: unstable, on the side where rotation is stable; they tend to a connection.
     assert not cycles.stable.any()
     assert (cycles.values[1:20] > hopf.value).all()
     assert cycles.periods[0] == pytest.approx(math.pi, abs=1e-2)
     assert cycles.ends == ("born at a Hopf", "the period exceeds 20")
     # Near by the amplitude grows with the square root of the distance.
-    near = udd.continuation(hopf, amplitude=1e-3, step=2e-3, longest=2e-3, most=6)
+    near = udd.continuation(hopf, amplitude=1e-3, ds=2e-3, ds_max=2e-3, max_points=6)
     low, high = near.extremes
     spread, distance = (high - low)[:, 0], near.values - hopf.value
     assert spread[5] / spread[0] > 5.0
@@ -386,7 +386,7 @@ def test_the_fold_of_rotation_over_the_friction_at_rest() -> None:
 
 
 def test_damping_moves_where_the_symmetry_breaks(figure_eight: udd.Branch) -> None:
-    curve = udd.locus(figure_eight.points[0], "B", (0.0, 0.04), most=12)
+    curve = udd.locus(figure_eight.points[0], "B", (0.0, 0.04), max_points=12)
     assert curve.ends == ("the bound 0", "the bound 0.04")
     # The same from a branch at that damping.
     there = udd.continuation(udd.periodic_orbit(udd.DLE(9.0, B=0.04)), "w", (5.0, 12.0))
@@ -394,7 +394,9 @@ def test_damping_moves_where_the_symmetry_breaks(figure_eight: udd.Branch) -> No
 
 
 def test_rotation_has_a_homoclinic_orbit_as_shilnikov_says() -> None:
-    cycles = udd.continuation(udd.periodic_orbit(udd.DLE(0.3)), "w", (0.29, 3.0), direction="up", period=50.0)
+    cycles = udd.continuation(
+        udd.periodic_orbit(udd.DLE(0.3)), "w", (0.29, 3.0), direction="up", max_period=50.0
+    )
     found = udd.connection(cycles)
     assert found.kind == "homoclinic" and found.wild
     assert found.error < 1e-9
@@ -418,9 +420,9 @@ def test_rotation_has_a_homoclinic_orbit_as_shilnikov_says() -> None:
 
 
 def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) -> None:
-    found = udd.connection(udd.continuation(rotation.find("Hopf")[0], period=16.0))
+    found = udd.connection(udd.continuation(rotation.find("Hopf")[0], max_period=16.0))
     np.testing.assert_allclose(found.equilibrium.state, [0.0, 0.0, 5.0], atol=1e-12)
-    longer = udd.continuation(rotation.find("Hopf")[0], period=22.0)
+    longer = udd.continuation(rotation.find("Hopf")[0], max_period=22.0)
     # The cycles come nearer by exp(-0.85 T): the branch itself is not there yet.
     assert longer.values[-1] == pytest.approx(found.value, abs=1e-6)
     assert found.error < 1e-9 and not found.wild
@@ -429,7 +431,7 @@ def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) 
 def test_the_disks_connection_has_cycles_that_wind_towards_it() -> None:
     # From the lower end of the symmetric cycles; 0.0126 is where the folds of the branch born there gather.
     lower = udd.continuation(udd.periodic_orbit(udd.Disk(0.088)), "W", (0.009, 0.09), direction="down")
-    born = udd.continuation(lower.find("symmetry breaking")[-1], bounds=(0.005, 0.05), period=9.0)
+    born = udd.continuation(lower.find("symmetry breaking")[-1], bounds=(0.005, 0.05), max_period=9.0)
     found = udd.connection(born)
     assert found.kind == "homoclinic" and found.wild and found.error < 1e-9
     folds = np.array([fold.value for fold in born.find("fold")])
@@ -468,7 +470,7 @@ def test_pictures_of_branches(figure_eight: udd.Branch, rotation: udd.Branch) ->
     with pytest.raises(udd.UddError, match="equilibria have no period"):
         udd.plot.branches(rotation, view="period")
     # Cycles that are all unstable, beside an equilibrium that has no period to be marked.
-    cycles = udd.continuation(rotation.points[0], bounds=(3.0, 3.6), longest=0.05)
+    cycles = udd.continuation(rotation.points[0], bounds=(3.0, 3.6), ds_max=0.05)
     ax = udd.plot.branches([rotation, cycles], view="period")
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["unstable"]
 
@@ -552,11 +554,14 @@ def test_the_command_refuses_in_one_sentence(
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", (8, 9)), "outside the bounds"),
         (lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1))), "which parameter"),
         (
-            lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", most=0),
-            "most must be a whole number",
+            lambda: udd.continuation(udd.periodic_orbit(udd.DLE(7.1)), "w", max_points=0),
+            "max_points must be a whole number",
         ),
         (lambda: udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=0), "n must be a whole number"),
-        (lambda: udd.equilibria(udd.DLE(1.0), starts="many"), "starts must be a whole number"),
+        (
+            lambda: udd.equilibria(udd.DLE(1.0), initial_states="many"),
+            "initial_states must be a whole number",
+        ),
         (
             lambda: udd.equilibria(udd.Model(["x", "y"], {"x": "sin(t)", "y": "-y"})),
             "depend on time",

@@ -104,8 +104,8 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
             values,
             n=_KEPT,
             transient=2 * _TRANSIENT,
-            starts=starts,
-            extend=6,
+            initial_states=starts,
+            max_extension=6,
             threads=_worker_threads(),
             progress=False,
         )

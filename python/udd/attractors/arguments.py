@@ -12,6 +12,7 @@ from udd.errors import ModelError
 from udd.models import Model, require_model
 from udd.models.parameter_batch import default_state
 from udd.models.state_scaling import Floats
+from udd.simulation.batch import RunOptions
 from udd.simulation.trajectory import initial_state, tolerances
 
 from .section_runs import SectionRunner
@@ -22,9 +23,7 @@ def runner_of(
     rows: Floats,
     section: str | None,
     direction: str | None,
-    rtol: float,
-    atol: float,
-    threads: int | None,
+    options: RunOptions,
     t_max: float | None,
     each: int,
 ) -> SectionRunner:
@@ -35,10 +34,10 @@ def runner_of(
     if not isinstance(section, str | None):
         raise ModelError(f"section must be one expression such as 'z', not {section!r}")
     surfaces, ways = surfaces_of(model, section, direction)
-    rtol, atol = tolerances(rtol, atol)
+    rtol, atol = tolerances(options["rtol"], options["atol"])
     mean = None if t_max is None else number("t_max", t_max, above=0.0) / each
     t_each = CLOCKS * clock_of(model, rows) if mean is None else mean
-    return SectionRunner(model, surfaces, ways, rtol, atol, thread_count(threads), t_each)
+    return SectionRunner(model, surfaces, ways, rtol, atol, thread_count(options["threads"]), t_each)
 
 
 def start_states(model: Model, starts: ArrayLike | None) -> Floats:
@@ -46,9 +45,9 @@ def start_states(model: Model, starts: ArrayLike | None) -> Floats:
     require_model(model)
     if starts is None:
         return np.array([default_state(model)])
-    given = np.atleast_2d(array("starts", starts))
+    given = np.atleast_2d(array("initial_states", starts))
     if given.ndim != 2 or not len(given):
-        raise ModelError("starts must be a list of initial states")
+        raise ModelError("initial_states must be a list of states")
     return np.stack([initial_state(model, state) for state in given])
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.validation import whole
 from udd.chaos.recurrence import tightness
 from udd.errors import ModelError, interrupted
 from udd.models import Model
 from udd.models.state_scaling import Floats, coordinates_of
+from udd.simulation.batch import RUN_OPTIONS, RunOptions
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 
 from .arguments import increasing, parameter_rows, runner_of, start_states
@@ -41,6 +43,7 @@ _NOT_RUN = [INTERRUPTED, START_OUTSIDE]
 _FINAL = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
 
 
+@renamed(extend="max_extension")
 def basins(
     model: Model,
     grid: Mapping[str, ArrayLike],
@@ -50,13 +53,9 @@ def basins(
     direction: str | None = None,
     n: int = 100,
     transient: int = 100,
-    extend: int = 16,
-    rtol: float = 1e-9,
-    atol: float = 1e-12,
+    max_extension: int = 16,
     t_max: float | None = None,
-    threads: int | None = None,
-    progress: bool | None = None,
-    partial: bool = False,
+    **options: Unpack[RunOptions],
 ) -> xr.Dataset:
     """Which initial states end on which attractor.
 
@@ -76,18 +75,15 @@ def basins(
         By how many section points a motion is recognised, at least 12; periods up to a third of this are.
     transient : int
         How many points are left out before.
-    extend : int
+    max_extension : int
         What is not clear is followed further, up to this many times ``transient + n`` points.
-    rtol, atol : float
-        Tolerances of the runs.
     t_max : float, optional
         The longest time for the first ``transient + n`` points; by default generous.
-    threads : int, optional
-        How many; by default one per core.
-    progress : bool, optional
-        Whether to show a progress bar on stderr; by default where that is a terminal.
-    partial : bool
-        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+    **options
+        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``threads`` (by default one per
+        core); ``progress``, whether to show a progress bar on stderr (by default where that is a terminal);
+        ``partial``, after Ctrl-C to return what there is, with a warning, instead of raising it with the
+        exception.
 
     Returns
     -------
@@ -127,7 +123,7 @@ def basins(
     Periodic orbits are known by their section points, aperiodic attractors by visiting the same places,
     equilibria by their rates. No long transient shall pass for an attractor: what nearly comes back is
     followed until it does, and aperiodic motions are followed twice as far, and on and on as long as some of
-    them end elsewhere. Where that does not stop within `extend`, they are "undecided".
+    them end elsewhere. Where that does not stop within `max_extension`, they are "undecided".
 
     The fractions' errors are those of a sample on a grid: binomial where neighbours have nothing in common,
     smaller where the basins are large. With f ~ distance^alpha, the basins' boundary has the dimension of the
@@ -150,18 +146,19 @@ def basins(
 
     xarray = require_xarray()
     n, transient = whole("n", n, 12), whole("transient", transient, 0)
-    extend = whole("extend", extend, 1)
+    chosen = with_defaults("basins", RUN_OPTIONS, options)
+    extend = whole("max_extension", max_extension, 1)
     axes, starts = _starts(model, grid, state0)
     rows = parameter_rows(model, {}, 1)
-    runner = runner_of(model, rows, section, direction, rtol, atol, threads, t_max, transient + n)
+    runner = runner_of(model, rows, section, direction, chosen, t_max, transient + n)
     judge = MotionClassifier(model, None, coordinates_of(model, starts), tightness(runner.rtol))
     samples = InitialStates(runner, AttractorCatalogue(judge), starts, n, extend * (transient + n))
 
-    shown = sys.stderr.isatty() if progress is None else progress
+    shown = sys.stderr.isatty() if chosen["progress"] is None else chosen["progress"]
     with tqdm(total=len(starts), unit="start", disable=not shown, leave=False) as bar:
         stopped = samples.run(transient, bar)
-    options = {"n": n, "transient": transient, "extend": extend, "complete": int(not stopped)}
-    attrs = of_result(runner, "basins of attraction", options)
+    told_of = {"n": n, "transient": transient, "max_extension": extend, "complete": int(not stopped)}
+    attrs = of_result(runner, "basins of attraction", told_of)
     for k, name in enumerate(model.state_names):
         if name not in axes:
             attrs[f"start_{name}"] = float(starts[0, k])
@@ -174,7 +171,7 @@ def basins(
             if left
             else "stopped by Ctrl-C before the aperiodic motions were followed further"
         )
-        interrupted(made, message, partial)
+        interrupted(made, message, chosen["partial"])
     return made
 
 

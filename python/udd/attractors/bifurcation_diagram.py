@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.validation import number, whole
 from udd.chaos.recurrence import SETTLING, tightness
 from udd.errors import ModelError, interrupted
 from udd.models import Model
 from udd.models.state_scaling import Floats, coordinates_of
+from udd.simulation.batch import RUN_OPTIONS, RunOptions
 
 from .arguments import parameter_rows, parameter_values, runner_of, start_states
 from .classification import Classification, MotionClassifier, again, decided, follow, put
@@ -37,6 +39,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+class DiagramOptions(RunOptions, TypedDict, total=False):
+    """Keyword arguments of :func:`bifurcation` beside those of all runs."""
+
+    max_extension: int
+    perturbation: float
+    match_distance: float
+
+
+_OPTIONS: DiagramOptions = {**RUN_OPTIONS, "max_extension": 64, "perturbation": 1e-4, "match_distance": 0.25}
+
+
+@renamed(starts="initial_states", extend="max_extension", nudge="perturbation", reach="match_distance")
 def bifurcation(
     model: Model,
     parameter: str,
@@ -46,19 +60,12 @@ def bifurcation(
     direction: str | None = None,
     n: int = 200,
     transient: int = 200,
-    starts: ArrayLike | None = None,
+    initial_states: ArrayLike | None = None,
     path: Literal["independent", "up", "down", "both"] = "independent",
     component: str | Sequence[str] | None = None,
     attractors: bool = True,
-    extend: int = 64,
-    nudge: float = 1e-4,
-    reach: float = 0.25,
-    rtol: float = 1e-9,
-    atol: float = 1e-12,
     t_max: float | None = None,
-    threads: int | None = None,
-    progress: bool | None = None,
-    partial: bool = False,
+    **options: Unpack[DiagramOptions],
 ) -> xr.Dataset:
     """Section points over a parameter, with the attractors told apart.
 
@@ -78,7 +85,7 @@ def bifurcation(
         How many points are kept, at least 12. Periods up to a third of this are recognised.
     transient : int
         How many points are left out before.
-    starts : array_like, shape (s, dim) or (dim,), optional
+    initial_states : array_like, shape (s, dim) or (dim,), optional
         Initial states; by default that of :func:`udd.lyapunov`.
     path : {"independent", "up", "down", "both"}
         Whether every value begins at the initial states, or where the one before (after) it ended.
@@ -86,24 +93,17 @@ def bifurcation(
         Which components of the state are kept; by default all.
     attractors : bool
         Whether to tell periods and attractors; otherwise the points and outcomes are all there is.
-    extend : int
-        What still settles is followed further, up to this many times ``transient + n`` points.
-    nudge : float
-        What is added to a state that is carried over, relative to the size of the motion, lest it stay on an
-        orbit that is no longer stable.
-    reach : float
-        How far an attractor's points may move, on average and relative to the size of the motion, from one
-        value to the next.
-    rtol, atol : float
-        Tolerances of the runs.
     t_max : float, optional
         The longest time for the first ``transient + n`` points; by default generous.
-    threads : int, optional
-        How many; by default one per core.
-    progress : bool, optional
-        Whether to show a progress bar on stderr; by default where that is a terminal.
-    partial : bool
-        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+    **options
+        ``max_extension`` (64): what still settles is followed further, up to this many times ``transient +
+        n`` points; ``perturbation`` (1e-4): what is added to a state that is carried over, relative to the
+        size of the motion, lest it stay on an orbit that is no longer stable; ``match_distance`` (0.25):
+        how far an attractor's points may move, on average and relative to the size of the motion, from one
+        value to the next; ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``threads`` (by
+        default one per core); ``progress``, whether to show a progress bar on stderr (by default where that
+        is a terminal); ``partial``, after Ctrl-C to return what there is, with a warning, instead of
+        raising it with the exception.
 
     Returns
     -------
@@ -145,8 +145,8 @@ def bifurcation(
     -----
     What is not periodic is told by the exponents of a short run on. A chaotic transient that outlives the
     run looks like chaos; where the ways up and down differ, all are followed to the length of
-    `extend` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the way up
-    or down begins at its initial state again with the next value.
+    `max_extension` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the
+    way up or down begins at its initial state again with the next value.
 
     The numbers do not depend on the number of threads. Where the rates depend on time, every run begins at
     time 0, carried over or not.
@@ -165,18 +165,22 @@ def bifurcation(
     xarray = require_xarray()
     axis = parameter_values(model, parameter, values)
     n, transient = whole("n", n, 12 if attractors else 1), whole("transient", transient, 0)
-    longest = whole("extend", extend, 1) * (transient + n)
-    nudge, reach = number("nudge", nudge, least=0.0), number("reach", reach, above=0.0)
+    chosen = with_defaults("bifurcation", _OPTIONS, options)
+    extension = whole("max_extension", chosen["max_extension"], 1)
+    longest = extension * (transient + n)
+    nudge = number("perturbation", chosen["perturbation"], least=0.0)
+    reach = number("match_distance", chosen["match_distance"], above=0.0)
+    partial = chosen["partial"]
     if path not in PATHS:
         raise ModelError(f"path must be one of {', '.join(PATHS)}, not {path!r}")
     kept = _components(model, component)
-    begin = start_states(model, starts)
+    begin = start_states(model, initial_states)
     middle = model.with_parameters({parameter: float(axis[len(axis) // 2])})
     shape = (len(PATHS[path]), len(begin), len(axis))
     places = np.arange(np.prod(shape)).reshape(shape)
     of_job = np.broadcast_to(axis, shape).ravel()
     rows = parameter_rows(model, {parameter: of_job}, places.size)
-    runner = runner_of(model, rows, section, direction, rtol, atol, threads, t_max, transient + n)
+    runner = runner_of(model, rows, section, direction, chosen, t_max, transient + n)
     judge = MotionClassifier(model, parameter, coordinates_of(middle, begin), tightness(runner.rtol))
     found = nothing(places.size, n, begin.shape[1])
     verdicts = Classification.none(places.size)
@@ -189,7 +193,7 @@ def bifurcation(
             one = runner(rows[these], states, transient, n)
         put(found, these, one)
 
-    shown = sys.stderr.isatty() if progress is None else progress
+    shown = sys.stderr.isatty() if chosen["progress"] is None else chosen["progress"]
     with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
         added = kick(judge.coordinates.size, nudge)
         stopped = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
@@ -231,10 +235,10 @@ def bifurcation(
     }
     for k, name in enumerate(model.state_names):
         coords[f"start_{name}"] = ("start", begin[:, k], of_state(model, name, "at the start"))
-    options = {"parameter": parameter, "n": n, "transient": transient, "extend": extend, "nudge": nudge}
-    more = {"reach": reach, "complete": int(not stopped)}
+    told_of = {"parameter": parameter, "n": n, "transient": transient, "max_extension": extension}
+    more = {"perturbation": nudge, "match_distance": reach, "complete": int(not stopped)}
     made: xr.Dataset = xarray.Dataset(
-        data, coords, of_result(runner, "bifurcation diagram", {**options, **more})
+        data, coords, of_result(runner, "bifurcation diagram", {**told_of, **more})
     )
     if stopped:
         left = int((found.outcome == INTERRUPTED).sum())

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
+from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
 
@@ -69,15 +70,16 @@ class Locus:
         )
 
 
+@renamed(step="ds", longest="ds_max", most="max_points")
 def locus(
     point: BifurcationPoint,
     parameter: str,
     bounds: Sequence[float] = (0.0, np.inf),
     *,
     within: Sequence[float] = (0.0, np.inf),
-    step: float = 0.05,
-    longest: float = 0.2,
-    most: int = 200,
+    ds: float = 0.05,
+    ds_max: float = 0.2,
+    max_points: int = 200,
 ) -> Locus:
     """Follow a bifurcation point over a second parameter.
 
@@ -90,9 +92,9 @@ def locus(
         The second parameter.
     bounds, within : (float, float)
         The curve ends where the second or the first parameter leaves these bounds.
-    step, longest : float
+    ds, ds_max : float
         The first and the longest step, in units of the parameters' values at the point.
-    most : int
+    max_points : int
         Points at most, in either direction.
 
     Returns
@@ -136,13 +138,13 @@ def locus(
     start = np.array([point.value, point._curve.values_at(point._place.u)[second]])
     if (start < box[:, 0]).any() or (start > box[:, 1]).any():
         raise ModelError(f"the point itself, at {start[0]:g} and {start[1]:g}, lies outside the bounds")
-    step = number("step", step, above=0.0)
-    longest = max(step, number("longest", longest, above=0.0))
-    most = whole("most", most, 1)
+    ds = number("ds", ds, above=0.0)
+    ds_max = max(ds, number("ds_max", ds_max, above=0.0))
+    max_points = whole("max_points", max_points, 1)
     along = _Fold if point.kind == "fold" else _Plane
     ways = []
     for sense in (-1.0, 1.0):
-        ways.append(along(point, second, box).follow(sense, step, longest, most))
+        ways.append(along(point, second, box).follow(sense, ds, ds_max, max_points))
     (back, first), (on, last) = ways
     found = [*back[:0:-1], *on]
     values = np.array([value for value, _, _ in found])

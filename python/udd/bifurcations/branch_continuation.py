@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import ModelError
 from udd.models import Model, beyond_the_edge
@@ -28,16 +29,17 @@ from .solutions import Equilibrium, PeriodicOrbit
 __all__ = ["bounds_of", "branch_from", "continuation"]
 
 
+@renamed(step="ds", longest="ds_max", most="max_points", period="max_period")
 def continuation(
     start: Equilibrium | PeriodicOrbit | BifurcationPoint,
     parameter: str | None = None,
     bounds: Sequence[float] = (0.0, np.inf),
     *,
     direction: Literal["both", "up", "down"] = "both",
-    step: float = 0.02,
-    longest: float = 0.1,
-    most: int = 2000,
-    period: float | None = None,
+    ds: float = 0.02,
+    ds_max: float = 0.1,
+    max_points: int = 2000,
+    max_period: float | None = None,
     until: str | Callable[[BifurcationPoint], bool] | None = None,
     amplitude: float = 0.01,
 ) -> Branch:
@@ -57,12 +59,12 @@ def continuation(
         The branch ends where the parameter leaves them.
     direction : {"both", "up", "down"}
         Whether the parameter rises or falls from the start on, or the branch is followed both ways.
-    step, longest : float
+    ds, ds_max : float
         The first and the longest step, in arclength: states count in typical sizes, the parameter in units
         of its value at the start.
-    most : int
+    max_points : int
         Points at most, in either direction.
-    period : float, optional
+    max_period : float, optional
         A branch of cycles ends where the period exceeds this, by default 40 typical times, or 8
         times that of the start.
     until : str or callable, optional
@@ -123,12 +125,12 @@ def continuation(
     if direction not in ("both", "up", "down"):
         raise ModelError(f"direction must be both, up or down, not {direction!r}")
     low, high = bounds_of(bounds)
-    step = number("step", step, above=0.0)
-    longest = max(number("longest", longest, above=0.0), step)
+    ds = number("ds", ds, above=0.0)
+    ds_max = max(number("ds_max", ds_max, above=0.0), ds)
     if isinstance(start, BifurcationPoint):
         size = number("amplitude", amplitude, above=0.0)
         curve, place, off = born_at(start, size)
-        step *= min(1.0, off / size)
+        ds *= min(1.0, off / size)
         model = start.solution.model
     else:
         model = start.model
@@ -140,9 +142,9 @@ def continuation(
         )
     own = curve.span(place.u) if isinstance(curve, PeriodicOrbitCurve) else 0.0
     limit = max(40.0 * curve.flow.clock, 8.0 * own)
-    limit = limit if period is None else number("period", period, above=0.0)
+    limit = limit if max_period is None else number("max_period", max_period, above=0.0)
     wanted = _wanted(until)
-    limits = ContinuationLimits(low, high, step, longest, whole("most", most, 1), limit, wanted)
+    limits = ContinuationLimits(low, high, ds, ds_max, whole("max_points", max_points, 1), limit, wanted)
     if isinstance(start, BifurcationPoint):
         return branch_from([follow_branch(curve, place, limits)], model, parameter, f"born at a {start.kind}")
     up = place if place.tangent[-1] >= 0 else CurvePoint(place.u, -place.tangent)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.keywords import renamed
 from udd.attractors.arguments import parameter_values
 from udd.attractors.bifurcation_diagram import bifurcation
 from udd.errors import ModelError
@@ -76,14 +77,15 @@ class Diagram:
         )
 
 
+@renamed(most="max_points", period="max_period")
 def diagram(
     model: Model,
     parameter: str,
     values: ArrayLike,
     *,
     generations: int = 2,
-    most: int = 400,
-    period: float | None = None,
+    max_points: int = 400,
+    max_period: float | None = None,
     **options: Any,
 ) -> Diagram:
     """The bifurcation diagram with what lies behind it.
@@ -99,12 +101,12 @@ def diagram(
         between the first and the last.
     generations : int
         How often branches born at bifurcation points are followed in turn.
-    most : int
+    max_points : int
         Points at most on each branch, in either direction.
-    period : float, optional
+    max_period : float, optional
         As in :func:`udd.continuation`.
     **options
-        As in :func:`udd.bifurcation`: `n`, `transient`, `section`, `starts`, ...
+        As in :func:`udd.bifurcation`: `n`, `transient`, `section`, `initial_states`, ...
 
     Returns
     -------
@@ -132,17 +134,19 @@ def diagram(
         raise ModelError("a diagram needs at least two values")
     scan = bifurcation(model, parameter, axis, path="both", **options)
     bounds = (float(axis[0]), float(axis[-1]))
-    limits: dict[str, Any] = {"bounds": bounds, "most": most, "period": period}
+    limits: dict[str, Any] = {"bounds": bounds, "max_points": max_points, "max_period": max_period}
     branches: list[Branch] = []
     for value in (axis[0], axis[len(axis) // 2], axis[-1]):
         for rest in equilibria(model.with_parameters({parameter: float(value)})):
             if not any(_has(branch, rest, float(value)) for branch in branches):
-                branches.append(continuation(rest, parameter, bounds, most=most, longest=_steps(axis)))
+                branches.append(
+                    continuation(rest, parameter, bounds, max_points=max_points, ds_max=_steps(axis))
+                )
     cycles: list[Branch] = []
     for orbit, value in _seeds(model, parameter, scan):
         if not any(_has(branch, orbit, value) for branch in cycles):
-            cycles.append(continuation(orbit, parameter, longest=_steps(axis), **limits))
-    grown = descendants([*branches, *cycles], generations, longest=_steps(axis), **limits)
+            cycles.append(continuation(orbit, parameter, ds_max=_steps(axis), **limits))
+    grown = descendants([*branches, *cycles], generations, ds_max=_steps(axis), **limits)
     rests = [branch for branch in grown if branch.kind == "equilibrium"]
     return Diagram(model, parameter, scan, (*rests, *(branch for branch in grown if branch.kind == "cycle")))
 

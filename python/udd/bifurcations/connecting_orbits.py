@@ -134,7 +134,7 @@ def connection(branch: Branch) -> Connection:
     >>> import udd
     >>> rest = udd.equilibria(udd.DLE(2.5, B=0.2))[0]
     >>> hopf = udd.continuation(rest, "w", (1.0, 9.0)).points[0]
-    >>> found = udd.connection(udd.continuation(hopf, period=16.0))
+    >>> found = udd.connection(udd.continuation(hopf, max_period=16.0))
     >>> print(found.kind, round(found.value, 8), found.wild)
     homoclinic 4.25994905 False
     """

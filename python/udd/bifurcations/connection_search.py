@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
 from udd.models import Model, beyond_the_edge
@@ -92,13 +93,14 @@ class Connections(list[Connection]):
         return f"<{super().__repr__()}; {self.search}>"
 
 
+@renamed(longest="t_max")
 def connections(
     model: Model,
     parameter: str,
     bounds: Sequence[float],
     *,
     n: int = 300,
-    longest: float | None = None,
+    t_max: float | None = None,
 ) -> Connections:
     """The homoclinic and heteroclinic orbits of an interval of a parameter.
 
@@ -111,7 +113,7 @@ def connections(
         Of the parameter, both finite.
     n : int
         At so many values, equally far apart, the manifolds are compared at first.
-    longest : float, optional
+    t_max : float, optional
         Connections are looked for that come near the equilibrium at their end within this time after they
         have left the one at their beginning, by default 10 typical times.
 
@@ -138,7 +140,7 @@ def connections(
     Examples
     --------
     >>> import udd
-    >>> found = udd.connections(udd.DLE(4.0, B=0.2), "w", (4.0, 4.5), n=20, longest=10.0)
+    >>> found = udd.connections(udd.DLE(4.0, B=0.2), "w", (4.0, 4.5), n=20, t_max=10.0)
     >>> [(one.kind, round(one.value, 8)) for one in found]
     [('homoclinic', 4.25994905)]
     """
@@ -150,7 +152,7 @@ def connections(
     there = equilibria(start)
     flow = flow_of(start, _extent(start, [rest.state for rest in there]))
     index = flow.index(parameter)
-    span = number("longest", 10.0 * flow.clock if longest is None else longest, above=0.0)
+    span = number("t_max", 10.0 * flow.clock if t_max is None else t_max, above=0.0)
     rests = [flow.reduced(rest.state) for rest in there]
     found: list[Connection] = []
     followed, whole_search = 0, True

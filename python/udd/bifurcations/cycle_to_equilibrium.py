@@ -102,7 +102,7 @@ def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleCon
     >>> rests = udd.equilibria(udd.DLE(2.5, B=0.2))
     >>> hopf = udd.continuation(rests[0], "w", (1.0, 9.0)).points[0]
     >>> saddle = next(rest for rest in rests if abs(rest.state[0]) < 1e-9)
-    >>> (one,) = udd.cycle_connections(udd.continuation(hopf, period=16.0), saddle)
+    >>> (one,) = udd.cycle_connections(udd.continuation(hopf, max_period=16.0), saddle)
     >>> print(one.kind, round(one.value, 9))
     equilibrium to cycle 3.691730046
     """

@@ -173,8 +173,8 @@ def _next(points: list[BifurcationPoint], bounds: tuple[float, float], closer: f
         points[-1],
         bounds=bounds,
         until=_KIND,
-        period=4.0 * points[-1].period,
-        step=0.01 / closer,
-        longest=0.05 / closer,
+        max_period=4.0 * points[-1].period,
+        ds=0.01 / closer,
+        ds_max=0.05 / closer,
         amplitude=0.01 / closer,
     )

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy import optimize
 from scipy.stats import qmc
 
+from udd._util.keywords import renamed
 from udd._util.validation import array, whole
 from udd.errors import ModelError
 from udd.models import Model, require_model
@@ -42,7 +43,8 @@ class Equilibria(list[Equilibrium]):
         return f"<{super().__repr__()}; {self.search}>"
 
 
-def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128) -> Equilibria:
+@renamed(starts="initial_states")
+def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: int = 128) -> Equilibria:
     """The equilibria of a model.
 
     Parameters
@@ -51,7 +53,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
         Its rates must not depend on time.
     near : array_like, shape (dim,) or (n, dim), optional
         States from which the search starts besides those that it chooses itself.
-    starts : int
+    initial_states : int
         From so many states the search starts, spread over boxes of 0.3 to 10 times the size of the motion.
 
     Returns
@@ -95,7 +97,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, starts: int = 128
         raise ModelError(f"near must be states of {dim} components, not of shape {given.shape}")
     flow = flow_of(model, given if len(given) else np.ones((1, dim)))
     guesses = [*flow.reduced(given)]
-    box = qmc.Sobol(flow.dim, seed=3).random(max(whole("starts", starts, 1), len(_REACHES)))
+    box = qmc.Sobol(flow.dim, seed=3).random(max(whole("initial_states", initial_states, 1), len(_REACHES)))
     for k, reach in enumerate(_REACHES):
         guesses += [*((2.0 * box[k :: len(_REACHES)] - 1.0) * reach * flow.size)]
     found: list[Floats] = []

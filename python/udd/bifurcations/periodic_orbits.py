@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.keywords import renamed
 from udd._util.validation import array, number
 from udd.errors import IntegrationError, ModelError
 from udd.models import Model, beyond_the_edge, require_model
@@ -42,13 +43,14 @@ _FAMILY = 400  # unknowns up to which singular values are asked for
 _RESIDUAL = 1e-9  # gaps that are as good as none
 
 
+@renamed(longest="max_period")
 def periodic_orbit(
     model: Model,
     guess: ArrayLike | xr.Dataset | None = None,
     *,
     period: float | str | None = None,
     settle: float | None = None,
-    longest: float | None = None,
+    max_period: float | None = None,
 ) -> PeriodicOrbit:
     """A cycle of a model, with its Floquet multipliers and its symmetry.
 
@@ -71,7 +73,7 @@ def periodic_orbit(
         For so long the model is run from the guess before, to get near a stable cycle; by default 0, or 600
         typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess. Of a forced model:
         for as many whole periods as this takes; the guess is a state at time 0.
-    longest : float, optional
+    max_period : float, optional
         The longest period looked for, by default 40 typical times.
 
     Returns
@@ -146,7 +148,7 @@ def periodic_orbit(
     start = given.reshape(dim)
     if aside > 0.0:
         start = simulate(free, [0.0, aside], start, method="auto").state[-1]
-    limit = number("longest", 40.0 * flow.clock if longest is None else longest, above=0.0)
+    limit = number("max_period", 40.0 * flow.clock if max_period is None else max_period, above=0.0)
     mirrored = False
     if forcing is None:
         span, mirrored = _return_time(flow, free, start, limit)

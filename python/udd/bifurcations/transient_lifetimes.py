@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from udd._util.keywords import renamed
 from udd._util.validation import array, number
 from udd.errors import ModelError
 from udd.models import Model, beyond_the_edge, require_model
@@ -67,12 +68,13 @@ class Lifetimes:
         )
 
 
+@renamed(longest="t_max")
 def lifetimes(
     model: Model,
     starts: ArrayLike,
     attractors: Equilibrium | PeriodicOrbit | Sequence[Equilibrium | PeriodicOrbit],
     *,
-    longest: float,
+    t_max: float,
     after: float | None = None,
     near: float = 0.02,
     threads: int | None = None,
@@ -88,7 +90,7 @@ def lifetimes(
     attractors : Equilibrium, PeriodicOrbit or a sequence of them
         Stable ones, from :func:`udd.equilibria` and :func:`udd.periodic_orbit`; their mirror images count
         too.
-    longest : float
+    t_max : float
         Runs that last longer are left off.
     after : float, optional
         The time in which the starts are forgotten, by default 20 typical times: what settles before is left
@@ -116,7 +118,7 @@ def lifetimes(
     >>> model = udd.DLE(3.4, B=0.2)
     >>> rotation = [rest for rest in udd.equilibria(model) if rest.stable]
     >>> starts = np.random.default_rng(1).normal(size=(64, 3)) + [0, 1, -3]
-    >>> found = udd.lifetimes(model, starts, rotation, longest=2000.0)
+    >>> found = udd.lifetimes(model, starts, rotation, t_max=2000.0)
     >>> bool(found.settled.mean() > 0.0)
     True
     """
@@ -131,7 +133,7 @@ def lifetimes(
     if not listed:
         raise ModelError("at least one attractor is needed")
     tree = cKDTree(np.vstack([_points(flow, one) for one in listed]))
-    end = number("longest", longest, above=0.0)
+    end = number("t_max", t_max, above=0.0)
     begin = number("after", 20.0 * flow.clock if after is None else after, least=0.0)
     radius = number("near", near, above=0.0)
     time, settled = np.full(len(given), end), np.zeros(len(given), dtype=bool)

@@ -6,19 +6,20 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.keywords import with_defaults
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
 from udd._util.validation import number, whole
 from udd.errors import IncompleteWarning, ModelError, interrupted
 from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
-from udd.simulation.batch import Batch
+from udd.simulation.batch import RUN_OPTIONS, Batch, RunOptions
 from udd.simulation.outcomes import OUTCOMES
 from udd.simulation.trajectory import tolerances
 
@@ -230,11 +231,7 @@ def poincare(
     direction: str | Sequence[str] | None = None,
     transient: int = 100,
     t_max: float | None = None,
-    rtol: float = 1e-9,
-    atol: float = 1e-12,
-    threads: int | None = None,
-    progress: bool | None = None,
-    partial: bool = False,
+    **options: Unpack[RunOptions],
 ) -> Section:
     """Crossings of a surface along orbits: a Poincaré section.
 
@@ -265,14 +262,11 @@ def poincare(
     t_max : float, optional
         The time at which an orbit ends in any case; by default 100 typical times of the motion for every
         crossing.
-    rtol, atol : float
-        Tolerances of the run.
-    threads : int, optional
-        By default one per core. The result does not depend on it.
-    progress : bool, optional
-        Whether to show a progress bar; by default for many orbits in a terminal.
-    partial : bool
-        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+    **options
+        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the run; ``threads`` (by default one per core;
+        the result does not depend on it); ``progress``, whether to show a progress bar (by default for many
+        orbits in a terminal); ``partial``, after Ctrl-C to return what there is, with a warning, instead of
+        raising it with the exception.
 
     Returns
     -------
@@ -312,15 +306,16 @@ def poincare(
     require_model(model)
     surfaces, ways = surfaces_of(model, section, direction)
     count, skipped = whole("n", n, 1), whole("transient", transient, 0)
-    rtol, atol = tolerances(rtol, atol)
+    chosen = with_defaults("poincare", RUN_OPTIONS, options)
+    rtol, atol = tolerances(chosen["rtol"], chosen["atol"])
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     if t_max is None:
         end = CLOCKS * clock_of(model, rows) * (count + skipped)
     else:
         end = number("t_max", t_max, above=0.0)
     jobs = max(len(rows), len(starts))
-    with progress_bar(jobs, "orbit", progress) as since:
-        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), since(0))
+    with progress_bar(jobs, "orbit", chosen["progress"]) as since:
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), since(0))
         found = _core.sections(batch, list(zip(surfaces, ways, strict=True)), skipped, count, end)
     names = np.array(OUTCOMES)[found["outcome"]]
     numbers = found["found"].astype(np.int64)
@@ -356,7 +351,7 @@ def poincare(
             found["t_end"].reshape(shape),
             model,
         )
-    _tell(found["outcome"], numbers, count, made, partial)
+    _tell(found["outcome"], numbers, count, made, chosen["partial"])
     return made
 
 

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> CommandResult:
             model,
             args.parameter,
             values,
-            starts=starts_of(args),
+            initial_states=starts_of(args),
             path=args.path,
             progress=is_terminal(),
             **runs_of(args),

@@ -107,7 +107,7 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
                 f"{error} (a cycle at {args.parameter} = {model.parameters[args.parameter]:g} is wanted: "
                 "try another --at, or say --state and --period)"
             ) from None
-    branches = [continuation(start, args.parameter, bounds, most=args.most) for start in starts]
+    branches = [continuation(start, args.parameter, bounds, max_points=args.most) for start in starts]
 
     def missed(point: BifurcationPoint, error: ModelError) -> None:
         warnings.warn(f"{point.parameter} = {point.value:.10g}: {error}", stacklevel=2)
@@ -119,7 +119,7 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
             begun=lambda point: tell(f"following what is born at {point.parameter} = {point.value:.10g}"),
             missed=missed,
             bounds=bounds,
-            most=args.most,
+            max_points=args.most,
         )
 
 

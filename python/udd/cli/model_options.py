@@ -80,7 +80,7 @@ def runs_of(args: argparse.Namespace) -> dict[str, Any]:
         check_count(name, getattr(args, name), least)
     names = {"section": "section", "direction": "direction", "points": "n", "transient": "transient"}
     options = {own: getattr(args, name) for name, own in names.items()}
-    extend = {} if args.extend is None else {"extend": args.extend}
+    extend = {} if args.extend is None else {"max_extension": args.extend}
     return {**options, **extend, "rtol": args.rtol, "atol": args.atol}
 
 

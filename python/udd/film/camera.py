@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,17 +57,31 @@ class Camera:
         )
 
 
-def make_camera(
-    radius: float,
-    *,
-    size: Sequence[int],
-    fps: float,
-    exposure: float,
-    scale: float | None,
-    pivot: Sequence[float] | None,
-    tilt: float,
-) -> Camera:
-    """Check what the user gave; the rest is the paper's camera, fitted to `size` and the radius in m."""
+class CameraOptions(TypedDict, total=False):
+    """The camera of a film, see :func:`udd.render`."""
+
+    fps: float
+    exposure: float
+    size: Sequence[int]
+    scale: float | None
+    pivot: Sequence[float] | None
+    tilt: float
+
+
+CAMERA_OPTIONS: CameraOptions = {
+    "fps": 25.0,
+    "exposure": 0.010,
+    "size": (550, 700),
+    "scale": None,
+    "pivot": None,
+    "tilt": 0.0,
+}
+
+
+def make_camera(radius: float, options: CameraOptions) -> Camera:
+    """Check what the user gave; the rest is the paper's camera, fitted to its `size` and the radius in m."""
+    size, fps, exposure = options["size"], options["fps"], options["exposure"]
+    scale, pivot, tilt = options["scale"], options["pivot"], options["tilt"]
     numbers = np.asarray(size)
     if numbers.shape != (2,) or not all(
         float(v) == int(v) and 64 <= v <= 8192 and v % 2 == 0 for v in numbers

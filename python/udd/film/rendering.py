@@ -7,16 +7,17 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.keywords import with_defaults
 from udd.errors import UddError
 from udd.measurement import Measurement
 from udd.video.writer import CODECS, checked_path, require_video, write_film
 
-from .camera import Camera, make_camera
+from .camera import CAMERA_OPTIONS, Camera, CameraOptions, make_camera
 from .defects import Defects, hung
 from .exposure import Scene
 from .light import Noise, Picture, to_light
@@ -72,12 +73,6 @@ def render(
     trajectory: TrajectoryLike,
     path: str | os.PathLike[str],
     *,
-    fps: float = 25.0,
-    exposure: float = 0.010,
-    size: Sequence[int] = (550, 700),
-    scale: float | None = None,
-    pivot: Sequence[float] | None = None,
-    tilt: float = 0.0,
     support: float = 1.0,
     background: ArrayLike | None = None,
     noise: float = 2.0,
@@ -87,6 +82,7 @@ def render(
     layout: Sequence[Mapping[str, Any]] | None = None,
     seed: int = 0,
     progress: bool = False,
+    **camera: Unpack[CameraOptions],
 ) -> Film:
     """Film a simulated run: what a camera before the device would see.
 
@@ -105,19 +101,6 @@ def render(
         model's rates where the trajectory has a model); samples too far apart for a cubic are refused.
     path : path-like
         File to write, ``.mp4`` or ``.mov``. An older film is replaced once the new one is complete.
-    fps : float
-        Frames per second.
-    exposure : float
-        Time in s for which the shutter is open, at most ``1 / fps``.
-    size : (int, int)
-        Width and height of the picture in pixels, both even.
-    scale : float, optional
-        Pixels per metre; by default 1750 for R = 0.08 m and the paper's 550 x 700 pixels, and in proportion.
-    pivot : (float, float), optional
-        Pixel (x, y) of the point where the wheels hold the disk, by default (275, 330) of 550 x 700. The
-        centre of the top left pixel is (0, 0).
-    tilt : float
-        Angle in rad by which the camera shows everything turned clockwise.
     support : float
         Width of the black support relative to the real one (26 mm for R = 0.08 m); 0 films the disk alone.
     background : array_like, optional
@@ -140,6 +123,13 @@ def render(
         Seed of the noise. The same call gives the same film.
     progress : bool
         Show a progress bar.
+    **camera
+        ``fps`` (25), frames per second; ``exposure`` (0.010), the time in s for which the shutter is open,
+        at most ``1 / fps``; ``size`` ((550, 700)), width and height of the picture in pixels, both even;
+        ``scale``, pixels per metre, by default 1750 for R = 0.08 m and the paper's 550 x 700 pixels, and in
+        proportion; ``pivot``, the pixel (x, y) of the point where the wheels hold the disk, by default
+        (275, 330) of 550 x 700, where the centre of the top left pixel is (0, 0); ``tilt`` (0), the angle
+        in rad by which the camera shows everything turned clockwise.
 
     Returns
     -------
@@ -167,7 +157,7 @@ def render(
     t, _ = checked(trajectory)
     radius = float(getattr(getattr(trajectory, "model", None), "R", 0.08))
     defects = Defects() if defects is None else defects
-    camera = make_camera(radius, size=size, fps=fps, exposure=exposure, scale=scale, pivot=pivot, tilt=tilt)
+    view = make_camera(radius, with_defaults("render", CAMERA_OPTIONS, camera))
     _check_rest(support, noise, quality, seed)
     if codec not in CODECS:
         raise UddError(f"codec must be one of {', '.join(CODECS)}, got {codec!r}")
@@ -176,24 +166,24 @@ def render(
     motion = motion_of(trajectory)
     if defects.after:
         motion = then_falling(motion, float(t[-1]))
-    error = spacing_error(trajectory, radius) * camera.scale
+    error = spacing_error(trajectory, radius) * view.scale
     if error > _COARSE:
         raise UddError(
             "the trajectory's samples are too far apart to film: "
             f"a mark would be off by about {error:.2g} pixels; "
             "simulate more times (200 per second are plenty) or with dense=True"
         )
-    stamps = frame_times(t, camera, defects.after)
+    stamps = frame_times(t, view, defects.after)
     numbers = np.setdiff1d(np.arange(len(stamps)), np.asarray(defects.dropped, dtype=int))
-    wall = _background(background, camera, radius)
+    wall = _background(background, view, radius)
     if defects.clutter:
-        wall = hung(wall, camera, defects.clutter, radius / 0.08)
-    scene = Scene(camera, radius, wall, support, defects, _patches(layout, radius))
+        wall = hung(wall, view, defects.clutter, radius / 0.08)
+    scene = Scene(view, radius, wall, support, defects, _patches(layout, radius))
     write_film(
         target,
         _frames(scene, motion, t[0] + stamps, numbers, defects, Noise(noise, seed), progress),
-        camera.size,
-        camera.rate,
+        view.size,
+        view.rate,
         quality,
         codec,
         numbers.tolist(),
@@ -201,7 +191,7 @@ def render(
     times = stamps[numbers]
     held = times + t[0] <= t[-1]
     state = motion(t[0] + times)
-    return Film(target, times, state, held, camera.size, camera.scale, camera.pivot, radius)
+    return Film(target, times, state, held, view.size, view.scale, view.pivot, radius)
 
 
 def frame_times(t: Array, camera: Camera, after: float = 0.0) -> Array:

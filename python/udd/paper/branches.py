@@ -40,6 +40,6 @@ def hopf(branch: Branch) -> BifurcationPoint | None:
 
 
 def _branch(model: DLE | Disk, near: list[float], parameter: str, low: float, high: float) -> Branch:
-    rests = equilibria(model, near=near, starts=2)
+    rests = equilibria(model, near=near, initial_states=2)
     rotating = max(rests, key=lambda rest: float(rest.state[0]))
-    return continuation(rotating, parameter, (low, high), longest=0.05)
+    return continuation(rotating, parameter, (low, high), ds_max=0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +37,28 @@ class Batch:
     atol: float
     threads: int = 1
     progress: Callable[[int], object] | None = None
+
+
+class RunOptions(TypedDict, total=False):
+    """Keyword arguments of all functions that run many orbits.
+
+    Attributes
+    ----------
+    rtol, atol : float
+        Tolerances of the runs.
+    threads : int, optional
+        By default one per core. No result depends on it.
+    progress : bool, optional
+        Whether to show a progress bar on stderr; by default where that is a terminal.
+    partial : bool
+        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+    """
+
+    rtol: float
+    atol: float
+    threads: int | None
+    progress: bool | None
+    partial: bool
+
+
+RUN_OPTIONS: RunOptions = {"rtol": 1e-9, "atol": 1e-12, "threads": None, "progress": None, "partial": False}

@@ -1,0 +1,51 @@
+"""Keyword arguments: the names that they had before, and those that several functions share."""
+
+from __future__ import annotations
+
+import warnings
+
+import pytest
+
+import udd
+from udd._util.keywords import renamed
+
+RUN = udd.simulate(udd.Disk(0.04), 1.0, [0.0, 1e-3, 0.04, 0.0])
+
+
+def test_a_name_of_before_works_with_a_warning() -> None:
+    rest = udd.equilibria(udd.DLE(2.5, B=0.2), initial_states=8)[0]
+    now = udd.continuation(rest, "w", (1.0, 9.0), ds=0.05, max_points=30)
+    with pytest.warns(DeprecationWarning, match="called ds= now") as told:
+        before = udd.continuation(rest, "w", (1.0, 9.0), step=0.05, max_points=30)  # type: ignore[call-arg]
+    assert told[0].filename == __file__
+    assert before.values.tolist() == now.values.tolist()
+
+
+def test_both_names_at_once_are_refused() -> None:
+    @renamed(old="new")
+    def doubled(*, new: int) -> int:
+        return 2 * new
+
+    with pytest.raises(TypeError, match="both 'new' and 'old'"):
+        doubled(new=1, old=2)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: udd.poincare(udd.DLE(1.0), n=1, tol=1e-9),  # type: ignore[call-arg]
+        lambda: udd.basins(udd.DLE(4.5), {"y": [0.1]}, tol=1e-9),  # type: ignore[call-arg]
+        lambda: udd.bifurcation(udd.DLE(1.0), "w", [1.0], tol=1e-9),  # type: ignore[call-arg]
+        lambda: udd.render(RUN, "a.mp4", zoom=2.0),  # type: ignore[call-arg]
+    ],
+)
+def test_an_option_that_there_is_not_is_named(call: object) -> None:
+    with pytest.raises(TypeError, match=r"unexpected keyword argument '(tol|zoom)'"):
+        call()  # type: ignore[operator]
+
+
+def test_a_partial_result_is_warned_of_where_the_package_was_called() -> None:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        udd.errors.interrupted(None, "half is missing", partial=True)
+    assert told[0].filename == __file__
