@@ -52,7 +52,7 @@ def write(
     if target.is_dir():
         raise UddError(f"{target} is a folder, not a page to write to")
     origin = film if source is None else source
-    of_own = discovery.fit.model.kind == "own"
+    of_own = discovery.fit.model.profile.written
     if of_own and film is not None:
         raise UddError("a film shows a disk, not a model of your own")
     fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from udd import _core
+from udd.fitting.parameter_meanings import meaning
 from udd.plot.whiteness import shown_lags
 
 from . import wording
@@ -96,9 +97,7 @@ def _shown(unit: str) -> tuple[str, float]:
 def _meaning(name: str, discovery: Any) -> str:
     effect, dot, parameter = name.partition(".")
     if not dot:
-        if name == "k0" and discovery.measurement.kind == "pendulum":
-            return "viscous friction"
-        return wording.MEANINGS.get(name, name)
+        return meaning(name, discovery.measurement.kind) or name
     found = next((f for f in discovery.effects if f.effect.name == effect), None)
     return f"{found.title if found else effect}: {wording.pretty(parameter)}"
 
@@ -123,13 +122,7 @@ def measured(discovery: Any) -> Markup:
         for name, own in zip(m.names, sd.T, strict=True)
     ]
     noise = ", ".join(each[:-1]) + (" and " if len(each) > 1 else "") + each[-1]
-    if m.kind == "disk":
-        what = (
-            f"The centre and the orientation of a disk of radius {100 * model.R:g}\u00a0cm that two wheels "
-            f"lift at {100 * discovery.baseline.problem.models[0].W:.3g}\u00a0cm/s (as stated)"
-        )
-    else:
-        what = f"The angle of a pendulum of {100 * discovery.baseline.problem.models[0].length:.4g}\u00a0cm"
+    what = model.profile.shown.measured(model, discovery.baseline.problem.models[0])
     if several > 1:
         what = f"{several} records, fitted together; the pictures of the motion show the first. {what}"
     return Markup(

@@ -14,6 +14,7 @@ import numpy as np
 
 from udd._util.atomic_files import write_whole
 from udd.errors import UddError
+from udd.models import profile_of
 from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
 
 from . import wording
@@ -49,7 +50,7 @@ def write_tracked(
     m: Measurement = found.measurement if isinstance(found, Tracking) else found
     if "calibration" not in m.meta or not m.quality:
         raise UddError("the measurement was not tracked in a film, so there is no page about it")
-    checked = health(m) if m.kind == "disk" else None
+    checked = health(m) if profile_of(m.kind).sensor.sees_marks else None
     udd_version, all_versions = versions()
     page = template("tracked.html").render(
         m=m,
@@ -79,7 +80,7 @@ def headline(m: Measurement) -> str:
     """The whole result in one sentence."""
     usable = int(m.seen.sum())
     share = "Every frame" if usable == len(m) else f"{usable} of {len(m)} frames"
-    what = "the disk" if m.kind == "disk" else "the pendulum"
+    what = f"the {profile_of(m.kind).shown.noun}"
     gone = int(sum(str(f).startswith("gone") for f in m.flag))
     rest = f"; it leaves the wheels, and nothing is said of the last {gone} frames" if gone else ""
     return f"{share} of this film {'says' if usable == len(m) else 'say'} where {what} is{rest}"
@@ -93,10 +94,10 @@ def numbers(m: Measurement, checked: Any) -> list[tuple[str, str, str]]:
             unit = "rad" if name in ("beta", "theta") else "m"
             spread = wording.length(float(np.nanmedian(m.sigma[:, k])), unit)
             out.append((f"standard error of {wording.pretty(name)}, typical", spread, ""))
-    if m.kind == "disk":
-        value, sigma, _ = m.meta["calibration"]["W"]
+    if drive := profile_of(m.kind).dynamics.drive:
+        value, sigma, _ = m.meta["calibration"][drive]
         said = "–" if value is None else f"{100 * value:.4g} cm/s"
-        out.append(("drive W, as it is seen", said, "" if not sigma else f"± {100 * sigma:.1g} cm/s"))
+        out.append((f"drive {drive}, as it is seen", said, "" if not sigma else f"± {100 * sigma:.1g} cm/s"))
     if checked is not None:
         noise = f"noise alone: {wording.length(checked.noise, 'm')}"
         out.append(("left of the rolling constraint", wording.length(checked.rms, "m"), noise))
