@@ -1,4 +1,4 @@
-"""What is known of each model beside its equations; a new model is asked the same without another line here."""
+"""What is known of each model beside its equations; a new model is asked the same without another line."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def start_of(data: Any) -> Start:
 
 def model_of(data: Any) -> Model:
     """A disk or the DLE from JSON, with effects of the library."""
-    if isinstance(data, dict) and data.get("kind") not in PAGE_MODELS:
+    if isinstance(data, dict) and data.get("kind") not in tuple(PAGE_MODELS):  # also what is not hashable
         raise ModelError(f"the page shows a disk or the dle, not {data.get('kind')!r}")
     return model_from_dict(data)
 
