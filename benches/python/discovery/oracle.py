@@ -13,10 +13,11 @@ from laws import LIBRARY
 from units import TRAIN
 
 import udd
-from udd.discovery.validation.held_out_errors import _FILTER, HORIZONS, _windows, held_out_errors
+from udd.discovery.validation.held_out_errors import _windows, held_out_errors
 from udd.errors import ModelError
 from udd.fitting import fit_record, record_of
 
+DISK = udd.Disk.profile.discovery
 _SMALL = np.array([1e-4, 1e-7, 1e-7, 1e-6])
 _HUBER = 2.5
 
@@ -50,7 +51,7 @@ def _by_udd(drawn: Record) -> dict[float, float]:
 def own(drawn: Record) -> dict[float, float]:
     """The true flow from starts fitted to the same windows; nothing of udd but the choice of frames."""
     record = record_of(drawn.measurement)
-    windows, ends, horizons = _windows(record, ~record.first(TRAIN), HORIZONS["disk"], _FILTER["disk"])
+    windows, ends, horizons = _windows(record, ~record.first(TRAIN), DISK.horizons, DISK.filter_window)
     t = record.t * (1 + drawn.camera.clock)
     seen, there = record.seen, record.observed.all(axis=1)
     frames = windows[:, :1] + np.arange(windows[0, 1] - windows[0, 0] + 1)

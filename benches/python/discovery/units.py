@@ -10,17 +10,17 @@ import udd
 from udd.discovery.discover import TRAIN
 from udd.discovery.scoring.candidates import library, ripples
 from udd.discovery.thresholds import ALPHA
-from udd.fitting.parameters import CAMERA, CLOCK
-from udd.fitting.parameters import DISK as SPREAD
-from udd.fitting.problem import SEARCHED, levels
+from udd.fitting.problem import levels
 
 __all__ = ["TRAIN", "assumed", "threshold"]
 
 
 def assumed(model: udd.Disk) -> Assumed:
     """What a search assumes of the model at its tightest."""
-    device = {name: SPREAD[name] * model.parameters[name] for name in DEVICE}
-    return Assumed(levels("disk")[SEARCHED["disk"] - 1], {**device, "clock": CLOCK}, dict(CAMERA["disk"]))
+    fit, sensor = model.profile.fit, model.profile.sensor
+    device = {name: fit.priors[name] * model.parameters[name] for name in DEVICE}
+    level = levels(model.kind)[: fit.searched][-1]
+    return Assumed(level, {**device, "clock": sensor.clock}, dict(sensor.camera))
 
 
 def threshold(model: udd.Disk, t: np.ndarray, amplitudes: int) -> float:

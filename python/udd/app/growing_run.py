@@ -8,23 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import ModelError
-from udd.models import DLE, Disk, Model
+from udd.models import Model
 from udd.simulation.energy import EnergyBalance, angular_momentum, energy_balance
 from udd.simulation.trajectory import Trajectory, integrated
 
 from . import limits
+from .page_models import page_model
 from .spec import Start, key_of
 
 Array = NDArray[np.float64]
 
 RATE = 240  # states per second that passes on the page
 _FIRST = 4.0  # s of the first call
-_SCALE = Disk(0.0)  # the constants in which the DLE is shown: the paper's
 
 
 def clock_of(model: Model) -> float:
     """How much of the model's time passes in a second."""
-    return 2.0 * _SCALE.k0 / _SCALE.R**2 if isinstance(model, DLE) else 1.0
+    return page_model(model).clock
 
 
 def per_unit(model: Model) -> float:
@@ -40,8 +40,7 @@ def times_of(model: Model, count: int) -> Array:
 
 def columns_of(model: Model) -> list[str]:
     """What is told of every time: the state, and what is drawn or plotted beside it."""
-    drawn = ["beta"] if isinstance(model, DLE) else ["J"]
-    return [*model.state_names, *drawn, "friction", "friction_work", "effects_work"]
+    return [*model.state_names, page_model(model).drawn, "friction", "friction_work", "effects_work"]
 
 
 class Run:
@@ -89,7 +88,7 @@ class Run:
 
 def _table(run: Trajectory, books: EnergyBalance, count: int) -> Array:
     work = [books.friction, books.work("friction"), books.work("effects")]
-    if isinstance(run.model, DLE):
+    if page_model(run.model).drawn == "beta":
         omega, step = run.state[:, 0], np.diff(run.t)
         turned = np.append(0.0, np.cumsum(0.5 * (omega[1:] + omega[:-1]) * step))  # to draw the mark
         beside = [turned]

@@ -14,9 +14,10 @@ from udd.attractors import bifurcation
 from udd.chaos.largest_exponent import lyapunov
 from udd.chaos.poincare_sections import poincare
 from udd.errors import ModelError
-from udd.models import DLE, Model, beyond_the_edge
+from udd.models import Model, beyond_the_edge
 
 from . import limits
+from .page_models import page_model
 from .spec import Start, drive_of
 
 Array = NDArray[np.float64]
@@ -24,13 +25,6 @@ Array = NDArray[np.float64]
 _TRANSIENT = 60  # crossings left out
 _VALUES = (90, 300)  # of the drive: a first picture, then a better one
 _KEPT = 40  # points of every orbit in a diagram
-_EXPONENT = {"dle": (1200.0, 0.03), "disk": (160.0, 0.25)}  # time of a run, and the error that is enough
-
-#: The surfaces that the page offers, and the component that its return map shows.
-SURFACES = {
-    "dle": {"zero": ("z", "y"), "maxima": ("maxima of z", "z"), "reversals": ("reversal", "z")},
-    "disk": {"zero": ("Z", "Y"), "maxima": ("maxima of Z", "Z"), "reversals": ("reversal", "Z")},
-}
 
 
 def _worker_threads() -> int:
@@ -40,7 +34,7 @@ def _worker_threads() -> int:
 
 def section(start: Start, surface: str, count: int) -> tuple[Array, str]:
     """Crossings of a surface, shape (n, dim), and how the orbit ended."""
-    known = SURFACES[start.model.kind]
+    known = page_model(start.model).surfaces
     if surface not in known:
         raise ModelError(f"no section is called {surface!r}; there are {', '.join(known)}")
     with warnings.catch_warnings():
@@ -82,7 +76,7 @@ def starts_of(start: Start) -> Array:
     mirrored = state.copy()
     mirrored[:2] *= -1.0
     third = np.zeros(len(state))
-    third[:3] = [0.1, 0.2, 1.5] if isinstance(start.model, DLE) else [3.0, 0.005, 0.0]
+    third[:3] = page_model(start.model).third
     return np.array([state, mirrored, third])
 
 
@@ -115,7 +109,7 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
 
 
 def _exponents(model: Model, name: str, values: Array) -> Exponents:
-    time, enough = _EXPONENT[model.kind]
+    time, enough = page_model(model).exponent
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the error is drawn
         value, error = lyapunov(

@@ -16,21 +16,9 @@ from udd.report.wording import pretty
 
 from . import limits
 from .growing_run import RATE, clock_of, columns_of, per_unit
-from .maps import SURFACES
+from .page_models import PLAIN, page_model
 from .result import text_of
 
-#: Least, greatest, step of a slider, and by what the SI value is multiplied for the reader in which unit.
-_RANGES: dict[str, dict[str, tuple[float, float, float, float, str]]] = {
-    "disk": {
-        "W": (0.001, 0.14, 0.0001, 100.0, "cm/s"),
-        "R": (0.04, 0.16, 0.001, 100.0, "cm"),
-        "g": (1.0, 25.0, 0.01, 1.0, "m/s²"),
-        "k0": (0.002, 0.05, 0.0001, 1.0, "m²/s"),
-        "k1": (0.002, 0.3, 0.001, 1.0, "m²/s"),
-        "k2": (0.0, 0.2, 0.001, 1.0, "m²"),
-    },
-    "dle": {"w": (0.05, 12.0, 0.001, 1.0, ""), "B": (0.0, 0.9, 0.001, 1.0, "")},
-}
 #: Amplitudes with which an effect is seen at once, about a tenth of what else acts on the disk.
 _SHOWN = {
     ("quadratic_drag", "c"): 4e-4,
@@ -90,8 +78,8 @@ def catalogue() -> dict[str, Any]:
             "points": limits.POINTS,
             "piece": limits.SAMPLES,
         },
-        "models": {"disk": _model(Disk(0.03)), "dle": _model(DLE(3.9))},
-        "effects": [_effect_as_json(spec) for spec in effects.library() if "disk" in spec.bodies],
+        "models": {model.kind: _model(model) for model in (Disk(0.03), DLE(3.9))},
+        "effects": [_effect_as_json(spec) for spec in effects.library() if Disk.kind in spec.bodies],
         "presets": [
             {"key": key, "model": model_to_dict(model), "state": state} for key, model, state in _presets()
         ],
@@ -99,14 +87,13 @@ def catalogue() -> dict[str, Any]:
 
 
 def _model(model: Model) -> dict[str, Any]:
+    page = page_model(model)
     parameters = [
         dict(zip(("name", "least", "most", "step", "scale", "unit"), (name, *numbers), strict=True))
-        for name, numbers in _RANGES[model.kind].items()
+        for name, numbers in page.ranges.items()
     ]
     for parameter in parameters:
         parameter["default"] = model.parameters[str(parameter["name"])]
-    plain = Disk(0.0)  # the constants in which the DLE is shown: the paper's
-    metres = 1.0 if isinstance(model, Disk) else 2 * plain.k0**2 / (plain.g * plain.R**2)
     return {
         "parameters": parameters,
         "states": list(model.state_names),
@@ -114,8 +101,8 @@ def _model(model: Model) -> dict[str, Any]:
         "columns": columns_of(model),
         "clock": clock_of(model),
         "per_unit": per_unit(model),
-        "radius": plain.R / metres,
-        "surfaces": {key: component for key, (_, component) in SURFACES[model.kind].items()},
+        "radius": PLAIN.R / page.metres,
+        "surfaces": {key: component for key, (_, component) in page.surfaces.items()},
     }
 
 

@@ -22,6 +22,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from udd.errors import UddError
+from udd.models import Disk
 
 from . import limits, uploads
 from .error_text import sentence
@@ -119,7 +120,7 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
     if kind == "render":
         start = from_json("the run", await uploads.text(request.stream()))
         seconds = _number(request, "seconds") or 0.0
-        if start_of(start).model.kind != "disk":
+        if not isinstance(start_of(start).model, Disk):
             raise UddError("Only a run of the disk can be filmed.")
         if not 0.5 <= seconds <= limits.RENDERED:
             raise UddError(f"A film lasts from 0.5 to {limits.RENDERED:g} s.")

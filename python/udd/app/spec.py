@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from udd.errors import ModelError
-from udd.models import DLE, Model
+from udd.models import Model
 from udd.models.serialization import model_from_dict
 from udd.simulation.trajectory import initial_state
+
+from .page_models import PAGE_MODELS
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ def start_of(data: Any) -> Start:
 
 def model_of(data: Any) -> Model:
     """A disk or the DLE from JSON, with effects of the library."""
-    if isinstance(data, dict) and data.get("kind") not in ("disk", "dle"):
+    if isinstance(data, dict) and data.get("kind") not in tuple(PAGE_MODELS):  # also what is not hashable
         raise ModelError(f"the page shows a disk or the dle, not {data.get('kind')!r}")
     return model_from_dict(data)
 
@@ -49,7 +51,9 @@ def key_of(start: Start) -> str:
 
 def drive_of(model: Model) -> str:
     """The name of the drive among the parameters."""
-    return "w" if isinstance(model, DLE) else "W"
+    drive = model.profile.dynamics.drive
+    assert drive is not None  # of the models that the page shows
+    return drive
 
 
 def from_json(what: str, text: str) -> Any:

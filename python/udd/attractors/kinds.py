@@ -75,8 +75,10 @@ def kinds_of(
 def _turns(judge: MotionClassifier, state: Floats, value: float) -> bool:
     """Whether a state at rest is one of rotation."""
     model, coordinates = judge.at(value), judge.coordinates
-    if model.kind == "dle":
-        turning = abs(float(state[0])) / float(coordinates.size[0])
+    rotation = model.profile.dynamics.rotation
+    if rotation is not None:
+        k = model.state_names.index(rotation)
+        turning = abs(float(state[k])) / float(coordinates.size[k])
     else:
         free = ~np.isfinite(coordinates.size)
         rates = model.rates(0.0, state)[free] * coordinates.clock

@@ -30,8 +30,6 @@ __all__ = ["Section", "poincare"]
 
 _Floats = NDArray[np.float64]
 
-_DEFAULT = {"dle": "z", "disk": "Z", "pendulum": "theta"}
-_HEIGHT = {"dle": "z", "disk": "Z", "pendulum": "theta"}
 _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 # Named surfaces of a component X: the zero of its rate, and the direction that the name implies.
 _EXTREMA = {"maxima": -1, "minima": 1, "turning points": 0}
@@ -175,7 +173,8 @@ class Section:
         ModelError
             The state has no such component, or there is no point to start from, or parameters were varied.
         """
-        name = _HEIGHT.get(self.model.kind, self.model.state_names[0]) if component is None else component
+        usual = self.model.profile.dynamics.section or self.model.state_names[0]
+        name = usual if component is None else component
         self.component(name)
         if self.t.ndim != 1:
             raise ModelError("the cusp map is that of one orbit; ask udd.poincare for the maxima of many")
@@ -360,7 +359,7 @@ def surfaces_of(
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """The expressions, and the signs of the directions in which they are crossed."""
     if section is None:
-        section = _DEFAULT.get(model.kind, f"maxima of {model.state_names[0]}")
+        section = model.profile.dynamics.section or f"maxima of {model.state_names[0]}"
     texts = [section] if isinstance(section, str) else section
     if not isinstance(texts, Sequence) or not texts or not all(isinstance(text, str) for text in texts):
         raise ModelError(f"section must be an expression such as 'z', or a list of them, not {section!r}")
@@ -396,16 +395,8 @@ def _surface(model: Model, text: str, direction: str | None) -> tuple[str, int]:
 def clock_of(model: Model, rows: _Floats) -> float:
     """A typical time between crossings, that of the slowest orbit; `rows` are the orbits' parameters."""
     p = dict(zip(model.parameters, rows.T, strict=True))
-    if model.kind == "dle":
-        # The symmetric orbit at strong drive takes 10.6 / sqrt(w).
-        rate = np.sqrt(p["w"]) / 10.0
-    elif model.kind == "disk":
-        # The same, as w = tau W/L.
-        rate = np.sqrt(p["g"] * p["W"] / (4.0 * p["k0"])) / 10.0
-    elif model.kind == "own":
-        rate = np.full(len(rows), 0.1)  # its unit of time is the user's
-    else:
-        rate = np.sqrt(p["g"] * p["length"] / p["inertia"]) / (2.0 * np.pi)
+    crossing_rate = model.profile.dynamics.crossing_rate
+    rate = np.full(len(rows), 0.1) if crossing_rate is None else crossing_rate(p)
     slowest = float(rate[np.isfinite(rate) & (rate > 0)].min(initial=1.0))
     return 1.0 / max(slowest, 1e-6)
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._util.validation import number, whole
 from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError
-from udd.models import DLE, Disk, Model, require_model
+from udd.models import DLE, Model, require_model
 from udd.models.parameter_batch import default_state
 from udd.models.state_scaling import coordinates_of
 from udd.simulation.batch import Batch
@@ -382,20 +382,8 @@ def _invariants(model: Model, exponents: _Floats, mean: _Floats, product: _Float
 
     They follow from the rates of functions of the state, which average to zero on bounded orbits.
     """
-    p = model.parameters
-    if isinstance(model, DLE):
-        w, B = p["w"], p["B"]
-        z, zz = mean[2], product[2, 2]
-        return {
-            "sum of exponents + 1 + B w": float(exponents.sum() + 1.0 + B * w),
-            "<omega y> - w (1 - B <z>)": float(product[0, 1] - w * (1.0 - B * z)),
-            "<omega^2> - <omega y>": float(product[0, 0] - product[0, 1]),
-            "<omega z>": float(product[0, 2]),
-            "<z> - B <z^2>": float(z - B * zz),
-        }
-    if isinstance(model, Disk) and not model.effects:
-        return {"<Y Omega> - W": float(product[1, 0] - p["W"]), "<Z Omega>": float(product[2, 0])}
-    return {}
+    averages = model.profile.dynamics.averages
+    return {} if averages is None else averages(model, exponents, mean, product)
 
 
 @dataclass(frozen=True, eq=False)

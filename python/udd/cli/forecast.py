@@ -75,11 +75,13 @@ def run(args: argparse.Namespace) -> CommandResult:
     return CommandResult(text, {**given.told, **found.to_dict(), "files": args.out})
 
 
+#: In which unit an error is told, and by what to multiply.
+_ERROR = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "spread": (1e2, "% of the spread")}
+
+
 def describe(found: Forecast) -> str:
     """A forecast in a few lines."""
-    factor, unit = {
-        "disk": (1e3, "mm"), "pendulum": (1e3, "mrad"), "own": (1e2, "% of the spread"),
-    }[found.fit.model.kind]  # fmt: skip
+    factor, unit = _ERROR[found.fit.model.profile.sensor.error_unit]
     within = f"{factor * found.error:.3g} {unit}"
     reach = found.t[-1] - found.start
     lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from udd.models import Model
     from udd.simulation.trajectory import Trajectory
 
-_START = {"disk": [0.0, 1e-3, 0.04, 0.0], "dle": [1.0, 1.0, 0.01], "pendulum": [0.0, 0.5]}
 _MOST = 10_000_000  # rows
 
 
@@ -98,7 +97,8 @@ def run_model(
     rows = int(length / step + 1e-9) + 1
     if rows > _MOST:
         raise UddError(f"{rows} rows are too many (at most {_MOST}): a longer --dt would do")
-    start = _START[model.kind] if args.state is None else numbers(args.state, "--state")
+    start = model.profile.shown.run_start if args.state is None else numbers(args.state, "--state")
+    assert start is not None  # of every model that the command line offers
     return integrated(model, step * np.arange(rows), start, rtol=rtol, atol=atol, dense=dense)
 
 

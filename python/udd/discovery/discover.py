@@ -32,7 +32,6 @@ from udd.fitting.diagnostics import readings
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
-from udd.measurement.table import ANGLES
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
@@ -219,7 +218,7 @@ def _thinned(
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
     one = model if isinstance(model, Model) else next(iter(model))
-    angles = one.angles if isinstance(one, FormulaModel) else ANGLES
+    angles = one.angles if isinstance(one, Model) else ()
     return [thinned(own, angles) for own in some]
 
 

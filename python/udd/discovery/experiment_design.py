@@ -20,7 +20,7 @@ from udd.fitting import Fit, Record
 from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
-from udd.models import Disk, Model, Pendulum
+from udd.models import Model
 from udd.simulation.trajectory import integrated
 
 if TYPE_CHECKING:
@@ -30,9 +30,6 @@ Array = NDArray[np.float64]
 
 #: Forms part where their fits differ by as many units of log-likelihood, as in the search.
 PARTED = 10.0
-_DRIVES = (0.5, 0.7, 1.4, 2.0)  # times the present drive
-_SWINGS = (0.5, 1.5, 2.0)  # times the present start of a pendulum
-_UPRIGHT = 2.8  # rad; a pendulum is not started farther out
 _STARTS = 6  # places of the record that a further film may start from, tried in turn
 _SHORTEST = 0.5  # of the film's length: a disk that leaves sooner makes no film
 
@@ -166,18 +163,8 @@ def _films(fit: Fit) -> Iterator[Film]:
     model, states, own = fit.models[0], fit.states, fit.record.film == 0
     ends = fit.states[own][-1:]
     places = states[own][np.linspace(0, own.sum() - 1, _STARTS).astype(int)]
-    if isinstance(model, Disk):
-        if model.W:
-            for times in _DRIVES:
-                drive = times * model.W
-                text = f"the disk again with {times:g} times the drive (W = {drive:.3g} m/s)"
-                yield Film(text, model.with_parameters({"W": drive}), places)
-        yield Film("the disk again, from another start", model, places[1:])
-    elif isinstance(model, Pendulum):
-        for times in _SWINGS:
-            start = states[own][:1] * times
-            if abs(start[0, 1]) < _UPRIGHT:
-                yield Film(f"the pendulum again, from {start[0, 1]:.2g} rad", model, start)
+    for design, parameters, start in model.profile.discovery.films(model, places):
+        yield Film(design, model.with_parameters(parameters) if parameters else model, start)
     yield Film("on for as long again", model, ends, again=True)
 
 

@@ -76,7 +76,7 @@ class AddedEffect:
         Not of a disk, which a camera sees.
         """
         over = [] if self.curve is None else [c.name for c in self.curve.coordinates]
-        return over == ["t"] and model.kind != "disk"
+        return over == ["t"] and not model.profile.sensor.sees_marks
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""

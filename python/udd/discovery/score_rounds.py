@@ -10,9 +10,9 @@ from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_curves
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
-from udd.discovery.scoring.coordinates import Coordinate
 from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
 from udd.fitting import Fit, with_larger_model_error
+from udd.models.profile import Coordinate
 
 from .thresholds import ALPHA
 from .trial_fits import price_of

@@ -353,7 +353,7 @@ class Search:
             known = max(look.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
-        if singles and (current.part.model.kind != "disk" or any(t.formula for t in singles)):
+        if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
             singles += self._pairs(current, look)
         return (
             self._accept(current, singles, look)

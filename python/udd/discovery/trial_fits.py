@@ -108,7 +108,8 @@ class TrialFit:
     def physical(self) -> bool:
         """Whether all amplitudes lie in their ranges, and a pendulum's own friction still brakes."""
         values, errors = self.fit.parameters, self.fit.errors
-        if self.fit.model.kind == "pendulum" and "k0" in values and values["k0"] < -2 * errors["k0"]:
+        brakes = [name for name in self.fit.model.profile.discovery.brakes if name in values]
+        if any(values[name] < -2 * errors[name] for name in brakes):
             return False  # two forms that take from each other what a third would do alone
         if self.curve is not None:
             return True

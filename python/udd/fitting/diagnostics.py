@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd import _core
-from udd.models.formula_model import FormulaModel
 
 from .parameters import Free
 from .sensor import is_film, lattice, moving
@@ -229,7 +228,7 @@ def _rests(fit: Fit) -> float | None:
 
 def readings(fit: Fit) -> list[Reading]:
     """The noise of each channel that was seen, and the steps that it was read in."""
-    known = {"disk": ("m", "m", "rad"), "pendulum": ("rad",)}.get(fit.model.kind)
+    known = fit.model.profile.sensor.units
     sd = fit.noise.sd(fit.record, fit.blurring)
     result = []
     for k, name in enumerate(fit.channels):
@@ -244,10 +243,7 @@ def readings(fit: Fit) -> list[Reading]:
 
 def units(fit: Fit) -> dict[str, str]:
     """The SI unit of every free parameter; a share is told in %."""
-    kind = fit.model.kind
-    known = dict(fit.model.units)
-    if kind != "own":
-        known |= dict(_core.camera_parameters(kind))
+    known = fit.model.units | dict(_core.camera_parameters(fit.model.kind))
     return {name: known.get(name.partition("[")[0], "") for name in fit.parameters}
 
 
@@ -261,12 +257,8 @@ def rate_of(state: str) -> str:
 def _missed(fit: Fit) -> list[ModelError]:
     step = float(np.median(np.diff(fit.record.t)))
     model = fit.model
-    if isinstance(model, FormulaModel):
-        names = {name: "" for name in model.state_names if name not in model.kinematic}
-        order = list(model.state_names)
-    else:
-        order = {"disk": ["Omega", "Y", "Z", "beta"], "pendulum": ["Omega", "theta"]}[model.kind]
-        names = {"Omega": "rad/s^2", "Y": "m/s", "Z": "m/s"} if model.kind == "disk" else {"Omega": "rad/s^2"}
+    order, told = list(model.state_names), model.profile.fit.equations
+    names = {name: "" for name in order if name not in model.kinematic} if told is None else told
     now, best = fit.problem.diffusion, fit.problem.schedule[-1]
     root = np.sqrt(step)
     return [

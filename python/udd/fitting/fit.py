@@ -11,7 +11,7 @@ import numpy as np
 from udd.effects import Effect
 from udd.errors import FitError
 from udd.measurement import Measurement
-from udd.models import Disk, Model, Pendulum
+from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .estimator_input import FilmParameters
@@ -19,24 +19,16 @@ from .formula_models import levels_of
 from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
-from .problem import FOLLOWS, SEARCHED, Fit, Point, Problem, levels
+from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .sensor import is_encoder
 from .solve import SolveError, solve
 from .units import ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
-#: In a search a pendulum's angle that states no error is not taken for better than this part of what is
-#: typical: frames may scatter less, but perspective bends the angle by as much.
-_FAITHFUL = 0.5
 _FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
 #: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
 UNEXPLAINED = 2.5
-#: What is free where units are compared: what is known least, and where the pivot is.
-_UNKNOWN = {"disk": ("k0", "k1", "k2"), "pendulum": ("k0",)}
-_HARDLY = {"disk": 0, "pendulum": 1}  # how tightly a model is held there, by the place in the schedule
-_PIVOT = {"disk": ("y0", "z0", "tilt"), "pendulum": ("theta0",)}
-_STATED = ("W", "length")
 _OFF = 3.0  # times the drive that was stated: more than what is missing does
 _PACE = 2.0  # times a pendulum's stated ratio of length to inertia
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
@@ -138,14 +130,15 @@ def fit_record(
     """
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
-    kind = models[0].kind
-    if camera is True and kind == "pendulum" and all(is_encoder(own) for own in measurements):
-        camera = _PIVOT[kind][:1]  # its zero, and no perspective
+    kind, profile = models[0].kind, models[0].profile
+    zero = profile.sensor.zero
+    if camera is True and zero is not None and all(is_encoder(own) for own in measurements):
+        camera = (zero,)  # and no perspective
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], FormulaModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
     else:
-        schedule = levels(kind)[: SEARCHED.get(kind) if search else None]
+        schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
     sets = tuple(
         FilmParameters(list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
@@ -169,23 +162,26 @@ def ran_away(fitted: Fit) -> bool:
     A strong effect that is missing does that: the fit then makes up for it with a clock that is off by a
     third, or with a drive a fifth of the stated.
     """
-    parts = [f for f in fitted.problem.free if f.role != "model" or f.name.partition("[")[0] in _STATED]
+    stated = fitted.model.profile.fit.stated
+    parts = [f for f in fitted.problem.free if f.role != "model" or f.name.partition("[")[0] in stated]
     return any(abs(fitted.point.value(f) - f.mean) > _FAR * f.sd for f in parts)
 
 
 def _pace_is_off(found: Model, known: Model) -> bool:
-    """Whether a pendulum swings at another pace than stated by far."""
-    if not (isinstance(found, Pendulum) and isinstance(known, Pendulum)):
+    """Whether the motion has another pace than stated by far, as a pendulum's swings may."""
+    pace = known.profile.fit.pace
+    if pace is None:
         return False
-    ratio = found.length / found.inertia * known.inertia / known.length
+    ratio = pace(found.parameters) / pace(known.parameters)
     return not 1 / _PACE < ratio < _PACE
 
 
 def _drive_is_off(measurement: Measurement, model: Model) -> bool:
     """Whether the frames alone show another drive than stated by far."""
-    if not isinstance(model, Disk) or measurement.kind != "disk" or not model.W:
+    fit, name = model.profile.fit, model.profile.dynamics.drive
+    if fit.drive_seen is None or name is None or measurement.kind != model.kind or not model.parameters[name]:
         return False
-    return not 1 / _OFF < drive_seen(measurement) / model.W < _OFF
+    return not 1 / _OFF < drive_seen(measurement) / model.parameters[name] < _OFF
 
 
 def checked_units(
@@ -215,7 +211,8 @@ def checked_units(
     free = options["free"]
     free_parameters(models, **options)  # which says what is wrong with them
     ask(measurements, models)
-    held = [name for name in _UNKNOWN.get(models[0].kind, ()) if free is None or name in free]
+    unknown = models[0].profile.fit.unknown
+    held = [name for name in unknown if free is None or name in free]
 
     def check() -> None:
         told = other_unit(measurements, models, lambda some, own: _loosest(some, own, held))
@@ -224,14 +221,13 @@ def checked_units(
 
     if any(_drive_is_off(*pair) for pair in zip(measurements, models, strict=True)):
         check()
-    known = models[0].kind in _UNKNOWN
     try:
         found = fits()
     except SolveError:
-        if known:
+        if unknown:
             check()
         raise
-    if known and any(astray(one) for one in found):
+    if unknown and any(astray(one) for one in found):
         check()
     return found
 
@@ -239,8 +235,9 @@ def checked_units(
 def _loosest(measurements: Sequence[Measurement], models: Sequence[Model], free: Sequence[str]) -> float:
     """The evidence of a model that is hardly held to, its drive and the camera as stated."""
     record = record_of(measurements, models)
-    parameters = free_parameters(models, free, _PIVOT.get(models[0].kind, ()))
-    schedule = levels(models[0].kind)[_HARDLY[models[0].kind] :][:1]
+    profile = models[0].profile
+    parameters = free_parameters(models, free, profile.sensor.pivot)
+    schedule = levels(models[0].kind)[profile.fit.hardly :][:1]
     problem = Problem(
         tuple(models), record, parameters, stated(record), schedule, schedule[0], likeliest=False
     )
@@ -257,7 +254,8 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
     if len(models) != len(measurements):
         raise FitError(f"there are {len(measurements)} measurements but {len(models)} models")
     for own, measurement in zip(models, measurements, strict=True):
-        if not isinstance(own, FormulaModel) and measurement.kind != getattr(own, "kind", None):
+        known = isinstance(own, Model)
+        if not (known and own.profile.written) and measurement.kind != getattr(own, "kind", None):
             raise FitError(
                 f"the measurement has columns {', '.join(measurement.names)}, "
                 f"which {type(own).__name__} does not explain"
@@ -320,11 +318,11 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
 
 def as_stated(fitted: Fit) -> Fit:
     """Fit anew with the drive and the camera, but for the pivot, held as they were stated; for a search."""
-    models = fitted.problem.models
+    models, profile = fitted.problem.models, fitted.model.profile
     names = [f.name.partition("[")[0] for f in fitted.problem.free if f.role == "model"]
-    kept = [name for name in dict.fromkeys(names) if name not in _STATED]
+    kept = [name for name in dict.fromkeys(names) if name not in profile.fit.stated]
     pivot = [f.name.partition("[")[0] for f in fitted.problem.free if f.role == "camera"]
-    camera = [name for name in dict.fromkeys(pivot) if name in _PIVOT.get(models[0].kind, ())]
+    camera = [name for name in dict.fromkeys(pivot) if name in profile.sensor.pivot]
     priors = {f.name: (f.mean, f.sd) for f in fitted.problem.free if f.name in kept}
     record = fitted.record
     return fit_record(fitted.measurements, record, models, kept, camera=camera, priors=priors, search=True)
@@ -343,8 +341,7 @@ def refit(fitted: Fit) -> Fit:
 
     In a search the noise stays as the first model showed it, so that chi2 compares.
     """
-    own = isinstance(fitted.model, FormulaModel)
-    schedule = fitted.problem.schedule if own else levels(fitted.model.kind)
+    schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     shown, point = not _least(fitted.measurements) > 0, fitted.point
     if shown:
@@ -392,15 +389,16 @@ def _afresh(fitted: Fit) -> Point:
 
 def _is_known(measurement: Measurement) -> bool:
     """Whether the noise is known beforehand: stated, or as the frames of a sensor show it."""
-    return measurement.sigma is not None or measurement.kind == "own" or is_encoder(measurement)
+    return measurement.sigma is not None or profile_of(measurement.kind).written or is_encoder(measurement)
 
 
 def _least(measurements: Sequence[Measurement]) -> float:
     """What the noise of a search is at least, in units of what is known beforehand."""
     first = measurements[0]
-    if first.kind != "pendulum" or first.sigma is not None:
+    least = profile_of(first.kind).sensor.faithful
+    if not least or first.sigma is not None:
         return 0.0
-    return 1.0 if is_encoder(first) else _FAITHFUL
+    return 1.0 if is_encoder(first) else least
 
 
 def _estimate_noise(

@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +19,8 @@ from udd._util.validation import array, number
 from udd.chaos.largest_exponent import lyapunov
 from udd.errors import FitError, IntegrationError, ModelError
 from udd.measurement import Measurement
-from udd.models import Disk, Model
+from udd.models import Model, beyond_the_edge
+from udd.models.profile import SensorProfile
 from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED
 from udd.simulation.trajectory import method_for
@@ -35,10 +37,6 @@ Array = NDArray[np.float64]
 # Times in s; of a user's own model in units of its `pace`.
 _STEP = 0.01  # between the times that a forecast is given at
 _KICK = 0.1  # between the kicks that stand for the model's assumed error
-_AHEAD = {"disk": 10.0, "pendulum": 60.0, "own": 10.0}
-_WINDOW = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
-#: The error at which a forecast is no longer valid: m, rad, and of each state in units of its spread.
-_LARGE = {"disk": 5e-3, "pendulum": 0.05, "own": 0.2}
 _FEWEST = 6  # frames that determine a state
 _RTOL, _ATOL = 1e-9, 1e-12
 _GROWTH_TIME = 4000.0  # over which the exponent is averaged; its error is then a percent or two
@@ -241,11 +239,11 @@ def forecast(
     else:
         fitted = fit(known, model)
     # What a user's own model is of its measurement's columns do not tell.
-    kind, unit = fitted.model.kind, motion_time_scale(fitted)
-    large = _LARGE[kind] if error is None else float(error)
-    times = _times(_AHEAD[kind] * unit if t is None else t, _STEP * unit)
-    length = float(_WINDOW[kind] * unit if window is None else window)
-    record = record_of(known, fitted.model if kind == "own" else None)
+    profile, unit = fitted.model.profile, motion_time_scale(fitted)
+    large = profile.fit.valid_error if error is None else float(error)
+    times = _times(profile.fit.ahead * unit if t is None else t, _STEP * unit)
+    length = float(profile.fit.window * unit if window is None else window)
+    record = record_of(known, fitted.model if profile.written else None)
     film = _film(fitted, measurement, film)
     part, origin = _window(fitted, film, record, length)
     rng = np.random.default_rng(seed)
@@ -261,7 +259,7 @@ def forecast(
     spread = np.nanstd(known.values, axis=0)
 
     low, median, high = _quantiles(seen, asked[1])
-    valid = [_parted(times, _size(member - median, kind, spread), large) for member in seen]
+    valid = [_parted(times, _size(member - median, profile.sensor, spread), large) for member in seen]
     tail = (1.0 - asked[1]) / 2.0
     # A member that never parts counts as later than all that do.
     shortest, valid_time, longest = np.quantile(valid, [tail, 0.5, 1.0 - tail], method="higher")
@@ -279,7 +277,7 @@ def forecast(
         valid_low=float(shortest),
         valid_high=float(longest),
         lyapunov_time=_growth(fitted.models[film], states, _GROWTH_TIME * unit),
-        measured_valid_time=_compared(measurement, kind, (clock, median), spread, large),
+        measured_valid_time=_compared(measurement, profile.sensor, (clock, median), spread, large),
         fit=fitted,
         measurement=measurement,
     )
@@ -427,10 +425,10 @@ def _runs(
 
 def _between_wheels(model: Model, states: Array) -> NDArray[np.bool_]:
     """Which disks have not left the wheels, where that ends a run."""
-    if not isinstance(model, Disk) or model.edge != "stop":
+    inside = model.profile.dynamics.inside
+    if inside is None or getattr(model, "edge", "ignore") != "stop":
         return np.ones(len(states), dtype=bool)
-    result: NDArray[np.bool_] = np.hypot(states[:, 1], states[:, 2]) < model.R
-    return result
+    return inside(model.parameters, states)
 
 
 def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: Array, runs: Array) -> Array:
@@ -457,14 +455,12 @@ def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
     return result[0], result[1], result[2]
 
 
-def _size(difference: Array, kind: str, spread: Array) -> Array:
+def _size(difference: Array, sensor: SensorProfile, spread: Array) -> Array:
     """How far two motions are apart: a disk's centre, m; a pendulum's angle; else in units of the spread."""
-    if kind == "disk":
-        result: Array = np.hypot(difference[:, 0], difference[:, 1])
+    if not sensor.compared:
+        result: Array = np.sqrt(np.mean((difference / spread) ** 2, axis=1))
         return result
-    if kind == "own":
-        difference = np.sqrt(np.mean((difference / spread) ** 2, axis=1, keepdims=True))
-    result = np.abs(difference[:, 0])
+    result = np.abs(reduce(np.hypot, difference[:, : sensor.compared].T))
     return result
 
 
@@ -481,7 +477,11 @@ def _parted(t: Array, size: Array, error: float) -> float:
 
 
 def _compared(
-    measurement: Measurement, kind: str, expectation: tuple[Array, Array], spread: Array, error: float
+    measurement: Measurement,
+    sensor: SensorProfile,
+    expectation: tuple[Array, Array],
+    spread: Array,
+    error: float,
 ) -> float:
     """When what was measured after the start first parts from the median, s after it; NaN if it does not."""
     clock, median = expectation
@@ -489,10 +489,10 @@ def _compared(
     t = after.t
     expected = np.column_stack([np.interp(t, clock, column) for column in median.T])
     difference = np.where(after.seen[:, None], after.values - expected, np.nan)
-    if kind == "pendulum":
+    if sensor.error_unit == "rad":
         difference = (difference + np.pi) % (2 * np.pi) - np.pi
     there = np.isfinite(difference).all(axis=1)
-    when = _parted(t[there] - clock[0], _size(difference[there], kind, spread), error)
+    when = _parted(t[there] - clock[0], _size(difference[there], sensor, spread), error)
     return when if np.isfinite(when) else math.nan
 
 
@@ -501,9 +501,8 @@ def _growth(model: Model, states: Array, long: float) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a percent is enough for a unit of time
         try:
-            if isinstance(model, Disk):
-                model = model.replace(edge="ignore")
-            value, spread = lyapunov(model, with_error=True, t=long, state0=np.median(states, axis=0))
+            equations = beyond_the_edge(model)
+            value, spread = lyapunov(equations, with_error=True, t=long, state0=np.median(states, axis=0))
         except (IntegrationError, ModelError):
             return math.nan
     return 1.0 / value if value > 2 * spread else math.inf

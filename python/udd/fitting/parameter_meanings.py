@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-#: Parameters in words.
-MEANINGS = {
-    "W": "speed at which the wheels lift the disk",
-    "R": "radius of the disk",
-    "g": "gravity",
-    "k0": "friction coefficient of fast rotation",
-    "k1": "friction coefficient at rest",
-    "k2": "how fast friction falls with the speed of rotation",
-    "length": "length of the pendulum",
-    "inertia": "moment of inertia per unit mass",
+from udd.models import profile_of
+from udd.models.registry import MODELS
+
+_CAMERA = {
     "y0": "contact, to the right of where it was taken to be",
     "z0": "contact, above where it was taken to be",
     "tilt": "camera turned clockwise",
@@ -29,11 +23,15 @@ MEANINGS = {
     "aside": "pivot to the right of where it was taken to be, in lengths of the pendulum",
     "above": "pivot above where it was taken to be, in lengths of the pendulum",
 }
+#: Parameters in words; of a name that several models have, as the disk has it.
+MEANINGS = {
+    name: text
+    for words in (*(cls.profile.shown.meanings for cls in reversed(MODELS.values())), _CAMERA)
+    for name, text in words.items()
+}
 
 
 def meaning(name: str, kind: str) -> str:
     """A free parameter of a model of this kind, or of its camera, in words; empty where it is an effect's."""
-    base = name.partition("[")[0]
-    if kind == "own":
-        return ""
-    return "viscous friction" if base == "k0" and kind == "pendulum" else MEANINGS.get(base, "")
+    base, profile = name.partition("[")[0], profile_of(kind)
+    return "" if profile.written else profile.shown.meanings.get(base, _CAMERA.get(base, ""))

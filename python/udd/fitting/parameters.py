@@ -10,33 +10,7 @@ import numpy as np
 
 from udd import _core
 from udd.errors import FitError
-from udd.models import Disk, Model, Pendulum
-
-#: What is known of a camera beforehand, as standard deviations around zero: a pivot found to a few
-#: millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose centre is off by a millimetre,
-#: an orientation that lags the position by milliseconds, a shutter that may roll (a frame's time over a
-#: picture 0.4 m high), means over some 20 ms (of which a 24th of the square counts), a lens that distorts by
-#: 1 % at 0.2 m from the middle, a clock good to 0.3 %. A pendulum's pivot is known to 1 % of its length.
-CAMERA = {
-    "disk": {
-        "y0": 5e-3,
-        "z0": 5e-3,
-        "tilt": 0.035,
-        "scale": 0.01,
-        "right": 1e-3,
-        "up": 1e-3,
-        "lag": 0.01,
-        "row": 0.05,
-        "shutter": 2e-5,
-        "lens": 0.0025,
-    },
-    "pendulum": {"theta0": 0.1, "aside": 0.01, "above": 0.01},
-}
-CLOCK = 3e-3
-
-#: Relative standard deviations of the parameters that a fit leaves free by default.
-DISK = {"k0": 1.0, "k1": 1.0, "k2": 1.0, "W": 0.05}
-PENDULUM = {"k0": np.inf, "length": 0.05, "inertia": 0.1}
+from udd.models import Model
 
 
 @dataclass(frozen=True)
@@ -99,12 +73,13 @@ def free_parameters(
     model = models[0]
     values = model.parameters
     names = list(_spread(model)) + _amplitudes(model) if free is None else list(free)
-    known = {**CAMERA.get(model.kind, {}), **({"clock": CLOCK} if model.kind == "disk" else {})}
+    sensor = model.profile.sensor
+    known = {**sensor.camera, **({} if sensor.clock is None else {"clock": sensor.clock})}
     wanted = list(known) if camera is True else [] if camera is False else list(camera)
     twice = {name for name in [*names, *wanted] if [*names, *wanted].count(name) > 1}
     if twice:
         raise FitError(f"{', '.join(sorted(twice))} is named twice")
-    own = {"W"} if each is None else set(each)
+    own = set(model.profile.fit.each if each is None else each)
     for name in [*names, *(own if each is not None else ())]:
         if name not in values:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(values)}")
@@ -163,13 +138,13 @@ def _amplitudes(model: Model) -> list[str]:
 def _spread(model: Model) -> dict[str, float]:
     """The standard deviations of the priors of what is free by default."""
     values = model.parameters
-    if isinstance(model, Disk):
-        # A drive at rest is at rest.
-        known = {n: s * abs(values[n]) for n, s in DISK.items() if n != "W" or values[n]}
-        return {n: s if s > 0 else np.inf for n, s in known.items()}
-    if isinstance(model, Pendulum):
-        return {n: s * abs(values[n]) if np.isfinite(s) else np.inf for n, s in PENDULUM.items()}
-    return {name: np.inf for name in values if name not in _amplitudes(model)}
+    priors = model.profile.fit.priors
+    if priors is None:
+        return {name: np.inf for name in values if name not in _amplitudes(model)}
+    # A drive at rest is at rest.
+    free = [name for name in priors if name != model.profile.dynamics.drive or values[name]]
+    known = {name: priors[name] * abs(values[name]) if np.isfinite(priors[name]) else np.inf for name in free}
+    return {name: sd if sd > 0 else np.inf for name, sd in known.items()}
 
 
 def _with_priors(free: list[Free], given: dict[str, tuple[float, float]]) -> tuple[Free, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd.measurement import Measurement
-from udd.models import Model
+from udd.models import Model, profile_of
 
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .noise import Noise, colour
@@ -26,37 +26,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The model's assumed error over one frame of 40 ms, from loose to tight, per state: ``[Omega, Y, Z, beta]``
-#: in rad/s, m, m, rad; ``[Omega, theta]`` in rad/s, rad. At the loose end a wrong model follows the data,
-#: which is where the noise is estimated; at the tight end small effects show. How tight is right for a fit
-#: the evidence says.
-SCHEDULE: dict[str, tuple[tuple[float, ...], ...]] = {
-    "disk": (
-        (0.1, 1e-4, 1e-4, 1e-3),
-        (0.02, 3e-5, 3e-5, 3e-4),
-        (3e-3, 1e-5, 1e-5, 1e-4),
-        (1e-3, 3e-6, 3e-6, 3e-5),
-        (3e-4, 1e-6, 1e-6, 1e-5),
-        (1e-4, 3e-7, 3e-7, 3e-6),
-        (3e-5, 1e-7, 1e-7, 1e-6),
-    ),
-    "pendulum": ((0.1, 1e-3), (0.01, 3e-4), (1e-3, 3e-5), (1e-4, 3e-6), (1e-5, 3e-7)),
-}
-_FRAME = 0.04
+_FRAME = 0.04  # s, over which the profiles state the model's assumed error
 #: A fit whose leverage is larger follows each frame.
 FOLLOWS = 0.7
 
 
-#: What no film is better than, however little its frames scatter: faults of the camera and of the tracking
-#: that go with the motion, as a root mean square per channel (some thousandths of a pixel).
-FAULTS: dict[str, tuple[float, ...]] = {"disk": (2e-6, 2e-6, 4e-5)}
-#: How many of these levels effects are sought at: below some 10 um a frame a film's faults look like them.
-SEARCHED = {"disk": 3}
-
-
 def levels(kind: str) -> tuple[tuple[float, ...], ...]:
     """The model's assumed error, loose to tight, per square root of a second."""
-    return tuple(tuple(q / _FRAME**0.5 for q in level) for level in SCHEDULE[kind])
+    return tuple(tuple(q / _FRAME**0.5 for q in level) for level in profile_of(kind).fit.model_error)
 
 
 @dataclass(frozen=True)
@@ -187,13 +164,13 @@ class Fit:
     @property
     def channels(self) -> tuple[str, ...]:
         """What `misfit` is of: the measurement's columns, or all states of a user's own model."""
-        return self.model.state_names if self.model.kind == "own" else self.measurement.names
+        return self.model.state_names if self.model.profile.written else self.measurement.names
 
     @property
     def blurring(self) -> Array:
         """The angular speed that noise may grow with, rad/s; a user's state need not be one."""
         omega = self.states[:, 0]
-        return np.zeros(len(omega)) if self.model.kind == "own" else omega
+        return np.zeros(len(omega)) if self.model.profile.written else omega
 
     @property
     def residuals(self) -> Array:
@@ -232,7 +209,7 @@ class Fit:
     def faults(self) -> float:
         """How much of chi2 a film's faults that go with the motion may make up: 0 where noise hides them."""
         sd = self.noise.sd(self.record, self.states[:, 0])
-        fault = np.array(FAULTS.get(self.model.kind, (0.0,)))
+        fault = np.array(self.model.profile.sensor.faults)
         return float(np.square(fault / sd, where=self.record.observed, out=np.zeros(sd.shape)).sum())
 
     def put_away(self) -> Fit:
@@ -257,7 +234,7 @@ class Fit:
 
         A pendulum's film is not taken for better than its geometry, which many are.
         """
-        assumed = self.model.kind == "pendulum" and self.measurement.sigma is None
+        assumed = self.model.profile.sensor.faithful > 0 and self.measurement.sigma is None
         return self.scatter if assumed else max(self.scatter, 1.0)
 
     def _colour(self, before: Fit) -> float:

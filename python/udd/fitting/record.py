@@ -14,16 +14,13 @@ from scipy.ndimage import maximum_filter1d
 
 from udd.errors import FitError
 from udd.measurement import Measurement
-from udd.models import Model
+from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .formula_models import checked_start, guessed, slope, typical_noise
 from .sensor import frame_noise, is_encoder, lattice, moving
 
 Array = NDArray[np.float64]
-
-#: What a camera typically gets wrong, taken where a measurement does not say: m, m, rad; rad for a pendulum.
-_SIGMA = {"disk": (5e-4, 5e-4, 7e-3), "pendulum": (5e-3,)}
 
 #: A frame is odd that lies farther off than this times what is typical; honest noise does in 1 of 1e8.
 _ODD = 9.0
@@ -153,7 +150,7 @@ def record_of(
     if own and not set(measurement.names) <= set(own.state_names):
         given, wanted = ", ".join(measurement.names), ", ".join(own.state_names)
         raise FitError(f"the measurement has columns {given}, but the model's states are {wanted}")
-    if not own and measurement.kind == "own":
+    if not own and profile_of(measurement.kind).written:
         given = ", ".join(measurement.names)
         raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
     values, seen = measurement.values, measurement.seen & (np.arange(len(measurement)) < moving(measurement))
@@ -200,14 +197,14 @@ def record_of(
 
 def _noise_of(measurement: Measurement, values: Array) -> Array:
     """What is taken for the noise where a measurement does not say, of each column or of each frame too."""
-    if measurement.kind == "own":
+    if profile_of(measurement.kind).written:
         typical = typical_noise(values)
         if not any(lattice(column) for column in values.T):
             return typical
         return np.maximum(typical, np.column_stack([frame_noise(column) for column in values.T]))
-    if measurement.kind == "pendulum" and is_encoder(measurement):
+    if profile_of(measurement.kind).sensor.zero is not None and is_encoder(measurement):
         return frame_noise(values[:, 0])[:, None]
-    return np.array(_SIGMA[measurement.kind])
+    return np.array(profile_of(measurement.kind).sensor.sigma)
 
 
 def _joined(records: Sequence[Record]) -> Record:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
+from udd.models import profile_of
 
 Array = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def frame_noise(values: Array) -> Array:
 
 def is_film(measurement: Measurement) -> bool:
     """Whether a measurement is one of the disk, tracked in a film."""
-    return measurement.kind == "disk" and "px_per_m" in measurement.meta
+    return profile_of(measurement.kind).sensor.sees_marks and "px_per_m" in measurement.meta
 
 
 def moving(measurement: Measurement) -> int:
@@ -115,7 +116,7 @@ def is_encoder(measurement: Measurement) -> bool:
     """
     if measurement.meta.get("sensor") == "encoder":
         return True
-    if measurement.kind != "pendulum":
+    if profile_of(measurement.kind).sensor.zero is None:
         return False
     noise, step = reads(measurement.values[measurement.seen, 0])
     return step > 0 and noise <= step and not (_is_round(step) or _is_round(math.degrees(step)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from udd.measurement import Measurement
 from udd.measurement.table import ANGLES
+from udd.models import profile_of
 
 from .record import odd_frames
 from .sensor import lattice
@@ -167,7 +168,7 @@ def _averaged(
     return Measurement(
         times,
         mean,
-        None if measurement.sigma is None and measurement.kind != "own" else sigma,
+        None if measurement.sigma is None and not profile_of(measurement.kind).written else sigma,
         rho,
         None,
         meta,

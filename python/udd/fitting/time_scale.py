@@ -16,7 +16,7 @@ def motion_time_scale(fit: Fit) -> float:
     deviation over the root mean square rate. For a short record the unit is shorter, but not below that, so
     that the part held out has enough blocks to resample.
     """
-    if fit.model.kind != "own":
+    if not fit.model.profile.written:
         return 1.0
     linked, dt = fit.record.linked, np.diff(fit.record.t)
     rates = (np.diff(fit.states, axis=0)[linked]) / dt[linked, None]

@@ -20,14 +20,6 @@ if TYPE_CHECKING:
 
     from .problem import Fit
 
-#: Standard uncertainties of what a fit holds: a radius measured with a caliper [m], gravity at a place that
-#: is not said [m/s^2].
-HELD: dict[str, dict[str, float]] = {
-    "disk": {"R": 1e-4, "g": 0.01},
-    "pendulum": {"g": 0.01},
-    "own": {},
-}
-
 _CAMERA, _NOISE, _MODEL = "camera", "noise", "model error"
 
 
@@ -148,7 +140,7 @@ def budget(fit: Fit, held: Mapping[str, float] | None = None, k: float = 2.0) ->
     ('noise', 'camera', 'g')
     """
     k = number("k", k, above=0.0)
-    held = HELD[fit.model.kind] if held is None else dict(held)
+    held = dict(fit.model.profile.fit.held if held is None else held)
     held = {name: number(name, value, above=0.0) for name, value in held.items()}
     free = fit.problem.free
     known = {f.name.partition("[")[0] for f in free}

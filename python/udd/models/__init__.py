@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from .base import Model, require_model
-from .builtin import DLE, Disk, Pendulum, beyond_the_edge
+from .compiled import beyond_the_edge
+from .disk import Disk
+from .dle import DLE
+from .pendulum import Pendulum
+from .registry import profile_of
 
-__all__ = ["DLE", "Disk", "Model", "Pendulum", "beyond_the_edge", "require_model"]
+__all__ = ["DLE", "Disk", "Model", "Pendulum", "beyond_the_edge", "profile_of", "require_model"]

@@ -14,6 +14,8 @@ from udd.effects import Effect
 from udd.effects.spec import Own
 from udd.errors import ModelError
 
+from .profile import ModelProfile
+
 if TYPE_CHECKING:
     from udd._util.expressions import Expression
 
@@ -94,8 +96,8 @@ class Model:
     """Their units, empty where dimensionless."""
     angles: ClassVar[tuple[str, ...]] = ()
     """The components that are angles: they may grow without end."""
-    slow: ClassVar[float] = 0.25
-    """About the unit of time in which the motion takes place, that of the disk being 0.27 s."""
+    profile: ClassVar[ModelProfile]
+    """What is known of it beside its equations."""
     _plain: ClassVar[tuple[str, ...]]
     _options: ClassVar[tuple[str, ...]] = ("effects",)
     effects: tuple[Effect, ...]
@@ -113,6 +115,16 @@ class Model:
         from .formula_model import FormulaModel
 
         return FormulaModel.__new__(FormulaModel)
+
+    @property
+    def slow(self) -> float:
+        """About the unit of time in which the motion takes place, that of the disk being 0.27 s."""
+        return self.profile.dynamics.time_scale
+
+    @property
+    def kinematic(self) -> tuple[str, ...]:
+        """The states whose equation only says that another is their rate; none of a compiled law."""
+        return ()
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -18,6 +18,7 @@ from udd.effects.user_defined import along_of
 from udd.errors import ModelError
 
 from .base import Model
+from .profile import DiscoveryProfile, DynamicsProfile, FitProfile, ModelProfile
 
 __all__ = ["FormulaModel"]
 
@@ -47,7 +48,6 @@ class FormulaModel(Model):
     """
 
     kind: ClassVar[str] = "own"
-    slow: ClassVar[float] = 1.0
     _plain: ClassVar[tuple[str, ...]] = ()
     _options: ClassVar[tuple[str, ...]] = ("states", "equations", "parameters", "angles", "effects", "mass")
 
@@ -378,6 +378,16 @@ class FormulaModel(Model):
         mass = f", mass={[list(row) for row in self.mass]!r}" if self.mass else ""
         text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{angles}{mass})"
         return f"{text}.with_effects({list(self.effects)!r})" if self.effects else text
+
+
+# Its sizes, units and times are the user's; what a fit needs to know of them the record says.
+FormulaModel.profile = ModelProfile(
+    written=True,
+    dynamics=DynamicsProfile(time_scale=1.0),
+    # The parameters that :mod:`udd.relatives` and models like the disk's and the pendulum's state.
+    fit=FitProfile(stated=("W", "length"), ahead=10.0, window=1.0, valid_error=0.2),  # of each state's spread
+    discovery=DiscoveryProfile(horizons=(0.2, 0.4, 1.0, 2.0, 4.0), filter_window=1.0, filter_level=2),
+)
 
 
 def _written(effect: Effect) -> str:

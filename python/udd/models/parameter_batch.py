@@ -12,23 +12,16 @@ from udd._util.validation import array
 from udd.errors import ModelError
 
 from .base import Model
-from .builtin import DLE, Disk, Pendulum
 
 Floats = NDArray[np.float64]
 
 
 def default_state(model: Model) -> list[float]:
     """An initial state from which orbits reach the main attractor."""
-    if isinstance(model, DLE):
-        start = [1.0, 1.0, 0.01]
-    elif isinstance(model, Disk):
-        # The same state in the disk's units, for the paper's constants.
-        start = [3.75, 0.0046, 5e-5, 0.0]
-    elif isinstance(model, Pendulum):
-        start = [0.0, 1.0]
-    else:
+    start = model.profile.dynamics.start
+    if start is None:
         raise ModelError("where orbits of a model of your own start is yours to say: give an initial state")
-    return start + [0.0] * (len(model.state_names) - len(start))  # bristles are at rest
+    return [*start, *[0.0] * (len(model.state_names) - len(start))]  # bristles are at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +99,7 @@ def outside_domain(model: Model, rows: Floats, starts: Floats) -> NDArray[np.boo
 
     `rows` (n, parameters) and `starts` (n, dim) come one for each orbit, or one for all.
     """
-    if getattr(model, "edge", "ignore") != "stop":
+    inside = model.profile.dynamics.inside
+    if inside is None or getattr(model, "edge", "ignore") != "stop":
         return np.zeros(max(len(rows), len(starts)), dtype=bool)
-    radius = rows[:, list(model.parameters).index("R")]
-    Y, Z = (starts[:, model.state_names.index(name)] for name in ("Y", "Z"))
-    off: NDArray[np.bool_] = np.hypot(Y, Z) >= radius
-    return off
+    return ~inside(dict(zip(model.parameters, rows.T, strict=True)), starts)

@@ -9,10 +9,8 @@ from udd.effects import Effect, library, serialization
 from udd.errors import ModelError
 
 from .base import Model
-from .builtin import DLE, Disk, Pendulum
 from .formula_model import FormulaModel
-
-_KINDS: dict[str, type[Model]] = {cls.kind: cls for cls in (DLE, Disk, Pendulum)}
+from .registry import COMPILED
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
@@ -35,7 +33,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         return own | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
-    if _KINDS.get(cls.kind) is cls:
+    if COMPILED.get(cls.kind) is cls:
         for name in (*cls._plain, *cls._options):
             result[name] = getattr(model, name)
         if "effects" in result:
@@ -63,15 +61,15 @@ def model_from_dict(data: object) -> Model:
         except (TypeError, ValueError):
             has = "states, equations, parameters, angles, effects and mass"
             raise ModelError(f"a model of your own has {has}, not {', '.join(given)}") from None
-    if not isinstance(kind, str) or kind not in _KINDS:
+    if not isinstance(kind, str) or kind not in COMPILED:
         raise ModelError(
-            f"the model's kind must be one of {', '.join((*_KINDS, FormulaModel.kind))}, not {kind!r}"
+            f"the model's kind must be one of {', '.join((*COMPILED, FormulaModel.kind))}, not {kind!r}"
         )
     if "effects" in given:
         if not isinstance(given["effects"], list):
             raise ModelError(f"the model's effects must be a list, not {given['effects']!r}")
         given["effects"] = [_effect_from_dict(effect) for effect in given["effects"]]
-    cls = _KINDS[kind]
+    cls = COMPILED[kind]
     known = (*cls._plain, *cls._options)
     for name in given:
         if name not in known:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import product
 
@@ -71,18 +70,8 @@ def coordinates_of(model: Model, states: Floats) -> Coordinates:
 
 def _sizes(model: Model) -> tuple[dict[str, float], float]:
     """What is large for the components that a model of ours has, and its typical time."""
-    p = model.parameters
-    if model.kind == "dle":
-        # Rotation at sqrt(w); half the figure-eight takes 5.3 / sqrt(w).
-        size = math.sqrt(p["w"]) or 1.0
-        return dict.fromkeys(("omega", "y", "z"), size), 4.0 / size
-    if model.kind == "disk":
-        swing = math.sqrt(p["g"] / p["R"]) or 1.0
-        return {"Omega": swing, "Y": p["R"], "Z": p["R"], "beta": 1.0}, 10.0 / swing
-    if model.kind == "pendulum":
-        swing = math.sqrt(p["g"] * p["length"] / p["inertia"]) or 1.0
-        return {"Omega": swing, "theta": 1.0}, 6.0 / swing
-    return {}, 1.0
+    sizes = model.profile.dynamics.sizes
+    return ({}, 1.0) if sizes is None else sizes(model.parameters)
 
 
 def _rates(model: Model, states: Floats) -> Floats:

@@ -97,7 +97,7 @@ def branches(
     unit = model.units[parameter]
     ax.set_xlabel(f"{parameter} [{unit}]" if unit else parameter)
     if view == "period":
-        ax.set_ylabel("period [1]" if model.kind == "dle" else "period [s]")
+        ax.set_ylabel(f"period [{model.profile.dynamics.time_unit or 1}]")
     else:
         words = axis_of(model, name)[0]
         ax.set_ylabel(f"least and greatest {words}" if view == "extremes" else words)

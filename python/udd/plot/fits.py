@@ -148,9 +148,9 @@ def coordinates(fit: Any) -> dict[str, Array]:
     result = {"t": fit.record.clock[:-1], **columns}
     if "beta" in columns:
         result["beta"] = np.mod(columns["beta"], 2 * np.pi)
-    if fit.model.kind == "disk":
-        result["R"] = np.hypot(columns["Y"], columns["Z"])
-        result["theta"] = np.mod(np.arctan2(columns["Y"], columns["Z"]), 2 * np.pi)
+    for more in fit.model.profile.discovery.coordinates:
+        values = more.of(result["t"], fit.states[:-1])
+        result[more.name] = np.mod(values, 2 * np.pi) if more.angle else values
     return result
 
 

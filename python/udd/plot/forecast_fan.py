@@ -42,7 +42,7 @@ def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
     coordinate = coordinate or ("Z" if "Z" in names else names[0])
     if coordinate not in names:
         raise UddError(f"the forecast has {', '.join(names)}, not {coordinate}")
-    of_own = result.fit.model.kind == "own"  # its states may be called as the disk's are
+    of_own = result.fit.model.profile.written  # its states may be called as the disk's are
     k, factor = names.index(coordinate), 1.0 if of_own else scale(coordinate)
     ax = new_axes(ax)
     t = result.t

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import UddError
+from udd.models import Model
 
 from .inputs import is_fit
 from .style import AFTER, FAINT, label, new_axes, tidy
@@ -37,7 +38,7 @@ def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = Non
     """
     fit = result if is_fit(result) else None
     model = fit.model if fit is not None else result
-    if getattr(model, "kind", None) not in ("disk", "pendulum"):
+    if not isinstance(model, Model) or model.profile.dynamics.inertia is None:
         raise UddError(f"a disk, a pendulum or a fit has friction, not {type(model).__name__}")
     speeds = np.abs(fit.states[:, 0]) if fit is not None else np.empty(0)
     top = fastest or (float(speeds.max()) if speeds.size else 15.0)
@@ -71,11 +72,10 @@ def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = Non
 
 def coefficient(model: Any, omega: Array) -> Array:
     """Friction coefficient, m^2/s; what does not change sign with Omega is no friction."""
-    disk = model.kind == "disk"
-    inertia = model.R**2 / 2 if disk else model.inertia
     state = np.zeros((2, len(omega), len(model.state_names)))
     state[:, :, 0] = omega, -omega
     rate = model.rates(0.0, state)[..., 0]
+    inertia = model.profile.dynamics.inertia(model, state[0])
     result: Array = -inertia * (rate[0] - rate[1]) / 2 / omega
     return result
 

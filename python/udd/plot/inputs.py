@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import UddError
+from udd.models import DLE, Model
+from udd.models.compiled import CompiledModel
+from udd.models.profile import ModelProfile
+from udd.models.registry import COMPILED
 
 Array = NDArray[np.float64]
 
-#: Names of the states, by the kind of model.
-STATES = {"disk": ("Omega", "Y", "Z", "beta"), "dle": ("omega", "y", "z"), "pendulum": ("Omega", "theta")}
-_BY_NUMBER = {len(names): names for names in STATES.values()}
+#: The models whose motions are drawn, by the number of their states; of as many the first is meant.
+_BY_NUMBER = {len(cls.state_names): cls for cls in reversed(COMPILED.values())}
 
 
 @dataclass(frozen=True)
@@ -39,9 +42,24 @@ class Motion:
     radius: float | None
 
     @property
-    def kind(self) -> str:
-        """``"disk"``, ``"pendulum"`` or ``"dle"``."""
-        return "disk" if "Z" in self.columns else "pendulum" if "theta" in self.columns else "dle"
+    def profile(self) -> ModelProfile:
+        """What is known of the model whose columns these are."""
+        return self._class.profile
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of that model's states."""
+        return self._class.state_names
+
+    @property
+    def time(self) -> str:
+        """The symbol of its time, which may have no unit."""
+        return "t" if self.profile.dynamics.time_unit else "tau"
+
+    @property
+    def _class(self) -> type[Model]:
+        drawn = [cls for cls in COMPILED.values() if set(cls.profile.shown.columns) <= set(self.columns)]
+        return next((cls for cls in drawn if isinstance(self.model, cls)), drawn[0] if drawn else DLE)
 
     def __getitem__(self, name: str) -> Array:
         try:
@@ -94,7 +112,10 @@ def motions(result: Any) -> list[Motion]:
         if state.ndim != 2 or state.shape[1] not in _BY_NUMBER:
             raise UddError(f"one trajectory can be drawn, state (time, 2 to 4), not {state.shape}")
         model = getattr(result, "model", None)
-        columns = dict(zip(_BY_NUMBER[state.shape[1]], state.T, strict=True))
+        cls = _BY_NUMBER[state.shape[1]]
+        if isinstance(model, CompiledModel) and len(type(model).state_names) == state.shape[1]:
+            cls = type(model)
+        columns = dict(zip(cls.state_names, state.T, strict=True))
         return [Motion("simulated", np.asarray(result.t), columns, model, _radius(model))]
     if hasattr(result, "values") and hasattr(result, "names"):
         return [measured(result, None)]

@@ -10,13 +10,12 @@ import numpy as np
 from udd.errors import UddError
 from udd.simulation.energy import angular_momentum
 
-from .inputs import STATES, Motion, motions, only
+from .inputs import Motion, motions, only
 from .style import AFTER, AXES, BEFORE, FAINT, MEASURED, label, new_axes, scale, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SHOWN = {"disk": ("Y", "Z"), "pendulum": ("theta",), "dle": ("y", "z")}
 _COLOURS = (AFTER, BEFORE, "#009e73", "#cc79a7")
 
 
@@ -47,12 +46,12 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
     'time T [s]'
     """
     drawn = motions(result)
-    kind = drawn[0].kind
-    names = tuple(coordinates) if coordinates is not None else _SHOWN[kind]
+    first = drawn[0]
+    names = tuple(coordinates) if coordinates is not None else first.profile.shown.columns
     units = {AXES[n][1] for n in names if n in AXES}
     if not names or not all(n in AXES for n in names) or len(units) != 1:
         raise UddError(
-            f"coordinates must share a unit and be of {', '.join(STATES[kind])}, not {', '.join(names)}"
+            f"coordinates must share a unit and be of {', '.join(first.states)}, not {', '.join(names)}"
         )
     ax = new_axes(ax)
     for motion in drawn:
@@ -67,7 +66,7 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
             )
             shade = MEASURED if dots and len(drawn) > 1 else colour
             ax.plot(motion.t, scale(name) * values, color=shade, label=what, **style)
-    ax.set_xlabel(label("tau" if kind == "dle" else "t"))
+    ax.set_xlabel(label(first.time))
     ax.set_ylabel(label(names[0]) if len(names) == 1 else f"{' and '.join(names)} [{units.pop()}]")
     if len(names) * len(drawn) > 1:
         ax.legend(frameon=False, loc="upper right", ncols=2)
@@ -91,12 +90,13 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
     Axes
     """
     drawn = motions(result)
-    kind = drawn[0].kind
-    across, up = {"disk": ("Y", "Z"), "pendulum": ("theta", "Omega"), "dle": ("y", "z")}[kind]
-    if kind == "pendulum":
+    profile = drawn[0].profile
+    shown, columns = profile.shown, profile.sensor.columns
+    across, up = shown.path
+    if columns and up not in columns:
         if up not in drawn[-1].columns:
             raise UddError(
-                "a pendulum's measurement holds no angular velocity: fit it first, then draw the fit"
+                f"a {shown.noun}'s measurement holds no angular velocity: fit it first, then draw the fit"
             )
         drawn = drawn[-1:]
     ax = new_axes(ax)
@@ -108,7 +108,7 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
             ax.plot(x, y, color=AFTER, linewidth=0.9, label=motion.title)
     ax.set_xlabel(label(across))
     ax.set_ylabel(label(up))
-    if kind == "disk":
+    if shown.contact:
         _device(ax, drawn)
     if len(drawn) > 1:
         ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -151,25 +151,26 @@ def phase_space(result: Any, ax: Axes | None = None) -> Axes:
         angular velocity, or of Axes without a third dimension.
     """
     motion = only(result)
-    if motion.kind == "pendulum":
-        raise UddError("a pendulum's phase space is a plane: use udd.plot.orbit")
+    space, noun = motion.profile.shown.space, motion.profile.shown.noun
+    if space is None:
+        raise UddError(f"a {noun}'s phase space is a plane: use udd.plot.orbit")
     if motion.title == "measured":
         raise UddError("a measurement holds no angular velocity: fit it first, then draw the fit")
-    if motion.kind == "disk":
+    if "J" in space:
         if motion.model is None:
             raise UddError("J needs the model's W and R: the trajectory has no model")
         y, z = motion["Y"], motion["Z"]
         state = np.stack([motion["Omega"], y, z], axis=-1)
         coordinates = {"J": angular_momentum(motion.model, state), "Y": y, "Z": z}
     else:
-        coordinates = {name: motion[name] for name in ("omega", "y", "z")}
-    space: Any = new_axes(ax, projection="3d")
-    if space.name != "3d":
+        coordinates = {name: motion[name] for name in space}
+    drawn: Any = new_axes(ax, projection="3d")
+    if drawn.name != "3d":
         raise UddError('phase_space needs three-dimensional Axes (projection="3d")')
     names = tuple(coordinates)
-    space.plot(*(scale(n) * v for n, v in coordinates.items()), color=AFTER, linewidth=0.7)
+    drawn.plot(*(scale(n) * v for n, v in coordinates.items()), color=AFTER, linewidth=0.7)
     for axis, name in zip("xyz", names, strict=True):
-        getattr(space, f"set_{axis}label")(label(name))
-    space.set_box_aspect(None, zoom=0.85)
-    made: Axes = space
+        getattr(drawn, f"set_{axis}label")(label(name))
+    drawn.set_box_aspect(None, zoom=0.85)
+    made: Axes = drawn
     return made

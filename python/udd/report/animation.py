@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _SLOWER = 2  # times slower than it was, as the page says
-_SECONDS = {"disk": 6.0, "pendulum": 12.0}
 _PANEL = 300  # pixels, or user units
 _REACH = 2.05  # radii from the contact to the edge of a panel
 _MARK_PLACE, _MARK_SIDE = 65 / 80, 16 / 80  # of the radius: the LEGO disk's
@@ -48,11 +47,11 @@ class Panel:
 def side_by_side(discovery: Discovery, film: str | os.PathLike[str] | None) -> Movie:
     """Measured and modelled motion from the first held-out frame on: the film itself where there is one."""
     fit = discovery.fit
-    times, measured, modelled = runs.side_by_side(discovery, _SECONDS[discovery.measurement.kind])
+    times, measured, modelled = runs.side_by_side(discovery, fit.model.profile.shown.movie)
     panels = [Panel("measured", MEASURED, _held(measured)), Panel("the known model", BEFORE, modelled[0])]
     if len(modelled) > 1:
         panels.append(Panel("with the added effect", AFTER, modelled[1]))
-    if discovery.measurement.kind == "disk":
+    if fit.model.profile.shown.contact:
         panels = [Panel(p.title, p.colour, _within(p.seen, fit.model.parameters["R"])) for p in panels]
     start, seconds = float(times[0]), float(times[-1] - times[0])
     if film is None:
@@ -89,7 +88,7 @@ def _svg(panels: list[Panel], model: Model, seconds: float) -> str:
     """Panels side by side, moved by the file itself: no script, and some tens of kilobytes."""
     size, n = _PANEL, len(panels)
     frames = max(len(p.seen) for p in panels)
-    draw = _disk if model.kind == "disk" else _pendulum
+    draw = _DRAWINGS[model.kind]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {n * size} {size + 8}" '
         f'width="{n * size}" height="{size + 8}">'
@@ -152,6 +151,10 @@ def _pendulum(panel: Panel, model: Model, seconds: float, frames: int) -> str:
         f'<path d="M0 0V{length:g}" stroke="#555" stroke-width="2"/>'
         f'<circle cy="{length:g}" r="12" fill="{panel.colour}"/></g><circle r="3" fill="#000"/></g>'
     )
+
+
+#: How the motion of a kind of model is drawn.
+_DRAWINGS = {"disk": _disk, "pendulum": _pendulum}
 
 
 def _padded(seen: Array, frames: int) -> Array:

@@ -72,7 +72,7 @@ def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str
 
 def disk_head(discovery: Discovery) -> Head:
     """The same of a disk or pendulum."""
-    thing = "disk" if discovery.measurement.kind == "disk" else "pendulum"
+    thing = discovery.fit.model.profile.shown.noun
     said = [Paragraph(_formula(effect, discovery), "formula") for effect in discovery.effects]
     said += [Paragraph(pretty(sentence)) for sentence in wording.short_limits(discovery)]
     return head(discovery, f"What the model of the {thing} lacks", said)
@@ -100,7 +100,8 @@ def sections(
 
 
 def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str] | None) -> Section:
-    disk = discovery.measurement.kind == "disk"
+    profile = discovery.fit.model.profile.shown
+    disk = profile.contact
     movie = animation.side_by_side(one, film)
     moving = (
         f"{'The film' if movie.filmed else 'The measured motion'} beside the models, at half its speed. At T "
@@ -122,7 +123,7 @@ def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str]
     free = " A free run starts where the record starts and then sees no more data" + (alike if disk else ".")
     moment = (
         "A closer look at one moment: at the line each model is let go"
-        if disk
+        if not profile.forecast_end
         else f"The end of the record: each model was let go at T = {discovery.split:.1f} s"
     )
     closer = (

@@ -37,12 +37,13 @@ def orbits(discovery: Discovery) -> Image:
     n = 1 + len(runs_shown)
     figure, grid = blank(3.5 * n, 3.8, columns=n, top=0.55, shared=True)
     axes = grid[0]
-    pendulum = discovery.measurement.kind == "pendulum"
-    if not pendulum:
+    # A measurement that lacks an axis of the orbit is shown as it was fitted.
+    fitted = not set(discovery.fit.model.profile.shown.path) <= set(discovery.measurement.names)
+    if not fitted:
         plot.orbit(discovery.measurement, axes[0])
     plot.orbit(runs.smooth(discovery.fit), axes[0])
-    axes[0].lines[-1 if pendulum else -2].set(color=MEASURED, alpha=0.4)
-    axes[0].set_title("fitted to the data" if pendulum else "measured")
+    axes[0].lines[-1 if fitted else -2].set(color=MEASURED, alpha=0.4)
+    axes[0].set_title("fitted to the data" if fitted else "measured")
     for ax, (words, fit, colour) in zip(axes[1:], runs_shown, strict=True):
         run = runs.free_run(fit)
         ax.set_title(words)
@@ -65,7 +66,7 @@ def orbits(discovery: Discovery) -> Image:
 def forecast(discovery: Discovery) -> Image:
     """The first seconds of the held-out data, and what the models make of them."""
     found = runs.forecast(discovery)
-    name = "Z" if discovery.measurement.kind == "disk" else "theta"
+    name = discovery.fit.model.profile.shown.columns[-1]
     k = discovery.measurement.names.index(name)
     figure, ((ax,),) = blank(9.0, 3.2, top=0.4)
     ax.plot(found.t_seen, scale(name) * found.seen[:, k], ".", color=MEASURED, markersize=5, label="measured")

@@ -47,7 +47,7 @@ def report_of(
         The film is not the one that was tracked.
     """
     origin = film if source is None else source
-    of_own = discovery.fit.model.kind == "own"
+    of_own = discovery.fit.model.profile.written
     if of_own and film is not None:
         raise UddError("a film shows a disk, not a model of your own")
     fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]

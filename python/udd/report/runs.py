@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 
 _STEP = 0.01  # s
 _BEFORE = 1.0  # s of data shown before the start
-_SHOWN = {"disk": 3.0, "pendulum": 12.0}  # s
 
 
 @dataclass(frozen=True)
@@ -73,17 +72,18 @@ def forecast(discovery: Discovery) -> Forecast:
     t = fit.record.t
     origin = fit.record.origin
     first = min(int(np.searchsorted(t, discovery.split - origin)), len(t) - 2)
-    if m.kind == "disk":
-        shown_from, end = t[first] - _BEFORE, min(t[first] + _SHOWN["disk"], t[-1])
+    shown = fit.model.profile.shown
+    if shown.forecast_end:
+        shown_from, end = max(t[-1] - shown.forecast, t[first]), t[-1]
     else:
-        shown_from, end = max(t[-1] - _SHOWN["pendulum"], t[first]), t[-1]
+        shown_from, end = t[first] - _BEFORE, min(t[first] + shown.forecast, t[-1])
     times = np.arange(t[first] + _STEP, end, _STEP)
     before, after = (_predicted(f, first, times) for f in (discovery.baseline, fit))
-    shown = m.slice(shown_from + origin, end + origin)
-    seen = np.where(shown.seen[:, None], shown.values, np.nan)
+    rows = m.slice(shown_from + origin, end + origin)
+    seen = np.where(rows.seen[:, None], rows.values, np.nan)
     late = times >= shown_from
     times_seen, start = times[late] + origin, float(t[first]) + origin
-    return Forecast(start, shown.t, seen, times_seen, before[late], after[late])
+    return Forecast(start, rows.t, seen, times_seen, before[late], after[late])
 
 
 def side_by_side(discovery: Discovery, seconds: float) -> tuple[Array, Array, list[Array]]:

@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from udd import _core
+from udd.fitting.parameter_meanings import meaning
 from udd.plot.whiteness import shown_lags
 
 from . import wording
@@ -104,9 +105,7 @@ def _shown(unit: str) -> tuple[str, float]:
 def _meaning(name: str, discovery: Discovery) -> str:
     effect, dot, parameter = name.partition(".")
     if not dot:
-        if name == "k0" and discovery.measurement.kind == "pendulum":
-            return "viscous friction"
-        return wording.MEANINGS.get(name, name)
+        return meaning(name, discovery.measurement.kind) or name
     found = next((f for f in discovery.effects if f.effect.name == effect), None)
     return f"{found.title if found else effect}: {wording.pretty(parameter)}"
 
@@ -119,8 +118,7 @@ def units(fit: Fit) -> dict[str, str]:
 
 def measured(discovery: Discovery) -> Markup:
     """What was measured, in a few sentences."""
-    m, fitted = discovery.measurement, discovery.baseline.model.parameters
-    stated = discovery.baseline.problem.models[0].parameters
+    m, model = discovery.measurement, discovery.baseline.model
     several = len(discovery.fit.measurements)
     usable = int(m.seen.sum())
     rate = 1.0 / float(np.median(np.diff(m.t)))
@@ -132,13 +130,7 @@ def measured(discovery: Discovery) -> Markup:
         for name, own in zip(m.names, sd.T, strict=True)
     ]
     noise = ", ".join(each[:-1]) + (" and " if len(each) > 1 else "") + each[-1]
-    if m.kind == "disk":
-        what = (
-            f"The centre and the orientation of a disk of radius {100 * fitted['R']:g}\u00a0cm that two "
-            f"wheels lift at {100 * stated['W']:.3g}\u00a0cm/s (as stated)"
-        )
-    else:
-        what = f"The angle of a pendulum of {100 * stated['length']:.4g}\u00a0cm"
+    what = model.profile.shown.measured(model, discovery.baseline.problem.models[0])
     if several > 1:
         what = f"{several} records, fitted together; the pictures of the motion show the first. {what}"
     return Markup(

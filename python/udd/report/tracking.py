@@ -12,6 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from udd.errors import UddError
+from udd.models import profile_of
 from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
 
 from . import wording
@@ -63,9 +64,10 @@ def write_tracked(
     m: Measurement = found.measurement if isinstance(found, Tracking) else found
     if "calibration" not in m.meta or not m.quality:
         raise UddError("the measurement was not tracked in a film, so there is no page about it")
-    checked = health(m) if m.kind == "disk" else None
+    marks = profile_of(m.kind).sensor.sees_marks
+    checked = health(m) if marks else None
     sections = [_found(video, m), _calibrated(m), _each_frame(m, detail)]
-    if m.kind == "disk":
+    if marks:
         sections.append(_rolls(checked))
     write_page(Report(_head(m, checked), tuple(sections), identity(video), command), path)
 
@@ -80,7 +82,7 @@ def _head(m: Measurement, checked: Health | None) -> Head:
 def _found(video: str | os.PathLike[str], m: Measurement) -> Section:
     drawn = (
         "the fitted rim, the marks where the fit has them, and the contact (cross)"
-        if m.kind == "disk"
+        if profile_of(m.kind).sensor.sees_marks
         else "the bob, and the pivot (cross)"
     )
     shown = (
@@ -111,7 +113,7 @@ def _each_frame(m: Measurement, detail: Tracking | None) -> Section:
     off = (
         "Residual: r.m.s. distance of the marks from where the rigid body has them. In view: share of the "
         "marks' edges that is seen. "
-        if m.kind == "disk"
+        if profile_of(m.kind).sensor.sees_marks
         else "Residual: distance of the bob from its circle. In view: its area against the usual one. "
     )
     where = (
@@ -156,7 +158,7 @@ def headline(m: Measurement) -> str:
     """The whole result in one sentence."""
     usable = int(m.seen.sum())
     share = "Every frame" if usable == len(m) else f"{usable} of {len(m)} frames"
-    what = "the disk" if m.kind == "disk" else "the pendulum"
+    what = f"the {profile_of(m.kind).shown.noun}"
     gone = int(sum(str(f).startswith("gone") for f in m.flag))
     rest = f"; it leaves the wheels, and nothing is said of the last {gone} frames" if gone else ""
     return f"{share} of this film {'says' if usable == len(m) else 'say'} where {what} is{rest}"
@@ -170,11 +172,11 @@ def numbers(m: Measurement, checked: Health | None) -> tuple[Number, ...]:
             unit = "rad" if name in ("beta", "theta") else "m"
             spread = wording.length(float(np.nanmedian(m.sigma[:, k])), unit)
             out.append(Number(Markup("standard error of {}, typical").format(wording.pretty(name)), spread))
-    if m.kind == "disk":
-        value, sigma, _ = m.meta["calibration"]["W"]
+    if drive := profile_of(m.kind).dynamics.drive:
+        value, sigma, _ = m.meta["calibration"][drive]
         said = "–" if value is None else f"{100 * value:.4g} cm/s"
         error = "" if not sigma else f"± {100 * sigma:.1g} cm/s"
-        out.append(Number("drive W, as it is seen", said, error))
+        out.append(Number(f"drive {drive}, as it is seen", said, error))
     if checked is not None:
         noise = f"noise alone: {wording.length(checked.noise, 'm')}"
         out.append(Number("left of the rolling constraint", wording.length(checked.rms, "m"), noise))

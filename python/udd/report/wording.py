@@ -319,13 +319,13 @@ def limit(other: Alternative) -> str:
 def command(discovery: Discovery, source: str | None) -> str | None:
     """What `udd discover` takes to do the same; None where the file is not known."""
     known = discovery.baseline.problem.models[0]
-    if source is None or known.effects or known.kind == "own" or len(discovery.fit.measurements) > 1:
+    if source is None or known.effects or known.profile.written or len(discovery.fit.measurements) > 1:
         return None
-    given = {"disk": ["W"], "pendulum": ["length"]}[discovery.measurement.kind]
+    given = [next(iter(known.parameters))]  # which has no default
     made: Callable[[float], Model] = type(known)
     usual = made(known.parameters[given[0]])
     given += [name for name, value in known.parameters.items() if value != usual.parameters[name]]
-    names = {"length": "pendulum"}
+    names = known.profile.shown.options
     options = (f"--{names.get(name, name)} {known.parameters[name]!r}" for name in dict.fromkeys(given))
     return f"udd discover {shlex.quote(source)} {' '.join(options)} --report report.html"
 
@@ -357,13 +357,5 @@ def limits(discovery: Discovery) -> list[str]:
         )
     else:
         result.append("Only the effects of the library were tried; the table above names the best.")
-    if discovery.measurement.kind == "disk":
-        result.append(
-            "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that "
-            "all lean the same way look upright: only angles between them can be seen."
-        )
-    else:
-        result.append(
-            "Gravity was taken as known; only the ratio of the length to the inertia sets the period."
-        )
+    result.append(discovery.fit.model.profile.shown.taken_as_known)
     return result

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import ModelError
-from udd.models import DLE, Disk, Model, Pendulum
+from udd.models import Disk
 
 from .trajectory import Trajectory
 
@@ -88,38 +88,14 @@ def energy_balance(run: Trajectory) -> EnergyBalance:
     """
     model, t, state = run.model, run.t, run.state
     rates = model.rates(t, state)
-    if isinstance(model, DLE):
-        omega = state[:, 0]
-        stored, motor = omega**2 / 2 + state[:, 2], model.w
-        change, friction = omega * rates[:, 0] + rates[:, 2], omega**2
-    elif isinstance(model, Disk):
-        omega, y, z = state[:, :3].T
-        inertia = model.R**2 / 2 + y**2 + z**2
-        stored, motor = inertia * omega**2 / 2 + model.g * z, model.g * model.W
-        turning = inertia * omega * rates[:, 0] + (y * rates[:, 1] + z * rates[:, 2]) * omega**2
-        change = turning + model.g * rates[:, 2]
-        friction = _friction(model, model.R**2 / 2, omega)
-    elif isinstance(model, Pendulum):
-        omega, theta = state[:, :2].T
-        weight = model.g * model.length
-        stored, motor = model.inertia * omega**2 / 2 - weight * np.cos(theta), 0.0
-        change = model.inertia * omega * rates[:, 0] + weight * np.sin(theta) * rates[:, 1]
-        friction = _friction(model, model.inertia, omega)
-    else:
+    energy = model.profile.dynamics.energy
+    if energy is None:
         raise ModelError("no energy is known of a model of your own")
+    stored, motor, change, friction = energy(model, state, rates)
     effects = change - motor + friction
     if not model.effects and getattr(model, "B", 0.0) == 0.0:
         effects = np.zeros(len(t))  # but for rounding it is so
     return EnergyBalance(t, stored, np.full(len(t), motor), friction, effects)
-
-
-def _friction(model: Model, inertia: float, omega: Array) -> Array:
-    """``k Omega^2`` of the plain law, from its rates where neither gravity nor the drive exerts a torque."""
-    plain = model.with_effects(())
-    state = np.zeros((len(omega), len(plain.state_names)))
-    state[:, 0] = omega
-    result: Array = -inertia * omega * plain.rates(0.0, state)[:, 0]
-    return result
 
 
 def angular_momentum(model: Disk, state: Array) -> Array:

@@ -206,7 +206,7 @@ def method_for(model: Model, method: str, rtol: float) -> str:
     if any(getattr(effect, "treatment", "smoothed") not in (None, "smoothed") for effect in effects):
         return "dop853" if rtol <= 1e-8 else "dopri5"
     # A law that a user wrote may depend on comparisons.
-    written = model.kind == "own" or any(effect.made for effect in effects)
+    written = model.profile.written or any(effect.made for effect in effects)
     return "dop853" if written and not _core.has_series(model) else "auto"
 
 

@@ -18,7 +18,7 @@ from udd import _core
 from udd._util.validation import number
 from udd.chaos.largest_exponent import span
 from udd.errors import IntegrationError, ModelError
-from udd.models import DLE, Model
+from udd.models import Model
 from udd.models.parameter_batch import outside_domain
 from udd.simulation.batch import Batch
 from udd.simulation.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED, OUTCOMES
@@ -62,7 +62,12 @@ def _chosen(given: Mapping[str, Any], defaults: Mapping[str, float | None]) -> d
 
 
 def _time_unit(model: Model) -> str:
-    return "1" if isinstance(model, DLE) else "s"
+    return model.profile.dynamics.time_unit or "1"
+
+
+def _rate_unit(model: Model) -> str:
+    unit = model.profile.dynamics.time_unit
+    return f"1/{unit}" if unit else "1"
 
 
 # --- Lyapunov exponents
@@ -77,7 +82,7 @@ def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
 
 
 def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
-    unit = "1" if isinstance(model, DLE) else "1/s"
+    unit = _rate_unit(model)
     return (
         Variable("value", unit, "largest Lyapunov exponent"),
         Variable("standard_error", unit, "its standard error"),
@@ -86,7 +91,7 @@ def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
 
 
 def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
-    unit = "1" if isinstance(model, DLE) else "1/s"
+    unit = _rate_unit(model)
     numbers = (("number", len(model.state_names)),)
     return (
         Variable("value", unit, "Lyapunov exponents", more=numbers),

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.parallel import parallel_map
-from udd.discovery.scoring.coordinates import Coordinate, Slot, coordinates, slots
+from udd.discovery.scoring.coordinates import Slot, coordinates, slots
 from udd.discovery.scoring.forcing import Responses, Score, responses, score_forcings
 from udd.fitting import Fit
 from udd.models import Model
+from udd.models.profile import Coordinate
 
 from .bsplines import Spline, along, product, rough_product
 from .penalized_curves import Absorbed, chance, smooth

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
-from udd.models import Disk, Model
+from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
@@ -76,9 +76,12 @@ def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     t : ndarray (n,)
         Times of the record's frames, s.
     """
-    if not isinstance(model, Disk) or model.W == 0 or "drive_ripple" in {e.name for e in model.effects}:
+    spec, drive = effects.drive_ripple().spec, model.profile.dynamics.drive
+    if model.kind not in spec.bodies or drive is None or model.parameters[drive] == 0:
+        return []
+    if spec.name in {e.name for e in model.effects}:
         return []
     duration, step = t[-1] - t[0], np.median(np.diff(t))
-    low, high = next(p.range for p in effects.drive_ripple().spec.parameters if p.role == "frequency")
+    low, high = next(p.range for p in spec.parameters if p.role == "frequency")
     frequencies = np.arange(max(2.0 / duration, low), min(0.25 / step, 6.0, high), 0.5 / duration)
     return [Candidate(effects.drive_ripple(f=float(f)), f"drive ripple at {f:.3g} Hz") for f in frequencies]

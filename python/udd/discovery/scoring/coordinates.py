@@ -10,35 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import FitError
-from udd.models import Disk, Model, Pendulum
+from udd.models import Model
 from udd.models.formula_model import FormulaModel
+from udd.models.profile import Coordinate
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """Something that a curve can be a function of.
-
-    Attributes
-    ----------
-    name : str
-        As the formulas' grammar and the pictures call it.
-    of : callable
-        ``(t, states) -> values``, states with the components along the last axis.
-    rate : callable
-        ``(states, rates) -> values``: how fast it changes along the motion.
-    angle : bool
-        Whether it counts modulo a turn.
-    text : str
-        What it is in formulas.
-    """
-
-    name: str
-    of: Callable[[Array, Array], Array]
-    rate: Callable[[Array, Array], Array]
-    angle: bool
-    text: str
 
 
 @dataclass(frozen=True)
@@ -79,11 +55,7 @@ def coordinates(model: Model) -> tuple[Coordinate, ...]:
     if "Omega" in model.state_names:
         k = model.state_names.index("Omega")
         own.append(Coordinate("|Omega|", partial(_size, k), partial(_growth, k), False, "abs(Omega)"))
-    if isinstance(model, Disk):
-        own += [
-            Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
-            Coordinate("theta", _azimuth, _azimuthal, True, "atan2(Y, Z)"),
-        ]
+    own += model.profile.discovery.coordinates
     own.append(Coordinate("t", _time, _passing, False, "t"))
     return tuple(own)
 
@@ -128,27 +100,6 @@ def _passing(x: Array, _v: Array) -> Array:
     return np.ones(x.shape[:-1])
 
 
-def _azimuth(_t: Array, x: Array) -> Array:
-    result: Array = np.arctan2(x[..., 1], x[..., 2])
-    return result
-
-
-def _distance(_t: Array, x: Array) -> Array:
-    result: Array = np.hypot(x[..., 1], x[..., 2])
-    return result
-
-
-def _radial(x: Array, v: Array) -> Array:
-    result: Array = (x[..., 1] * v[..., 1] + x[..., 2] * v[..., 2]) / np.hypot(x[..., 1], x[..., 2])
-    return result
-
-
-def _azimuthal(x: Array, v: Array) -> Array:
-    squared = x[..., 1] ** 2 + x[..., 2] ** 2
-    result: Array = (x[..., 2] * v[..., 1] - x[..., 1] * v[..., 2]) / squared
-    return result
-
-
 def slots(model: Model) -> tuple[Slot, ...]:
     """Where a model's unknown curves are tried.
 
@@ -156,17 +107,10 @@ def slots(model: Model) -> tuple[Slot, ...]:
     them), a pendulum's torque and friction; any other model's are the equations themselves, but
     for those that only say that one state is the rate of another.
     """
-    if isinstance(model, Disk):
-        turning = (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
-        moving = tuple(
-            Slot(name, momentum, equation, partial(_moving, equation, momentum))
-            for name, equation in (("lateral", "Y"), ("vertical", "Z"))
-            for momentum in ("constraint", "consistent")
-        )
-        return turning + moving
-    if isinstance(model, Pendulum):
-        return (Slot("torque", None, "Omega", _torque), Slot("friction", None, "Omega", _friction))
-    known = model.kinematic if isinstance(model, FormulaModel) else ()
+    named = model.profile.discovery.slots
+    if named is not None:
+        return tuple(Slot(*own, _forcing(*own)) for own in named)
+    known = model.kinematic
     along = {v: x for x, v in model.speeds.items()} if isinstance(model, FormulaModel) and model.mass else {}
     return tuple(
         Slot(f"force({along[name]})", None, name, partial(_force, name))
@@ -177,11 +121,17 @@ def slots(model: Model) -> tuple[Slot, ...]:
     )
 
 
+def _forcing(name: str, momentum: str | None, equation: str) -> Callable[[Model, Array, Array, Array], Array]:
+    """What a curve in an effect's slot adds to the rates."""
+    if name in ("torque", "friction"):
+        return _torque if name == "torque" else _friction
+    return partial(_moving, equation, momentum)
+
+
 def _inertia(model: Model, x: Array) -> Array | float:
-    if isinstance(model, Disk):
-        inertia: Array = model.R**2 / 2 + x[..., 1] ** 2 + x[..., 2] ** 2
-        return inertia
-    return float(model.parameters["inertia"])
+    inertia = model.profile.dynamics.inertia
+    assert inertia is not None  # of a model whose effects enter by slots
+    return inertia(model, x)
 
 
 def _torque(model: Model, x: Array, value: Array, _rate: Array) -> Array:
@@ -194,7 +144,7 @@ def _friction(model: Model, x: Array, value: Array, rate: Array) -> Array:
     return _torque(model, x, -value * x[..., 0], rate)
 
 
-def _moving(equation: str, momentum: str, model: Model, x: Array, value: Array, rate: Array) -> Array:
+def _moving(equation: str, momentum: str | None, model: Model, x: Array, value: Array, rate: Array) -> Array:
     result = np.zeros(x.shape)
     result[..., ("Omega", "Y", "Z").index(equation)] = value
     if momentum == "consistent":

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd.fitting import Fit
+from udd.models.profile import Coordinate
 
-from .coordinates import Coordinate, Slot
+from .coordinates import Slot
 
 Array = NDArray[np.float64]
 

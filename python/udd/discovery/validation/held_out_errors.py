@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -18,16 +19,6 @@ Array = NDArray[np.float64]
 #: A ratio and its 95 % interval.
 Ratio = tuple[float, float, float]
 
-#: Horizons of the free runs, s; those longer than a third of the held-out part are left out. Of a user's own
-#: model all times here count in units of its motion's pace, see :func:`pace`.
-HORIZONS = {
-    "disk": (0.2, 0.4, 1.0, 2.0, 4.0),
-    "pendulum": (0.5, 1.0, 4.0, 10.0, 20.0),
-    "own": (0.2, 0.4, 1.0, 2.0, 4.0),
-}
-# s of data before each start, from which its state is filtered
-_FILTER = {"disk": 1.0, "pendulum": 4.0, "own": 1.0}
-_FILTER_LEVEL = {"disk": 1, "pendulum": 3, "own": 2}  # how tightly, by the place in the schedule
 _AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
@@ -115,9 +106,10 @@ def held_out_errors(
     unit : float
         See :func:`pace`.
     """
-    kind = fit.model.kind
-    wanted = tuple(h * unit for h in HORIZONS[kind])
-    windows, ends, horizons = _windows(record, held, wanted, _FILTER[kind] * unit, _EVERY * unit)
+    profile = fit.model.profile
+    wanted = tuple(h * unit for h in profile.discovery.horizons)
+    window = profile.discovery.filter_window * unit
+    windows, ends, horizons = _windows(record, held, wanted, window, _EVERY * unit)
     firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
@@ -133,7 +125,7 @@ def held_out_errors(
     blocks = own_blocks[starts]
     low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
     return Errors(
-        unit={"disk": "m", "pendulum": "rad", "own": "spread"}[kind],
+        unit=profile.sensor.error_unit,
         horizons=horizons,
         median=np.nanmedian(samples, axis=0),
         low=low,
@@ -220,8 +212,8 @@ def lacks_more(fit: Fit, errors: Errors) -> bool:
     """
     if fit.scatter > UNEXPLAINED:
         return True
-    own = fit.model.kind == "own"
-    return own and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
+    written = fit.model.profile.written
+    return written and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
 
 
 def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -> bool:
@@ -278,7 +270,7 @@ def _windows(
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
     """States at the windows' first and last frames."""
-    diffusion = fit.problem.schedule[_FILTER_LEVEL[fit.model.kind]]
+    diffusion = fit.problem.schedule[fit.model.profile.discovery.filter_level]
     first, last, _covariance = filtered(fit, record, windows, diffusion)
     return first, last
 
@@ -344,9 +336,9 @@ def _floor(
 def _shown(fit: Fit, record: Record) -> Array | float:
     """The noise of a record's frames as they show it themselves, (n, m): a search may assume more.
 
-    Of a disk's film the search's is the frames' own.
+    Of a film of marks the search's is the frames' own.
     """
-    if fit.model.kind == "disk":
+    if fit.model.profile.sensor.sees_marks:
         return np.inf
     result = np.full(record.seen.shape, np.inf)
     for film in range(len(record.origins)):
@@ -367,10 +359,11 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
     """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread."""
     difference = a - b
     result: Array
-    if fit.model.kind == "disk":
-        return np.hypot(difference[..., 0], difference[..., 1])
-    if fit.model.kind == "pendulum":
-        result = np.abs(_turned(difference[..., 0]))
+    sensor = fit.model.profile.sensor
+    if sensor.compared:
+        if sensor.error_unit == "rad":
+            difference = _turned(difference)
+        result = np.abs(reduce(np.hypot, np.moveaxis(difference[..., : sensor.compared], -1, 0)))
         return result
     squares = []
     for k in np.flatnonzero(record.observed.any(axis=0)):

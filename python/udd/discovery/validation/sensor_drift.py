@@ -70,7 +70,7 @@ def as_random(known: Fit, found: Fit) -> Fit | None:
     Fit or None
         None where they do not, or where no such forces are needed.
     """
-    if found.model.kind == "disk":
+    if found.model.profile.sensor.sees_marks:
         return None
     likeliest = eased(found)
     tight = likeliest.level == len(likeliest.problem.schedule) - 1
