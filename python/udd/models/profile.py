@@ -314,7 +314,7 @@ class ShownProfile:
     columns : tuple of str
         What is drawn over time by default, all in one unit; a forecast's picture shows the last one.
     path : tuple of (str, str)
-        Across and up in the picture of an orbit.
+        Across and up in the picture of an orbit; empty where none is drawn.
     space : tuple of str, or None
         The axes of phase space; None where that is a plane.
     contact : bool
@@ -339,7 +339,7 @@ class ShownProfile:
 
     noun: str = ""
     columns: tuple[str, ...] = ()
-    path: tuple[str, str] = ("", "")
+    path: tuple[str, ...] = ()
     space: tuple[str, ...] | None = None
     contact: bool = False
     movie: float = 6.0

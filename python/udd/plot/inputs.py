@@ -58,7 +58,9 @@ class Motion:
 
     @property
     def _class(self) -> type[Model]:
-        drawn = [cls for cls in COMPILED.values() if set(cls.profile.shown.columns) <= set(self.columns)]
+        """The model whose last column in pictures is there, or all of whose states are."""
+        there = set(self.columns)
+        drawn = [c for c in COMPILED.values() if set(c.profile.shown.columns[-1:] or c.state_names) <= there]
         return next((cls for cls in drawn if isinstance(self.model, cls)), drawn[0] if drawn else DLE)
 
     def __getitem__(self, name: str) -> Array:

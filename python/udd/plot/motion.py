@@ -92,6 +92,8 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
     drawn = motions(result)
     profile = drawn[0].profile
     shown, columns = profile.shown, profile.sensor.columns
+    if not shown.path:
+        raise UddError(f"nothing says how the orbit of {drawn[0].model!r} is drawn")
     across, up = shown.path
     if columns and up not in columns:
         if up not in drawn[-1].columns:
