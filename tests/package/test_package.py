@@ -27,6 +27,10 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         udd.no_such_thing  # noqa: B018
 
 
+def test_the_version_is_that_of_the_package() -> None:
+    assert udd.__version__ == version("udd")
+
+
 def test_import_stays_light() -> None:
     # In a process of its own: here the other tests have imported everything already.
     code = "import sys, udd; print(*{name.partition('.')[0] for name in sys.modules})"
