@@ -1,0 +1,34 @@
+"""The argument `rng` (SPEC 7), and the name that it had before."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TypeAlias
+
+import numpy as np
+
+from udd.errors import ModelError
+
+#: What a random generator is made of; None takes fresh entropy.
+Rng: TypeAlias = int | np.random.Generator | None
+
+
+def generator(rng: Rng, seed: int | None) -> np.random.Generator:
+    """The generator of `rng`, or of `seed`, which works for one release more.
+
+    Raises
+    ------
+    ModelError
+        No generator can be made of it.
+    """
+    if seed is not None:
+        warnings.warn("seed is called rng now", DeprecationWarning, stacklevel=3)
+        rng = seed
+    try:
+        if isinstance(rng, bool):
+            raise TypeError
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"rng must be a whole number, 0 or more, a numpy.random.Generator or None, not {rng!r:.80}"
+        ) from None
