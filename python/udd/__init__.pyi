@@ -55,6 +55,8 @@ from .models import DLE as DLE
 from .models import Disk as Disk
 from .models import Model as Model
 from .models import Pendulum as Pendulum
+from .result_file import load as load
+from .result_file import save as save
 from .simulation.energy import energy_balance as energy_balance
 from .simulation.ensembles import Ensemble as Ensemble
 from .simulation.ensembles import ensemble as ensemble
