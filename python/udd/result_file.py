@@ -118,6 +118,12 @@ def load(path: str | os.PathLike[str]) -> Fit | Discovery:
     ------
     UddError
         There is no such file, it is not whole, or not one of these.
+
+    Examples
+    --------
+    >>> import udd
+    >>> fit = udd.load("fit.npz")  # doctest: +SKIP
+    >>> print(fit.summary())  # doctest: +SKIP
     """
     try:
         content = Path(path).read_bytes()
