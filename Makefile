@@ -71,7 +71,7 @@ test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" fo
 bench-page: .venv/.browser ## the page's frames per second and its delay from slider to frame
 	$(PY) benches/python/page.py
 
-lint: lint-rust lint-python ## rustfmt, clippy, ruff, mypy --strict, and the stub of udd._core against the module
+lint: lint-rust lint-python ## rustfmt, clippy, ruff, zizmor, mypy --strict, and the stub of udd._core against the module
 
 lint-rust: .venv/.made
 	cargo fmt --check
@@ -81,6 +81,7 @@ lint-python: .venv/.ready-user .venv/.ready-lint
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/lint-imports
+	$(BIN)/zizmor --offline --quiet .github
 	$(STEP) "mypy" $(BIN)/mypy --strict python/udd
 	$(STEP) "stubtest" $(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
 

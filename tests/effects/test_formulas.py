@@ -220,3 +220,12 @@ def test_a_fit_finds_a_formulas_numbers_as_the_librarys_effects() -> None:
     wanted = -0.01 * speed - 0.05 * np.abs(speed) * speed
     # That a spline bends where the drag's curvature jumps is less than the error.
     assert (np.abs(basis @ coefficients[places] - wanted) < 4.0 * error).all() and (error < 0.02).all()
+
+
+@pytest.mark.parametrize("kind", ["curve", "surface", "formula"])
+def test_a_key_that_an_effect_does_not_have_is_told_with_those_it_has(kind: str) -> None:
+    with pytest.raises(udd.UddError, match=rf"this {kind} .* no 'slto'; there are slot, .*momentum"):
+        serialization.from_dict({kind: {"slto": "torque"}})
+    with pytest.raises(udd.UddError) as error:
+        serialization.from_dict({kind: {"x" * 5000: 1}})
+    assert len(str(error.value)) < 300

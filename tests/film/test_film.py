@@ -252,7 +252,7 @@ def test_dense_output_bridges_any_gap(tmp_path: Path) -> None:
 
 def test_the_same_seed_gives_the_same_film(tmp_path: Path) -> None:
     run = plain_run(0.3)
-    films = [render(run, tmp_path / f"{i}.mp4", seed=seed).path for i, seed in enumerate((1, 1, 2))]
+    films = [render(run, tmp_path / f"{i}.mp4", rng=seed).path for i, seed in enumerate((1, 1, 2))]
     assert films[0].read_bytes() == films[1].read_bytes()
     first, _, other = (decode(path)[0] for path in films)
     assert (first != other).mean() > 0.1
@@ -357,7 +357,7 @@ def test_bad_values_are_named(tmp_path: Path) -> None:
         ("noise", {"noise": -1.0}),
         ("noise", {"noise": float("nan")}),
         ("quality", {"quality": 52.0}),
-        ("seed", {"seed": -1}),
+        ("rng", {"rng": -1}),
         ("background", {"background": np.zeros((3, 4, 3))}),
         ("background", {"background": (0, 0, 300)}),
     ]:
@@ -418,3 +418,14 @@ def test_without_the_extra_the_sentence_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     refused(tmp_path / "film.mp4", r"udd\[track\]")
+
+
+def test_a_generator_a_whole_number_and_the_name_of_before_give_the_same_film(tmp_path: Path) -> None:
+    run = plain_run(0.1)
+    films = [render(run, tmp_path / "0.mp4", rng=5).path]
+    films.append(render(run, tmp_path / "1.mp4", rng=np.random.default_rng(5)).path)
+    with pytest.warns(DeprecationWarning, match=r"seed=\.\.\.\) is called rng="):
+        films.append(render(run, tmp_path / "2.mp4", seed=5).path)  # type: ignore[call-arg]
+    assert len({path.read_bytes() for path in films}) == 1
+    fresh = [render(run, tmp_path / f"{i}.mp4", rng=None).path.read_bytes() for i in (3, 4)]
+    assert fresh[0] != fresh[1]

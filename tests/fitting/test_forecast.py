@@ -125,7 +125,7 @@ def test_a_model_is_fitted_first(swing: tuple[udd.Measurement, np.ndarray], swun
 
 
 def test_the_seed_decides(swing: tuple[udd.Measurement, np.ndarray], swung: udd.Fit) -> None:
-    one, two, other = (udd.forecast(swing[0], swung, 2.0, members=20, seed=s) for s in (3, 3, 4))
+    one, two, other = (udd.forecast(swing[0], swung, 2.0, members=20, rng=s) for s in (3, 3, 4))
     np.testing.assert_array_equal(one.members, two.members)
     assert (one.members != other.members).any()
 
@@ -248,3 +248,16 @@ def test_a_users_own_model_is_run_on_too(x):
     assert inside.mean() > 0.7
     assert np.abs(found.median[:, 0] - motion[600:, 0]).max() < 0.02
     assert found.to_dict()[x]["median"].shape == (200,)
+
+
+def test_a_generator_and_the_name_of_before_give_the_same_fan(
+    swing: tuple[udd.Measurement, np.ndarray], swung: udd.Fit
+) -> None:
+    one = udd.forecast(swing[0], swung, 2.0, members=20, rng=3)
+    other = udd.forecast(swing[0], swung, 2.0, members=20, rng=np.random.default_rng(3))
+    with pytest.warns(DeprecationWarning, match=r"seed=\.\.\.\) is called rng="):
+        before = udd.forecast(swing[0], swung, 2.0, members=20, seed=3)
+    np.testing.assert_array_equal(one.members, other.members)
+    np.testing.assert_array_equal(one.members, before.members)
+    with pytest.raises(udd.errors.ModelError, match="rng must be a whole number, 0 or more"):
+        udd.forecast(swing[0], swung, 2.0, members=20, rng=-1)

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from packaging.version import Version
 
 import udd
 
@@ -27,6 +28,10 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         udd.no_such_thing  # noqa: B018
 
 
+def test_the_version_is_that_of_the_package() -> None:
+    assert udd.__version__ == version("udd")
+
+
 def test_import_stays_light() -> None:
     # In a process of its own: here the other tests have imported everything already.
     code = "import sys, udd; print(*{name.partition('.')[0] for name in sys.modules})"
@@ -40,4 +45,6 @@ def test_one_version_everywhere() -> None:
     cargo = tomllib.loads((ROOT / "Cargo.toml").read_text())["package"]["version"]
     citation = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
     assert citation is not None
-    assert (version("udd"), citation[1]) == (cargo, cargo)
+    assert citation[1] == cargo
+    # Cargo writes 0.2.0-dev, Python 0.2.0.dev0.
+    assert Version(version("udd")) == Version(cargo)

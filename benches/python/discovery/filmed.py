@@ -49,6 +49,6 @@ def filmed(motion: Run, duration: float, rng: np.random.Generator) -> udd.Measur
             noise=float(rng.uniform(1, 4)),
             quality=float(rng.uniform(16, 24)),
             defects=defects,
-            seed=int(rng.integers(1 << 31)),
+            rng=int(rng.integers(1 << 31)),
         )
         return udd.track(path)

@@ -71,7 +71,7 @@ def film(case: Case, folder: Path, seed: int) -> Film:
         made: Film = pickle.loads(noted.read_bytes())
         return made
     options = {"exposure": 0.010, "codec": "mp4v", **case.options}
-    made = udd.render(run(case, seed), path, seed=seed, defects=Defects(**case.defects), **options)
+    made = udd.render(run(case, seed), path, rng=seed, defects=Defects(**case.defects), **options)
     noted.write_bytes(pickle.dumps(made))
     return made
 

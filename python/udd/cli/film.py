@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         quality=args.quality,
         codec=args.codec,
         defects=defects,
-        seed=args.seed,
+        rng=args.seed,
         progress=is_terminal(),
     )
     left = ", until the disk leaves the wheels" if trajectory.outcome == "ejected" else ""

@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> CommandResult:
             members=args.members,
             level=args.level,
             error=args.error,
-            seed=args.seed,
+            rng=args.seed,
         )
     for path in args.out:
         _write(path, found)

@@ -34,7 +34,7 @@ def main(folder: Path) -> None:
             if s.name in hidden
         )
         run = between_wheels(tuple(effects), seed)
-        film = render(run, folder / name, quality=QUALITY, seed=seed, progress=sys.stderr.isatty())
+        film = render(run, folder / name, quality=QUALITY, rng=seed, progress=sys.stderr.isatty())
         size = film.path.stat().st_size / 1e6
         print(f"{name}: {len(film.t)} frames, {size:.2f} MB, start {run.state[0].tolist()}")
 

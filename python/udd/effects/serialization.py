@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,13 @@ from udd.errors import ModelError
 
 from .spec import Effect
 from .user_defined import UNLIMITED, CurveSpec, FormulaSpec, SurfaceSpec, curve, surface, written
+
+#: What stands in each kind of effect.
+_KEYS = {
+    "formula": ("slot", "expression", "parameters", "name", "title", "amplitudes", "ranges", "momentum"),
+    "curve": tuple(signature(curve).parameters),
+    "surface": tuple(signature(surface).parameters),
+}
 
 
 def to_dict(effect: Effect) -> dict[str, Any]:
@@ -44,6 +52,9 @@ def from_dict(data: Mapping[str, Any]) -> Effect:
     ((kind, content),) = data.items()
     try:
         given = dict(content)
+        for key in given:
+            if key not in _KEYS[kind]:
+                raise ModelError(f"it has no {key!r:.80}; there are {', '.join(_KEYS[kind])}")
         momentum = given.pop("momentum", None)
         if kind == "curve":
             return curve(**given, momentum=momentum)

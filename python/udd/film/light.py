@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd.video.srgb import code_of, light_of
+
 Picture = NDArray[np.float32]
 
 _LEVELS = 1 << 14
@@ -13,12 +15,12 @@ _LEVELS = 1 << 14
 def to_light(code: ArrayLike) -> Picture:
     """Return the linear light, 0 to 1, of sRGB codes 0 to 255."""
     v = np.asarray(code, dtype=np.float64) / 255.0
-    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return light_of(v).astype(np.float32)
 
 
 def _table() -> Picture:
     x = np.arange(_LEVELS) / (_LEVELS - 1)
-    return (255.0 * np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)).astype(np.float32)
+    return (255.0 * code_of(x)).astype(np.float32)
 
 
 _CODES = _table()
@@ -30,18 +32,18 @@ def to_code(light: Picture) -> Picture:
 
 
 class Noise:
-    """Normal sensor noise of standard deviation `sd` codes, from a seed; no noise for sd = 0.
+    """Normal sensor noise of standard deviation `sd` codes, from a generator; no noise for sd = 0.
 
     A uniform 16-bit number picks a quantile from a table: the same normal law to 4.2 standard deviations
     as a normal generator gives, at a quarter of the time.
     """
 
-    def __init__(self, sd: float, seed: int) -> None:
+    def __init__(self, sd: float, rng: np.random.Generator) -> None:
         from scipy.special import ndtri
 
         n = 1 << 16
         self.sd = sd
-        self._bits = np.random.PCG64(seed)
+        self._rng = rng
         self._table = (sd * ndtri((np.arange(n) + 0.5) / n)).astype(np.float32)
 
     def on(self, codes: Picture) -> NDArray[np.uint8]:
@@ -50,6 +52,7 @@ class Noise:
 
         if self.sd == 0:
             return np.rint(codes).astype(np.uint8)
-        raw = self._bits.random_raw((codes.size + 3) // 4).view(np.uint16)[: codes.size]
+        bits = self._rng.integers(0, 2**64 - 1, (codes.size + 3) // 4, np.uint64, endpoint=True)
+        raw = bits.view(np.uint16)[: codes.size]
         noise = np.take(self._table, raw, mode="clip").reshape(codes.shape)
         return np.asarray(cv2.add(codes, noise, dtype=cv2.CV_8U), dtype=np.uint8)

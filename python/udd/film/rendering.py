@@ -12,7 +12,8 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from udd._util.keywords import with_defaults
+from udd._util.keywords import renamed, with_defaults
+from udd._util.random_generator import Rng, generator
 from udd.errors import UddError
 from udd.measurement import Measurement
 from udd.video.writer import CODECS, checked_path, require_video, write_film
@@ -69,6 +70,7 @@ class Film:
         return Measurement(self.t, values, meta={"R": self.radius, "source": self.path.name})
 
 
+@renamed(seed="rng")
 def render(
     trajectory: TrajectoryLike,
     path: str | os.PathLike[str],
@@ -80,7 +82,7 @@ def render(
     codec: str = "h264",
     defects: Defects | None = None,
     layout: Sequence[Mapping[str, Any]] | None = None,
-    seed: int = 0,
+    rng: Rng = 0,
     progress: bool = False,
     **camera: Unpack[CameraOptions],
 ) -> Film:
@@ -119,8 +121,8 @@ def render(
     layout : sequence of mappings, optional
         Square marks instead of the four: ``{"at": [y, z], "colour": "red"}`` or ``{"at": [y, z], "tag":
         "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given); sides upright at beta = 0.
-    seed : int
-        Seed of the noise. The same call gives the same film.
+    rng : int, Generator or None
+        Of the noise. The same whole number gives the same film; None takes fresh entropy.
     progress : bool
         Show a progress bar.
     **camera
@@ -158,7 +160,8 @@ def render(
     radius = float(getattr(getattr(trajectory, "model", None), "R", 0.08))
     defects = Defects() if defects is None else defects
     view = make_camera(radius, with_defaults("render", CAMERA_OPTIONS, camera))
-    _check_rest(support, noise, quality, seed)
+    _check_rest(support, noise, quality)
+    random = generator(rng)
     if codec not in CODECS:
         raise UddError(f"codec must be one of {', '.join(CODECS)}, got {codec!r}")
     if codec == "mp4v" and defects.dropped:
@@ -181,7 +184,7 @@ def render(
     scene = Scene(view, radius, wall, support, defects, _patches(layout, radius))
     write_film(
         target,
-        _frames(scene, motion, t[0] + stamps, numbers, defects, Noise(noise, seed), progress),
+        _frames(scene, motion, t[0] + stamps, numbers, defects, Noise(noise, random), progress),
         view.size,
         view.rate,
         quality,
@@ -256,9 +259,7 @@ def _background(background: ArrayLike | None, camera: Camera, radius: float) -> 
     return np.ascontiguousarray(np.broadcast_to(to_light(codes), (height, width, 3)))
 
 
-def _check_rest(support: float, noise: float, quality: float, seed: int) -> None:
+def _check_rest(support: float, noise: float, quality: float) -> None:
     for name, value, top in (("support", support, 10.0), ("noise", noise, 100.0), ("quality", quality, 51.0)):
         if not (math.isfinite(value) and 0 <= value <= top):
             raise UddError(f"{name} must be from 0 to {top:g}, got {value!r}")
-    if not (isinstance(seed, int | np.integer) and seed >= 0):
-        raise UddError(f"seed must be a whole number, 0 or more, got {seed!r}")

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.keywords import renamed
 from udd._util.progress import thread_count
+from udd._util.random_generator import Rng, generator
 from udd._util.validation import array, number
 from udd.chaos.largest_exponent import lyapunov
 from udd.errors import FitError, IntegrationError, ModelError
@@ -131,6 +133,7 @@ class Forecast:
         )
 
 
+@renamed(seed="rng")
 def forecast(
     measurement: Measurement,
     model: Model | Fit,
@@ -143,7 +146,7 @@ def forecast(
     error: float | None = None,
     film: int | None = None,
     process: bool = True,
-    seed: int = 0,
+    rng: Rng = 0,
 ) -> Forecast:
     """Forecast the motion from the last second of a measurement, with the fan of an ensemble.
 
@@ -179,8 +182,8 @@ def forecast(
         the one that it is.
     process : bool
         Whether the members are kicked. Without, the model's equations are taken as exact.
-    seed : int
-        The same seed gives the same ensemble.
+    rng : int, Generator or None
+        Of the ensemble. The same whole number gives the same one; None takes fresh entropy.
 
     Returns
     -------
@@ -217,6 +220,7 @@ def forecast(
     if not isinstance(measurement, Measurement):
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     asked = _options(members, level)
+    random = generator(rng)
     if t is not None:
         _times(t, _STEP)
     known = measurement
@@ -246,14 +250,13 @@ def forecast(
     record = record_of(known, fitted.model if profile.written else None)
     film = _film(fitted, measurement, film)
     part, origin = _window(fitted, film, record, length)
-    rng = np.random.default_rng(seed)
 
     scale = max(fitted.scatter, 1.0) ** 0.5
-    models, cameras, states = _starts(fitted, film, part, asked, scale, rng)
+    models, cameras, states = _starts(fitted, film, part, asked, scale, random)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
-    runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, rng)
+    runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, random)
     shown = [fitted.channels.index(name) for name in measurement.names]
     seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
     spread = np.nanstd(known.values, axis=0)

@@ -28,7 +28,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "equations": model.equations,
             "parameters": [list(pair) for pair in model.values],  # in order, which a table need not keep
             "angles": list(model.angles),
-            "effects": [_effect_to_dict(effect) for effect in model.effects],
+            "effects": [effect_to_dict(effect) for effect in model.effects],
         }
         return own | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
     cls = type(model)
@@ -37,7 +37,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         for name in (*cls._plain, *cls._options):
             result[name] = getattr(model, name)
         if "effects" in result:
-            result["effects"] = [_effect_to_dict(effect) for effect in model.effects]
+            result["effects"] = [effect_to_dict(effect) for effect in model.effects]
         if model_from_dict(result) == model:
             return result
     raise ModelError(f"a sweep cannot write this model down: {model!r}")
@@ -55,7 +55,7 @@ def model_from_dict(data: object) -> Model:
     kind = given.pop("kind", None)
     if kind == FormulaModel.kind:
         if isinstance(given.get("effects"), list):
-            given["effects"] = [_effect_from_dict(effect) for effect in given["effects"]]
+            given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
         try:
             return FormulaModel(**given | {"parameters": dict(given.get("parameters", {}))})
         except (TypeError, ValueError):
@@ -68,7 +68,7 @@ def model_from_dict(data: object) -> Model:
     if "effects" in given:
         if not isinstance(given["effects"], list):
             raise ModelError(f"the model's effects must be a list, not {given['effects']!r}")
-        given["effects"] = [_effect_from_dict(effect) for effect in given["effects"]]
+        given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
     cls = COMPILED[kind]
     known = (*cls._plain, *cls._options)
     for name in given:
@@ -80,7 +80,8 @@ def model_from_dict(data: object) -> Model:
     return cls(**given)
 
 
-def _effect_to_dict(effect: Effect) -> dict[str, Any]:
+def effect_to_dict(effect: Effect) -> dict[str, Any]:
+    """An effect as its name and parameters, or as what a user made it of."""
     if effect.made is not None:
         return serialization.to_dict(effect)
     choices = {"momentum": effect.momentum, "treatment": effect.treatment}
@@ -88,7 +89,14 @@ def _effect_to_dict(effect: Effect) -> dict[str, Any]:
     return {"name": effect.name, **effect.parameters, **made}
 
 
-def _effect_from_dict(data: object) -> Effect:
+def effect_from_dict(data: object) -> Effect:
+    """The effect that `effect_to_dict` or a person wrote down.
+
+    Raises
+    ------
+    ModelError
+        An unknown effect or parameter, or one that is unusable.
+    """
     given = _mapping("an effect", data)
     if given.keys() & {"formula", "curve", "surface"}:
         return serialization.from_dict(given)

@@ -83,7 +83,7 @@ def _make(recipe: Recipe, name: str, film: Path, table: Path, tell: Callable[[st
     t = np.arange(0.0, recipe.duration, _STEP)
     run = integrated(device.disk(recipe.W), t, recipe.start, dense=True)
     tell(f"filming W = {name} cm/s")
-    render(run, film, quality=recipe.quality, seed=recipe.seed)
+    render(run, film, quality=recipe.quality, rng=recipe.seed)
     tell(f"tracking the film of W = {name} cm/s")
     track(film, disk_radius=device.R).with_meta(W=recipe.W).to_csv(table)
 

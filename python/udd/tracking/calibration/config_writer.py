@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import tomlkit
+from tomlkit.items import Item
 
 from udd.video.reader import TrackError
 
@@ -53,9 +55,9 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "disk.toml"
     >>> udd.tracking.write_config(path, {"pivot": [275, 310.5], "sigma": {"pivot": 3.0}})
     >>> print(path.read_text())
-    pivot = [275, 310.5]  # where the wheels hold the disk, pixels (u, v down)
+    pivot = [275, 310.5] # where the wheels hold the disk, pixels (u, v down)
     <BLANKLINE>
-    [sigma]  # standard errors of what is given (pixels, pixels per metre, m): the film improves it
+    [sigma] # standard errors of what is given (pixels, pixels per metre, m): the film improves it
     pivot = 3.0
     """
     from udd._util.atomic_files import write_whole
@@ -66,22 +68,31 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
 
 def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
     """The text of the file."""
-    blocks = [[f"# {_plain(line)}".rstrip() for line in comment.splitlines()]]
-    blocks.append([_line(name, config[name]) for name in config if name not in TABLES])
+    document = tomlkit.document()
+    for line in comment.splitlines():
+        document.add(tomlkit.comment(_plain(line)))
+    plain = {name: value for name, value in config.items() if name not in TABLES}
+    if comment and plain:
+        document.add(tomlkit.nl())
+    for name, value in plain.items():
+        document.add(name, _noted(tomlkit.item(_value(value)), name))
     for name in TABLES:
         table = config.get(name)
         if table is None:
             continue
-        note = f"  # {NOTES[name]}"
+        if document.as_string():
+            document.add(tomlkit.nl())
         if isinstance(table, Mapping):
-            blocks.append([f"[{name}]{note}", *(f"{key} = {_value(value)}" for key, value in table.items())])
+            document.add(name, _noted(tomlkit.item(_value(table)), name))
             continue
         if not isinstance(table, list | tuple) or not all(isinstance(mark, Mapping) for mark in table):
             raise TrackError(f"{name} must be a table, or a list of them, to be written")
+        marks = tomlkit.aot()
         for mark in table:
-            blocks.append([f"[[{name}]]{note}", *(f"{key} = {_value(x)}" for key, x in mark.items())])
-            note = ""
-    return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
+            item = tomlkit.item(_value(mark))
+            marks.append(item if len(marks) else _noted(item, name))
+        document.add(name, marks)
+    return document.as_string()
 
 
 def _plain(text: str) -> str:
@@ -89,18 +100,16 @@ def _plain(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
-def _line(name: str, value: Any) -> str:
-    note = f"  # {NOTES[name]}" if name in NOTES else ""
-    return f"{name} = {_value(value)}{note}"
+def _noted(item: Item, name: str) -> Item:
+    return item.comment(NOTES[name]) if name in NOTES else item
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, int):
-        return str(value)
+def _value(value: Any) -> Any:
+    """Plain Python instead of NumPy's numbers and arrays, of tuples and the like."""
+    if isinstance(value, bool | str | int):
+        return value
+    if isinstance(value, Mapping):
+        return {key: _value(x) for key, x in value.items()}
     if hasattr(value, "__len__"):
-        return f"[{', '.join(_value(x) for x in value)}]"
-    return repr(float(value))
+        return [_value(x) for x in value]
+    return float(value)

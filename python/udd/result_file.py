@@ -1,0 +1,248 @@
+"""Fits and discoveries as files that are read back without running anything in them.
+
+A file is NumPy's ``.npz``: the arrays, and one JSON text (`tree`, UTF-8) that says what they belong to. It
+lists objects, each once, parts before wholes; ``{"object": 3}`` and ``{"array": 5}`` stand for one of them.
+Only the types listed here are made when a file is read.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd._util.atomic_files import write_whole
+from udd.discovery import Discovery
+from udd.discovery.nonparametric.bsplines import Spline
+from udd.discovery.nonparametric.curve_scan import Curve
+from udd.discovery.nonparametric.penalized_curves import Absorbed
+from udd.discovery.results import AddedEffect, Alternative, RejectedEffect
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.coordinates import Slot, coordinate, slots
+from udd.discovery.scoring.forcing import Score
+from udd.discovery.scoring.score_scan import Scored
+from udd.discovery.validation.held_out_errors import Errors
+from udd.effects import Effect
+from udd.errors import ModelError, UddError
+from udd.fitting import Fit, diagnostics
+from udd.fitting.estimator_input import FilmParameters
+from udd.fitting.noise import Noise
+from udd.fitting.parameters import Free
+from udd.fitting.problem import Point, Problem
+from udd.fitting.record import Record
+from udd.fitting.thinning import Thinned
+from udd.measurement import Measurement
+from udd.models import Model
+from udd.models.profile import Coordinate
+from udd.models.serialization import effect_from_dict, effect_to_dict, model_from_dict, model_to_dict
+
+FORMAT = "udd result 1"
+"""To be changed with every change of what stands in a file."""
+
+_TYPES: dict[str, type] = {
+    cls.__name__: cls
+    for cls in (
+        *(Fit, Problem, Point, Record, Noise, Free, Measurement, Thinned),
+        *(diagnostics.Diagnostics, diagnostics.ModelError, diagnostics.Reading, diagnostics.RunawayParameter),
+        *(Discovery, AddedEffect, Alternative, RejectedEffect, Candidate, Scored, Errors),
+        *(Curve, Spline, Score, Absorbed),
+    )
+}
+_BROKEN = (
+    *(AttributeError, IndexError, KeyError, OSError, OverflowError, RecursionError, TypeError, ValueError),
+    *(EOFError, MemoryError, NotImplementedError, zipfile.BadZipFile, zlib.error),
+)
+
+
+def save(result: Fit | Discovery, path: str | os.PathLike[str]) -> None:
+    """Write a fit or a discovery to a file that :func:`udd.load` reads.
+
+    Parameters
+    ----------
+    result : Fit or Discovery
+    path : path
+        File to write (``.npz``); one that stands there is replaced, by all of the new one or not at all.
+
+    Raises
+    ------
+    UddError
+        It is no such result, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np, pathlib, tempfile, udd
+    >>> t = np.arange(0, 20, 0.05)
+    >>> theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.5]).state[:, 1]
+    >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    >>> fit = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.1), free=["k0"])
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "fit.npz"
+    >>> udd.save(fit, path)
+    >>> udd.load(path).parameters == fit.parameters
+    True
+    """
+    if not isinstance(result, Fit | Discovery):
+        raise UddError(f"a Fit or a Discovery can be saved, not {type(result).__name__}")
+    writer = _Writer()
+    writer.value(result)
+    model = model_to_dict((result if isinstance(result, Fit) else result.baseline).model)
+    tree = {"format": FORMAT, "model": model, "objects": writer.objects}
+    text = np.frombuffer(json.dumps(tree, allow_nan=False).encode(), np.uint8)
+    content = io.BytesIO()
+    arrays = {f"a{k}": array for k, array in enumerate(writer.arrays)}
+    np.savez_compressed(content, tree=text, **arrays)  # type: ignore[arg-type]  # it takes any names
+    write_whole(path, content.getvalue())
+
+
+def load(path: str | os.PathLike[str]) -> Fit | Discovery:
+    """Read a fit or a discovery that :func:`udd.save` wrote; nothing in the file is run.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Fit or Discovery
+        With the numbers that were saved, to the bit.
+
+    Raises
+    ------
+    UddError
+        There is no such file, it is not whole, or not one of these.
+
+    Examples
+    --------
+    >>> import udd
+    >>> fit = udd.load("fit.npz")  # doctest: +SKIP
+    >>> print(fit.summary())  # doctest: +SKIP
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise UddError(f"{path} cannot be read: {error.strerror}") from None
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            tree = json.loads(file["tree"].tobytes())
+            if tree["format"] != FORMAT:
+                raise UddError(f"{path} is a result in another format: {str(tree['format'])[:80]!r}")
+            arrays = [file[f"a{k}"] for k in range(len(file.files) - 1)]
+        result = _read(tree, arrays)
+    except UddError as error:
+        raise error if str(path) in str(error) else UddError(f"{path}: {error}") from None
+    except _BROKEN:
+        raise UddError(f"{path} is not a whole file of udd.save") from None
+    if not isinstance(result, Fit | Discovery):
+        raise UddError(f"{path} holds neither a fit nor a discovery")
+    return result
+
+
+class _Writer:
+    """Objects and arrays in the order of a file, each once."""
+
+    def __init__(self) -> None:
+        self.objects: list[Any] = []
+        self.arrays: list[NDArray[Any]] = []
+        self._places: dict[int, tuple[object, dict[str, int]]] = {}  # the object too: its id stays its own
+
+    def value(self, value: Any) -> Any:
+        """A value as JSON."""
+        if isinstance(value, np.generic):
+            value = value.item()
+        if value is None or isinstance(value, bool | int | str):
+            return value
+        if isinstance(value, float):
+            return value if math.isfinite(value) else {"float": str(value)}
+        if isinstance(value, list):
+            return [self.value(x) for x in value]
+        if isinstance(value, FilmParameters):
+            return {"film": [self.value(x) for x in value]}
+        if isinstance(value, tuple):
+            return {"tuple": [self.value(x) for x in value]}
+        if isinstance(value, dict):
+            return {"dict": [[self.value(k), self.value(x)] for k, x in value.items()]}
+        if isinstance(value, _core.Linearised):
+            return None  # made anew where it is asked for
+        if id(value) not in self._places:
+            self._places[id(value)] = (value, self._new(value))
+        return self._places[id(value)][1]
+
+    def _new(self, value: Any) -> dict[str, int]:
+        if isinstance(value, np.ndarray):
+            self.arrays.append(value)
+            return {"array": len(self.arrays) - 1}
+        self.objects.append(self._object(value))
+        return {"object": len(self.objects) - 1}
+
+    def _object(self, value: Any) -> dict[str, Any]:
+        if isinstance(value, Model):
+            return {"model": model_to_dict(value)}
+        if isinstance(value, Effect):
+            return {"effect": effect_to_dict(value)}
+        if isinstance(value, Slot):
+            return {"slot": [value.name, value.momentum]}
+        if isinstance(value, Coordinate):
+            return {"coordinate": value.name}
+        name = type(value).__name__
+        if not is_dataclass(value) or _TYPES.get(name) is not type(value):
+            raise ModelError(f"a result with a {name} in it cannot be saved")
+        known = {one.name: self.value(getattr(value, one.name)) for one in fields(value)}
+        # Told of the fit before its errors were widened: it cannot be found again.
+        more = (
+            {"doubts": self.value(value.doubts)} if isinstance(value, Fit) and "doubts" in vars(value) else {}
+        )
+        return {"type": name, "fields": known | more}
+
+
+def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
+    """The last object of a file."""
+    model = model_from_dict(tree["model"])
+    curves = {(slot.name, slot.momentum): slot for slot in slots(model)}
+    objects: list[Any] = []
+    numbers: dict[str, Callable[[Any], Any]] = {
+        "float": float,
+        "film": lambda x: FilmParameters(*map(value, x)),
+        "tuple": lambda x: tuple(map(value, x)),
+        "dict": lambda x: {value(k): value(v) for k, v in x},
+        "array": arrays.__getitem__,
+        "object": objects.__getitem__,
+    }
+    made: dict[str, Callable[[Any], Any]] = {
+        "model": model_from_dict,
+        "effect": effect_from_dict,
+        "slot": lambda x: curves[x[0], x[1]],
+        "coordinate": lambda x: coordinate(model, x),
+    }
+
+    def value(data: Any) -> Any:
+        if isinstance(data, list):
+            return [value(x) for x in data]
+        if not isinstance(data, dict):
+            return data
+        ((kind, content),) = data.items()
+        return numbers[kind](content)
+
+    def new(data: Any) -> Any:
+        if "type" not in data:
+            ((kind, content),) = data.items()
+            return made[kind](content)
+        given = {name: value(x) for name, x in data["fields"].items()}
+        doubts = given.pop("doubts", None)
+        result = _TYPES[data["type"]](**given)
+        if doubts is not None:
+            vars(result)["doubts"] = doubts
+        return result
+
+    for data in tree["objects"]:
+        objects.append(new(data))
+    return objects[-1]
