@@ -8,23 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from udd.tracking.options import FIELDS
 from udd.video.reader import TrackError
 
 from .config import settings
 
-NOTES = {
-    "disk_radius": "m",
-    "mark_distance": "m",
-    "fps": "frames per second",
-    "pivot": "where the wheels hold the disk, pixels (u, v down)",
-    "scale": "pixels per metre",
-    "region": "u0, v0, u1, v1: nothing outside is looked at, pixels",
-    "length": "m",
-    "apart": "two marks, by their numbers from 1, and how far apart their middles are, m",
-    "calibrate": "true: found in the film; false: as given, or not there",
-    "sigma": "standard errors of what is given (pixels, pixels per metre, m): the film improves it",
-    "layout": "m right of and above the disk's centre when beta is 0; sRGB codes",
-}
 TABLES = ("calibrate", "sigma", "layout")  # TOML wants them after the rest
 
 
@@ -72,7 +60,7 @@ def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
         table = config.get(name)
         if table is None:
             continue
-        note = f"  # {NOTES[name]}"
+        note = _note(name)
         if isinstance(table, Mapping):
             blocks.append([f"[{name}]{note}", *(f"{key} = {_value(value)}" for key, value in table.items())])
             continue
@@ -90,8 +78,12 @@ def _plain(text: str) -> str:
 
 
 def _line(name: str, value: Any) -> str:
-    note = f"  # {NOTES[name]}" if name in NOTES else ""
-    return f"{name} = {_value(value)}{note}"
+    return f"{name} = {_value(value)}{_note(name)}"
+
+
+def _note(name: str) -> str:
+    note = FIELDS[name].metadata["note"]
+    return f"  # {note}" if note else ""
 
 
 def _value(value: Any) -> str:

@@ -78,7 +78,7 @@ def _compare(
     maps = np.zeros((len(arms), 2, 3))
     maps[:, 0, 0] = maps[:, 1, 1] = 1.0
     maps[:, 0, 2], maps[:, 1, 2] = (1j * arms).real, (1j * arms).imag
-    left = np.where(fit.used[:, None], fit.step.leftover, 0.0)
+    left = np.where(fit.used[:, None], fit.step.residuals, 0.0)
     weight = np.array(
         [
             s.information if s is not None and used else np.zeros((2, 2))

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.calibration_items import Calibrate, Estimate
 from udd.tracking.calibration.exposure import Exposure, exposure
+from udd.tracking.calibration.exposure import again as retimed
 from udd.tracking.calibration.rim import SPAN, Rim, outline
 from udd.tracking.calibration.rolling_shutter import Readout, readout
-from udd.tracking.calibration.setup import Setup
 from udd.tracking.detection.candidates import colours_of
 from udd.tracking.detection.colour_blobs import Sight
 from udd.tracking.detection.colour_mixing import mixed
@@ -18,15 +19,19 @@ from udd.tracking.detection.illumination import evenness
 from udd.tracking.detection.occluder import visible
 from udd.tracking.detection.survey import Moving, Survey, moving, repeats_last
 from udd.tracking.geometry.contact_point import Contact, rough_contact
-from udd.tracking.geometry.lens import Lens, calibrate
+from udd.tracking.geometry.lens import Bent, Lens, calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
-from udd.tracking.marks.learning import first_look, places, refine
+from udd.tracking.marks.learning import MOST, first_look, places, refine
 from udd.tracking.marks.localization import MISFIT
 from udd.tracking.marks.pose_fit import align
+from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
 from .first_pass import TrackerState
+from .second_pass import LocalMotion
+from .tracks import Tracks
 
+AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known
 FEWEST = 3  # frames in motion from which marks are learned a second time
 SHARP = 60  # slow frames from which the rim is measured
 FOR_LENS = 90  # frames from which tilt and lens are measured
@@ -42,7 +47,7 @@ def prepare(
     look_over: Survey,
     sights: list[Sight | None],
     seen: list[tuple[Picture, Sight]],
-    setup: Setup,
+    options: TrackOptions,
 ) -> tuple[TrackerState, Rim | None]:
     """Learn from the survey's pictures, in which the disk was found at `sights` (`seen`: slowest first).
 
@@ -51,10 +56,10 @@ def prepare(
     TrackError
         No picture is sharp enough, or the rim does not stand out from the background and is needed.
     """
-    body, wanted = setup.layout.unit, setup.calibrate
+    body, wanted = options.layout.unit, options.calibrate
     fixed = None if wanted.layout else body
     view, white = visible(seen, body)
-    view = view & setup.view(view.shape)
+    view = view & options.view(view.shape)
     look = first_look(seen, view, white, film.light, body)
     colours = colours_of([p for p, _ in seen], [Pose(s.centre, s.angle) for _, s in seen], look, view)
     even = evenness(seen, view, body, film.light)
@@ -114,13 +119,72 @@ def prepare(
             sharp.append((picture, pose, motion))
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
-    rim = _rim(film, sharp, look, view, setup)
+    rim = _rim(film, sharp, look, view, options)
     if rim is not None:
         look = replace(look, rim=rim.radius - RIM_SMEAR)
-    look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, setup)
+    look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, options)
     contact = _contact(in_motion, look)
-    known = TrackerState(look, view, colours, open_for.value, white, contact, rolling, open_for.sigma, bent)
-    return known, rim
+    estimates = {
+        **lens_estimates(bent, look.lens, wanted),
+        **readout_estimate(rolling, wanted),
+        **exposure_estimate(open_for, wanted),
+    }
+    return TrackerState(look, view, colours, open_for.value, white, contact, estimates), rim
+
+
+def lens_estimates(bent: Bent, lens: Lens, wanted: Calibrate) -> dict[str, Estimate]:
+    """Lens and tilt as rows of the table."""
+    names = ("lens", "tilt across", "tilt upward", "aspect", "shear")
+    values = (lens.curve, lens.tilt_u, lens.tilt_v, lens.aspect, lens.shear)
+    how = "found" if bent.found else "none found"
+    items = ("lens", *["tilt"] * 4)
+    return {
+        name: wanted.estimate(item, value, float(sigma), how)
+        for name, item, value, sigma in zip(names, items, values, bent.sigma, strict=True)
+    }
+
+
+def readout_estimate(found: Readout, wanted: Calibrate) -> dict[str, Estimate]:
+    """The readout as a row of the table."""
+    how = "found" if found.value else "none found"
+    return {"readout": wanted.estimate("readout", found.value, found.sigma, how)}
+
+
+def exposure_estimate(found: Exposure, wanted: Calibrate) -> dict[str, Estimate]:
+    """The exposure as a row of the table."""
+    how = "found" if found.value or np.isfinite(found.sigma) else "too slow to tell"
+    return {"exposure": wanted.estimate("exposure", found.value, found.sigma, how)}
+
+
+def recalibrate(
+    known: TrackerState, look_over: Survey, tracks: Tracks, options: TrackOptions
+) -> TrackerState:
+    """Exposure, readout and marks once more, now that every frame's motion is known from its neighbours."""
+    around, wanted = LocalMotion(tracks), options.calibrate
+    frames = []
+    for picture in look_over.pictures:
+        here = around.at(picture.index) if picture.index < len(tracks) else None
+        if here is not None and here.held and not tracks.flag[picture.index]:
+            frames.append((picture.y, here))
+    if known.look.readout and wanted.given("readout") is None:
+        moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
+        rolling = readout(moving, known.look, known.view, around.interval)
+        if rolling.value:
+            estimates = {**known.estimates, **readout_estimate(rolling, wanted)}
+            known = replace(known, look=replace(known.look, readout=rolling.value), estimates=estimates)
+    if known.exposure and wanted.given("exposure") is None:
+        paths = [(y, here.pose, here.motion) for y, here in frames]
+        value = retimed(paths, known.exposure, known.look, known.view)
+        found = Exposure(value, known.estimates["exposure"].sigma)
+        known = replace(
+            known, exposure=value, estimates={**known.estimates, **exposure_estimate(found, wanted)}
+        )
+    moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(known.exposure)) for y, here in frames]
+    moving.sort(key=lambda f: known.look.streak(f[2]))
+    slower = moving[: -(-len(moving) // 2)]
+    fixed = None if wanted.layout else options.layout.unit
+    look = refine(known.look, slower[:: -(-len(slower) // MOST)], known.view, AGAIN, fixed)
+    return replace(known, look=look)
 
 
 def _rim(
@@ -128,23 +192,23 @@ def _rim(
     sharp: list[tuple[Picture, Pose, Motion]],
     look: DiskAppearance,
     view: NDArray[np.bool_],
-    setup: Setup,
+    options: TrackOptions,
 ) -> Rim | None:
     """The disk's outline; None where it does not show and the layout says where its centre is."""
     try:
-        return outline(sharp, look, view, rim_span(setup))
+        return outline(sharp, look, view, rim_span(options))
     except TrackError as error:
-        if not setup.layout.standard:
+        if not options.layout.standard:
             return None
         raise TrackError(f"{film.path}: {error}") from None
 
 
-def rim_span(setup: Setup) -> tuple[float, float]:
+def rim_span(options: TrackOptions) -> tuple[float, float]:
     """Where to look for the rim, in units of the marks' reach."""
-    if setup.layout.standard:
+    if options.layout.standard:
         return SPAN
-    ratio = setup.radius / setup.layout.reach
-    near = NEAR_RIM + min(SURE * setup.sigma.layout / setup.radius, NEAR_RIM)
+    ratio = options.disk_radius / options.layout.reach
+    near = NEAR_RIM + min(SURE * options.sigma.layout / options.disk_radius, NEAR_RIM)
     return (1 - near) * ratio, (1 + near) * ratio
 
 
@@ -168,27 +232,27 @@ def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[c
     return complex(marks.mean() - factor * arms.mean()), sight.angle + turn
 
 
-def _centred(look: DiskAppearance, centre: complex, setup: Setup) -> DiskAppearance:
+def _centred(look: DiskAppearance, centre: complex, options: TrackOptions) -> DiskAppearance:
     """Marks as seen from the disk's own centre, turned to beta = 0."""
-    turn = upward(look.places - centre, setup)
+    turn = upward(look.places - centre, options)
     marks = [
         replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
     ]
     return replace(look, marks=marks)
 
 
-def upward(places: NDArray[np.complex128], setup: Setup) -> complex:
+def upward(places: NDArray[np.complex128], options: TrackOptions) -> complex:
     """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
 
     Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
     all the marks of any other layout. Of one that is said with an error the first mark says it.
     """
-    body = setup.layout.unit
-    if setup.sigma.layout and setup.calibrate.layout:
-        first = setup.layout.first
+    body = options.layout.unit
+    if options.sigma.layout and options.calibrate.layout:
+        first = options.layout.first
         turn = complex(places[first] / body[first])
         return turn / abs(turn)
-    if not setup.layout.standard:
+    if not options.layout.standard:
         turn = complex(np.vdot(body - body.mean(), places - places.mean()))
         return turn / abs(turn)
     turns = places / np.abs(places) / body
