@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
+from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose, moved_by_pose
 from udd.tracking.marks.pose_fit import align
 from udd.video.reader import Plane
 
@@ -75,16 +75,9 @@ def _compare(
     rows = look.lens.picture(here.centre + arms).imag
     speed = (motion.rate + 1j * motion.spin * arms) * ((rows + 0.5) / y.shape[0] - 0.5)
     moved = np.column_stack([speed.real, speed.imag])
-    maps = np.zeros((len(arms), 2, 3))
-    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
-    maps[:, 0, 2], maps[:, 1, 2] = (1j * arms).real, (1j * arms).imag
+    maps = moved_by_pose(arms)
     left = np.where(fit.used[:, None], fit.step.residuals, 0.0)
-    weight = np.array(
-        [
-            s.information if s is not None and used else np.zeros((2, 2))
-            for s, used in zip(fit.sightings, fit.used, strict=True)
-        ]
-    )
+    weight = fit.information
     # pixels that are known too well would drown the others
     weight = (
         np.minimum(1.0, 400.0 / np.maximum(np.abs(weight).max(axis=(1, 2)), 1e-9))[:, None, None] * weight

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from udd.calibration_items import Estimate
 from udd.tracking.detection.candidates import candidates, classify
-from udd.tracking.detection.frame_flags import REPEATED, lost, unusable
+from udd.tracking.detection.frame_flags import REPEATED, is_copy, lost, unusable
 from udd.tracking.geometry.contact_point import Contact
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT
@@ -30,8 +30,6 @@ FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
 STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
 BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
 SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
-COPIED = 10  # codes by which a copy may differ
-UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
 
 
 @dataclass(frozen=True)
@@ -239,13 +237,11 @@ def _motion(past: list[PoseSample], pose: Pose, t: float, known: TrackerState) -
 
 def along_contact(known: TrackerState, pose: Pose, spin: float, change: float = 0.0) -> Motion:
     """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
-    contact, open_for = known.contact, known.exposure
+    contact = known.contact
     assert contact is not None
     rate = contact.velocity(pose.centre, spin)
     bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
-    half = 0.5 * open_for**2
-    shift, turn = rate * open_for, spin * open_for
-    return Motion(shift, turn, bending * half, change * half, rate, spin, bending, change)
+    return Motion.of_rates(rate, spin, bending, change, known.exposure)
 
 
 def repeats(
@@ -255,11 +251,5 @@ def repeats(
     reach = look.reach
     if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
         return False
-    changed, size = 0, 0
-    for place in look.lens.picture(before.centre + look.places * np.exp(1j * before.angle)):
-        r, c, n = int(place.imag), int(place.real), int(SURROUNDINGS * np.hypot(*look.marks[0].half))
-        part = slice(max(0, r - n), max(0, r + n)), slice(max(0, c - n), max(0, c + n))
-        # a codec does not copy exactly, but it moves no edge
-        changed += int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED))
-        size += y[part].size
-    return size > 0 and changed < UNCHANGED
+    places = look.lens.picture(before.centre + look.places * np.exp(1j * before.angle))
+    return is_copy(y, last, places, int(SURROUNDINGS * np.hypot(*look.marks[0].half)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.detection.colour_blobs import blobs
-from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, lost
+from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, is_copy, lost
 from udd.tracking.detection.survey import survey
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
@@ -27,7 +27,6 @@ SHARE = 0.4  # of its colour and light from which on a pixel counts as the bob's
 HALF_HIDDEN = 0.93  # share of the usual size below which the middle is not the bob's
 TOO_MUCH = 1.15  # and above which something else of its colour is there
 MOVED = 3.0  # pixels: a bob that was to move by less may look like a copy
-COPIED, UNCHANGED = 10, 12  # codes, pixels: what a codec changes in a copy
 SURE = 0.02  # of the length by which the pivot may be unsure
 
 
@@ -176,10 +175,7 @@ def _copy(y: NDArray[np.uint8], last: NDArray[np.uint8], blob: Blob, path: Seque
     """Whether a frame repeats the last although the bob was moving."""
     if len(path) < 3 or abs(2 * (path[-1] - path[-2]) - (path[-2] - path[-3])) < MOVED:
         return False  # it was about to stand still
-    n = int(1.5 * np.sqrt(blob.area))
-    r, c = int(blob.centre.imag), int(blob.centre.real)
-    part = slice(max(0, r - n), r + n), slice(max(0, c - n), c + n)
-    return int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED)) < UNCHANGED
+    return is_copy(y, last, [blob.centre], int(1.5 * np.sqrt(blob.area)))
 
 
 def circle(points: NDArray[np.complex128]) -> Circle:

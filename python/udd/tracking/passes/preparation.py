@@ -96,9 +96,6 @@ def prepare(
     if rolling.value:
         look = replace(look, readout=rolling.value)
         look = refine(look, frames, view, fixed=fixed)
-        if given is None:
-            rolling = readout(frames, look, view, interval)
-            look = replace(look, readout=rolling.value)
     for _ in range(LENS_ROUNDS):
         at = places(look, frames[:FOR_LENS], view)
         bent = calibrate(at, view.shape, body, wanted.given("lens"), wanted.given("tilt"))

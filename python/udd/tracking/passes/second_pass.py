@@ -45,17 +45,7 @@ class Local:
 
     def motion(self, open_for: float) -> Motion:
         """What the exposure sees of it."""
-        half = 0.5 * open_for**2
-        return Motion(
-            self.rate * open_for,
-            self.spin * open_for,
-            self.bending * half,
-            self.twisting * half,
-            self.rate,
-            self.spin,
-            self.bending,
-            self.twisting,
-        )
+        return Motion.of_rates(self.rate, self.spin, self.bending, self.twisting, open_for)
 
 
 def refine(

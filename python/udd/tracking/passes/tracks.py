@@ -74,7 +74,6 @@ class Tracks:
 
 def found_in(t: float, fit: Fit, pose: Pose, streak: float, method: str) -> FrameTrack:
     """A frame in which a fit holds the disk."""
-    seen = [s if u else None for s, u in zip(fit.sightings, fit.used, strict=True)]
     return FrameTrack(
         t,
         pose.centre,
@@ -82,8 +81,8 @@ def found_in(t: float, fit: Fit, pose: Pose, streak: float, method: str) -> Fram
         fit.step.information,
         np.where(fit.used[:, None], fit.step.residuals, np.nan),
         np.where(fit.used, fit.step.chi2, np.nan),
-        np.array([s.information if s else np.zeros((2, 2)) for s in seen], dtype=np.float32),
-        np.array([s.complete if s else 0.0 for s in seen]),
+        fit.information.astype(np.float32),
+        np.array([s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]),
         streak,
         "",
         method,
