@@ -22,6 +22,7 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 import udd
 from film_for_tests import FPS, PIVOT, Motion, frame, write
 from test_track_layouts import THREE, Marks, rms, shot
+from udd.calibration_items import Calibrate
 from udd.cli import main
 from udd.film import Defects
 from udd.film import Film as Made
@@ -31,13 +32,13 @@ from udd.tracking.calibration.config import settings
 from udd.tracking.calibration.config_writer import write_config
 from udd.tracking.calibration.rim import Rim
 from udd.tracking.calibration.scale import scale
-from udd.tracking.calibration.setup import Calibrate, Setup, Sigma
 from udd.tracking.detection.survey import survey
 from udd.tracking.manual.circle import circle
 from udd.tracking.manual.patches import CLICK, FOUND, patch
 from udd.tracking.manual.questions import ClickSession
 from udd.tracking.manual.still_frames import still_frames
 from udd.tracking.manual.window import Window
+from udd.tracking.options import Sigma, TrackOptions
 from udd.video.reader import Picture
 
 APART = float(np.hypot(0.05, 0.095))  # m, of the first two marks
@@ -491,11 +492,11 @@ def test_a_config_is_written_as_it_is_read(tmp_path: Path) -> None:
 
 def test_what_has_an_error_must_be_said() -> None:
     with pytest.raises(TrackError, match="how well pivot is known, but pivot is not given"):
-        Setup(sigma=Sigma(pivot=1.0))
+        TrackOptions(sigma=Sigma(pivot=1.0))
     with pytest.raises(TrackError, match="how well layout is known, but layout is not given"):
-        Setup(sigma=Sigma(layout=1.0))
+        TrackOptions(sigma=Sigma(layout=1.0))
     with pytest.raises(TrackError, match="there is no mark 5: there are 4"):
-        Setup(apart=(1, 5, 0.1))
+        TrackOptions(apart=(1, 5, 0.1))
 
 
 def test_a_scale_that_is_said_with_an_error_is_a_beginning() -> None:
@@ -504,7 +505,7 @@ def test_a_scale_that_is_said_with_an_error_is_a_beginning() -> None:
     rim = Rim(0j, 80.0, 0.05, 0.05, 1000)
 
     def found(shown: Rim | None = rim, **said: Any) -> Any:
-        return scale(places, shown, Setup(layout=layout, **said))
+        return scale(places, shown, TrackOptions(layout=layout, **said))
 
     given = found(scale=990.0)
     assert (given.value, given.sigma, given.origin) == (990.0, 0.0, "given")

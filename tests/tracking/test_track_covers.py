@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +25,11 @@ from udd.tracking.geometry.pose import DiskAppearance, Mark, Motion, Pose
 from udd.tracking.marks.localization import Sighting, coverage
 from udd.tracking.marks.pose_fit import Fit
 from udd.tracking.marks.rigid_fit import solve
-from udd.tracking.metric.common_errors import in_common
+from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.pixels_to_metres import Camera
 from udd.tracking.metric.pose_covariance import _belief, covariance
-from udd.tracking.passes.first_pass import Tracks, append
-from udd.tracking.passes.second_pass import taken_to_middle
+from udd.tracking.passes.second_pass import to_mid_exposure
+from udd.tracking.passes.tracks import FrameTrack, Tracks, found_in
 from udd.video.reader import Picture, light_of_codes
 
 WEIGHT = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
@@ -121,7 +121,8 @@ def rolled(rng: np.random.Generator, along: float, across: float, common: float)
     """Poses of a rolling disk from marks with such errors [pixels], 0.01 being assumed; what they are off."""
     t = np.arange(0, 13.9, 0.04)
     state = ROLLING(t)
-    tracks, off = Tracks(*([] for _ in fields(Tracks))), []
+    frames: list[FrameTrack] = []
+    off = []
     speed = SCALE * np.gradient(state[:, 1] - 1j * state[:, 2], t)
     for k in range(len(t)):
         centre, angle = PIVOT + SCALE * complex(state[k, 1], -state[k, 2]), float(state[k, 3])
@@ -138,8 +139,9 @@ def rolled(rng: np.random.Generator, along: float, across: float, common: float)
         off.append(step.change)
         pose = Pose(centre + complex(*step.change[:2]), angle + float(step.change[2]))
         streak = 0.01 * float(np.abs(moving).max())
-        append(tracks, float(t[k]), "", Fit(step, sightings, np.ones(4, dtype=bool), 0.0), pose, streak, 4)
-    return tracks, np.array(off)
+        fit = Fit(step, sightings, np.ones(4, dtype=bool), 0.0)
+        frames.append(found_in(float(t[k]), fit, pose, streak, "fast"))
+    return Tracks.of(frames), np.array(off)
 
 
 def covers(off: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -158,28 +160,29 @@ def test_errors_along_streaks_and_across_are_told_apart() -> None:
 def test_marks_that_sit_elsewhere_are_no_noise() -> None:
     tracks, _ = rolled(np.random.default_rng(2), 0.02, 0.01, 0.0)
     placed_well = covariance(tracks, LOOK)
-    for k, left in enumerate(tracks.leftover):
-        elsewhere = 0.05 * np.array([1, -1, 1, -1]) * np.exp(1j * tracks.angle[k])
-        tracks.leftover[k] = left + np.stack([elsewhere.real, elsewhere.imag], axis=-1)
-    np.testing.assert_allclose(covariance(tracks, LOOK), placed_well, rtol=1e-9, atol=1e-15)
+    elsewhere = 0.05 * np.array([1, -1, 1, -1]) * np.exp(1j * tracks.angle)[:, None]
+    off = tracks.residuals + np.stack([elsewhere.real, elsewhere.imag], axis=-1)
+    np.testing.assert_allclose(
+        covariance(replace(tracks, residuals=off), LOOK), placed_well, rtol=1e-9, atol=1e-15
+    )
 
 
 def test_what_a_path_is_bent_by_has_errors_of_its_own() -> None:
     tracks, _ = rolled(np.random.default_rng(3), 0.01, 0.01, 0.0)
-    own = np.tile(np.eye(3), (len(tracks.t), 1, 1))
-    found = taken_to_middle(tracks, own, 0.04**2 / 12)
+    own = np.tile(np.eye(3), (len(tracks), 1, 1))
+    found = to_mid_exposure(tracks, own, 0.04**2 / 12)
     weights = np.array([-1 / 12, 4 / 3, -5 / 2, 4 / 3, -1 / 12]) / 24  # of a quartic's second derivative
     expected = ((np.array([0, 0, 1, 0, 0]) - weights) ** 2).sum()
     assert 1.2 < expected < 1.3
     np.testing.assert_allclose(found[5:-5], expected * own[5:-5], atol=1e-9)
-    np.testing.assert_array_equal(taken_to_middle(tracks, own, 0.0), own)
+    np.testing.assert_array_equal(to_mid_exposure(tracks, own, 0.0), own)
 
 
 def test_what_all_marks_share_is_seen_where_the_disk_jumps() -> None:
     camera = Camera(SCALE, 1.0, "given", PIVOT, 0.0, "given", 0.039j)
     tracks, off = rolled(np.random.default_rng(4), 0.01, 0.01, 0.02)
     own = covariance(tracks, LOOK)
-    found = in_common(tracks, own, camera)
+    found = common_mode_errors(tracks, own, camera)
     assert 0.015 < np.median(found) < 0.025  # 80 frames tell it to a tenth
     both = own + (found**2)[:, None, None] * np.diag([1.0, 1.0, 0.0])
     assert covers(off, own)[3] > 2.5
@@ -190,9 +193,9 @@ def test_slip_is_no_error_that_all_marks_share() -> None:
     camera = Camera(SCALE, 1.0, "given", PIVOT, 0.0, "given", 0.039j)
     tracks, _ = rolled(np.random.default_rng(5), 0.01, 0.01, 0.0)
     # 5 pixels to and fro, within a second; all that slips turns with the disk about the contact
-    slip = 5 * np.sin(np.array(tracks.t)) * np.exp(1j * np.array(tracks.angle))
-    slipped = replace(tracks, centre=list(np.array(tracks.centre) + slip))
-    assert np.median(in_common(slipped, covariance(tracks, LOOK), camera)) < 0.003
+    slip = 5 * np.sin(tracks.t) * np.exp(1j * tracks.angle)
+    slipped = replace(tracks, centre=tracks.centre + slip)
+    assert np.median(common_mode_errors(slipped, covariance(tracks, LOOK), camera)) < 0.003
 
 
 @pytest.mark.parametrize(
@@ -201,7 +204,7 @@ def test_slip_is_no_error_that_all_marks_share() -> None:
 def test_a_law_of_rolling_that_fails_is_no_noise(pivot: complex, drive: complex) -> None:
     # As where the wheels slip by a law of their own: no contact and no drive explain the motion.
     tracks, _ = rolled(np.random.default_rng(6), 0.01, 0.01, 0.0)
-    found = in_common(
+    found = common_mode_errors(
         tracks, covariance(tracks, LOOK), Camera(SCALE, 1.0, "given", pivot, 0.0, "given", drive)
     )
     assert found.max() < 0.008  # by second differences alone 0.1

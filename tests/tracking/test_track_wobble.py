@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import udd
 from udd.film import Defects
 from udd.tracking import track_in_detail
 from udd.tracking.geometry.pose import DiskAppearance, Mark
-from udd.tracking.passes.first_pass import Tracks
+from udd.tracking.passes.tracks import Tracks, lost_in
 from udd.tracking.passes.wobble import wobble
 
 
@@ -27,15 +28,16 @@ def tracks(amplitude: float, noise: float, axis: float = 0.0, n: int = 400) -> t
     short = np.cos(amplitude * np.sin(2 * np.pi * t / 1.3)) - 1
     normal = np.exp(1j * axis)  # across the axis
     places = 100 * np.array([-1j, 1, 1j, -1])
-    out = Tracks(*([] for _ in range(11)))
+    residuals = []
     for k in range(n):
         arm = places * np.exp(1j * angle[k])
         seen = arm + short[k] * normal * (arm * np.conj(normal)).real
         seen = seen + noise * (rng.normal(size=4) + 1j * rng.normal(size=4))
         turn = np.vdot(arm, seen - seen.mean())
         rest = seen - seen.mean() - arm * turn / abs(turn)
-        out.leftover.append(np.column_stack([rest.real, rest.imag]))
-    out.t, out.angle, out.streak, out.flag = list(t), list(angle), [1.0] * n, [""] * n
+        residuals.append(np.column_stack([rest.real, rest.imag]))
+    frames = [replace(lost_in(t[k], "", 1.0, 4), angle=angle[k], residuals=residuals[k]) for k in range(n)]
+    out = Tracks.of(frames)
     marks = [Mark(complex(z), (10.0, 10.0), 0.0, -50.0) for z in places]
     return out, DiskAppearance(marks, 0.7, 1.0, np.arange(256.0), 140.0)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from udd._util.atomic_files import require_writable
+from udd.calibration_items import SWITCHES, Item
 from udd.errors import UddError
 
 from .export import OutputFile
@@ -61,7 +62,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--calibrate",
         metavar="ITEM=HOW,...",
-        help="on, off or a number for layout, scale, lens, tilt, readout [s], exposure [s], pivot; "
+        help=f"on, off or a number for {', '.join(map(_named, SWITCHES))}; "
         "such as lens=off,readout=0.02 (default: all on)",
     )
     parser.add_argument(
@@ -111,6 +112,10 @@ def add(commands: Any) -> None:
     )
     add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
+
+
+def _named(item: Item) -> str:
+    return f"{item.name} [{item.unit}]" if item.unit else item.name
 
 
 def run(args: argparse.Namespace) -> CommandResult:

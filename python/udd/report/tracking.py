@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from udd.calibration_items import unit_of
 from udd.errors import UddError
 from udd.models import profile_of
 from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
@@ -187,7 +188,7 @@ def calibration(m: Measurement) -> list[dict[str, Text]]:
     """The self-calibration: item, value, standard error, how."""
     rows: list[dict[str, Text]] = []
     for name, (value, sigma, how) in m.meta["calibration"].items():
-        factor, unit = _unit(name, m.kind)
+        factor, unit = (1.0, "px") if name == "length" else unit_of(name)
         if value is None:
             shown, error = "–", "–"
         elif isinstance(value, list):
@@ -219,17 +220,6 @@ def _error(sigma: float | None, factor: float) -> str:
     if sigma is None:
         return "–"
     return f"{factor * sigma:.2g}" if sigma else "0"
-
-
-def _unit(name: str, kind: str) -> tuple[float, str]:
-    if name.startswith("mark"):
-        return 1e3, "mm (right, up)"
-    if name in ("readout", "exposure"):
-        return 1e3, "ms"
-    if name == "wobble":
-        return 180 / math.pi, "degrees"
-    known = {"scale": "px/m", "pivot": "px (right, down)", "W": "m/s", "length": "px"}
-    return 1.0, known.get(name, "")
 
 
 def flags(m: Measurement) -> list[tuple[str, int, str]]:
@@ -335,7 +325,7 @@ def picture_map(m: Measurement, detail: Tracking | None) -> Image:
         at, off = where.centre, np.asarray(m.quality["residual_px"], dtype=float)
         arrows = None
     else:
-        left = np.array(detail.tracks.leftover)
+        left = detail.tracks.residuals
         ok = np.isfinite(left).all(axis=2) & m.seen[:, None]
         at, arrows = where.marks[ok], left[ok]
         off = np.hypot(*arrows.T)

@@ -8,6 +8,7 @@ from udd.tracking.metric.pixels_to_metres import Pixels, pixels
 from udd.video.reader import Film, TrackError
 from udd.video.webcam import Recording, record
 
+from .options import TrackOptions
 from .overlay import overlay
 from .page import page
 from .pipeline import Tracking, pictures_at, pictures_between, track, track_in_detail
@@ -18,6 +19,7 @@ __all__ = [
     "Pixels",
     "Recording",
     "TrackError",
+    "TrackOptions",
     "TrackedFrame",
     "Tracking",
     "click",

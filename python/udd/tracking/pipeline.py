@@ -6,60 +6,45 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.markers.layout import STANDARD, read_bob
-from udd.markers.tags import Tag, is_tags, layout_of, read_tags
+from udd.calibration_items import Calibrate
+from udd.markers.layout import Layout
 from udd.measurement import DISK, Measurement, check_length
-from udd.tracking.calibration.config import Config, settings
-from udd.tracking.calibration.exposure import again as retimed
+from udd.tracking.calibration.config import Config, read_options
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.calibration.rim import Rim, outline
-from udd.tracking.calibration.rolling_shutter import readout
 from udd.tracking.calibration.scale import scale as size_of
-from udd.tracking.calibration.setup import (
-    Calibrate,
-    Layout,
-    MarkSeparation,
-    Region,
-    Setup,
-    Sigma,
-    length_of,
-    read_apart,
-    read_calibrate,
-    read_layout,
-    read_region,
-    read_sigma,
-)
 from udd.tracking.detection.colour_blobs import COLOURS, FEWEST, sightings
 from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost
 from udd.tracking.detection.layout_matching import sightings as matching
 from udd.tracking.detection.survey import Survey, slowest, survey
 from udd.tracking.geometry.pose import DiskAppearance, Pose
-from udd.tracking.marks.learning import MOST
-from udd.tracking.marks.learning import refine as learn
 from udd.tracking.metric.calibration_report import camera_of, meta_of
-from udd.tracking.metric.common_errors import in_common
+from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.pixels_to_metres import Camera, left_the_wheels, metres, recount
-from udd.tracking.metric.pose_covariance import covariance, with_causes
-from udd.tracking.passes.first_pass import TrackerState, Tracks, follow
+from udd.tracking.metric.pose_covariance import add_shared_errors, covariance
+from udd.tracking.passes.first_pass import TrackerState, follow
 from udd.tracking.passes.frame_quality import quality, remarks
 from udd.tracking.passes.pendulum_bob import track_bob
-from udd.tracking.passes.preparation import SHARP, prepare, rim_span, upward
-from udd.tracking.passes.second_pass import LONG, LocalMotion, drop_weak, taken_to_middle, unforeseen
+from udd.tracking.passes.preparation import SHARP, prepare, recalibrate, rim_span, upward
+from udd.tracking.passes.second_pass import LONG, LocalMotion, drop_weak, interpolation_error, to_mid_exposure
 from udd.tracking.passes.second_pass import refine as second_pass
 from udd.tracking.passes.tag_tracking import follow_tags
-from udd.tracking.passes.wobble import wobble
+from udd.tracking.passes.tracks import Tracks
+from udd.tracking.passes.wobble import Wobble, wobble
 from udd.tracking.passes.wobble_correction import WobbleCorrection, correct_wobble
 from udd.video.reader import Film, Picture, TrackError
 from udd.video.rgb_frames import rgb
 
+from .options import MoreOptions, TrackOptions
 from .tracked_frame import TrackedFrame
 
-AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known
+Array = NDArray[np.float64]
+Watch = Callable[[TrackedFrame], object]
 UNSURE = 0.005  # of the disk's radius: a position known no better is not given
 
 
@@ -78,20 +63,16 @@ def track(
     video: str | os.PathLike[str],
     *,
     disk_radius: float | None = None,
-    mark_distance: float | None = None,
     fps: float | None = None,
     pivot: tuple[float, float] | None = None,
     refine: bool | None = None,
     layout: Layout | Sequence[Mapping[str, Any]] | None = None,
     scale: float | None = None,
-    region: Region | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
-    sigma: Sigma | Mapping[str, float] | None = None,
-    apart: MarkSeparation | None = None,
     bob: str | Sequence[int] | None = None,
-    length: float | None = None,
-    config: Config | None = None,
+    config: Config | TrackOptions | None = None,
     progress: bool = False,
+    **more: Unpack[MoreOptions],
 ) -> Measurement:
     """Measure the motion of a disk with coloured marks in a film.
 
@@ -102,9 +83,6 @@ def track(
         green (clockwise) near its rim, or with those of `layout`.
     disk_radius : float, optional
         Radius of the disk [m], 0.08 if not given; with the marks' distance it sets the scale.
-    mark_distance : float, optional
-        Distance of the marks' centres from the disk's centre [m]. If not given, 65/80 of the radius where
-        the film agrees with that to 1.5 %, otherwise the rim alone sets the scale.
     fps : float, optional
         Frames per second, where the film's header does not tell the truth (slow motion).
     pivot : (u, v), optional
@@ -118,27 +96,27 @@ def track(
         ``{"tag": "4x4_50:7", "at": [y, z], "side": 0.03}``, upright at beta = 0.
     scale : float, optional
         Pixels per metre in the disk's plane, given instead of found.
-    region : (u0, v0, u1, v1), optional
-        The part of the picture in which the disk moves [pixels]; nothing outside it is looked at.
     calibrate : mapping, optional
         What the film is asked for: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: found (so
         if not given); False: as given, or not there; a number (lens, readout [s], exposure [s]): just that.
-    sigma : mapping, optional
-        Standard errors of what is given: ``pivot`` [pixels], ``scale`` [pixels per metre], ``layout`` [m].
-        With one, it is a beginning that the film improves; where the film does not tell, it stands. Without,
-        it is exact.
-    apart : (int, int, float), optional
-        Numbers of two marks (from 1; of the standard ones that is red) and the distance of their middles [m],
-        measured on the disk: that sets the scale.
     bob : str or (r, g, b), optional
         The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
         picture's vertical, about the centre of the bob's path (or `pivot`).
-    length : float, optional
-        Of that pendulum, from the pivot to the bob's middle [m]; sets the scale.
-    config : path or mapping, optional
-        A TOML file (or what would stand in one) with any of the arguments above; what is given here wins.
+    config : path, mapping or TrackOptions, optional
+        A TOML file (or what would stand in one) with any of these arguments; what is given here wins.
     progress : bool
         Show a progress bar.
+    **more
+        ``mark_distance``: of the marks' centres from the disk's centre [m]. If not given, 65/80 of the radius
+        where the film agrees with that to 1.5 %, otherwise the rim alone sets the scale.
+        ``region``: (u0, v0, u1, v1), the part of the picture in which the disk moves [pixels]; nothing
+        outside it is looked at.
+        ``sigma``: standard errors of what is given: ``pivot`` [pixels], ``scale`` [pixels per metre],
+        ``layout`` [m]. With one, it is a beginning that the film improves; where the film does not tell, it
+        stands. Without, it is exact.
+        ``apart``: (int, int, float), numbers of two marks (from 1; of the standard ones that is red) and the
+        distance of their middles [m], measured on the disk: that sets the scale.
+        ``length``: with `bob`, from the pendulum's pivot to the bob's middle [m]; sets the scale.
 
     Returns
     -------
@@ -175,292 +153,243 @@ def track(
     >>> m = udd.track("run.mp4", layout=[tag])  # doctest: +SKIP
     >>> swing = udd.track("clock.mp4", bob="red", length=0.8)  # doctest: +SKIP
     """
-    given = {
-        "disk_radius": disk_radius,
-        "mark_distance": mark_distance,
-        "fps": fps,
-        "pivot": pivot,
-        "refine": refine,
-        "layout": layout,
-        "scale": scale,
-        "region": region,
-        "calibrate": calibrate,
-        "sigma": sigma,
-        "apart": apart,
-    }
-    found = run_tracker(video, config=config, progress=progress, **given, bob=bob, length=length)
+    found = run_tracker(
+        video,
+        config=config,
+        progress=progress,
+        disk_radius=disk_radius,
+        fps=fps,
+        pivot=pivot,
+        refine=refine,
+        layout=layout,
+        scale=scale,
+        calibrate=calibrate,
+        bob=bob,
+        **more,
+    )
     return found.measurement if isinstance(found, Tracking) else found
 
 
 def run_tracker(
-    video: str | os.PathLike[str], *, config: Config | None = None, progress: bool = False, **given: Any
-) -> Tracking | Measurement:
-    """As `track`, with what was found on the way where the film is a disk's."""
-    known = settings({} if config is None else config, **given)
-    if known.get("bob") is not None:
-        return _pendulum(video, progress=progress, **known)
-    if known.pop("length", None) is not None:
-        raise TrackError("length is a pendulum's: say its bob's colour too")
-    return track_in_detail(video, **known, progress=progress)
-
-
-def _pendulum(
     video: str | os.PathLike[str],
     *,
-    bob: Any,
-    progress: bool,
-    length: float | None = None,
-    fps: float | None = None,
-    pivot: tuple[float, float] | None = None,
-    scale: float | None = None,
-    region: Region | None = None,
-    calibrate: Calibrate | Mapping[str, bool | float] | None = None,
-    refine: bool = False,
-    **more: Any,
-) -> Measurement:
-    """A plain pendulum's film; there is one pass whatever `refine` says."""
-    from tqdm import tqdm
-
-    if more:
-        raise TrackError(f"{', '.join(more)}: not for a pendulum, which has a bob and a length alone")
-    setup = Setup(
-        pivot=pivot,
-        layout=read_bob(bob),
-        scale=None if scale is None else length_of(scale, "scale", "pixels per metre"),
-        region=None if region is None else read_region(region),
-        calibrate=read_calibrate({} if calibrate is None else calibrate),
-    )
-    film = Film(video, fps=fps)
-    metres_long = None if length is None else length_of(length, "length")
-    with tqdm(total=film.packets, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
-        return track_bob(film, metres_long, setup, lambda _: bar.update())
+    config: Config | TrackOptions | None = None,
+    progress: bool = False,
+    watch: Watch | None = None,
+    **given: Any,
+) -> Tracking | Measurement:
+    """As `track`, with what was found on the way where the film is a disk's."""
+    options = read_options(config, **given)
+    film = Film(video, fps=options.fps)
+    if options.bob is not None:
+        with _bar(film, film.packets, "track", progress) as bar:
+            return track_bob(film, options, lambda _: bar.update())
+    if options.tags:
+        return _track_tags(film, options, progress, watch)
+    return _track_marks(film, options, progress, watch)
 
 
 def track_in_detail(
     video: str | os.PathLike[str],
     *,
-    disk_radius: float = 0.08,
-    mark_distance: float | None = None,
-    fps: float | None = None,
-    pivot: tuple[float, float] | None = None,
-    refine: bool = True,
-    layout: Layout | Sequence[Mapping[str, Any]] = STANDARD,
-    scale: float | None = None,
-    region: Region | None = None,
-    calibrate: Calibrate | Mapping[str, bool | float] | None = None,
-    sigma: Sigma | Mapping[str, float] | None = None,
-    apart: MarkSeparation | None = None,
     progress: bool = False,
-    watch: Callable[[TrackedFrame], object] | None = None,
+    watch: Watch | None = None,
+    **given: Any,
 ) -> Tracking:
-    """As `track`, with everything that was found on the way, in pixels; `watch` is told of each frame."""
-    tags = read_tags(layout) if is_tags(layout) and not isinstance(layout, Layout) else ()
-    setup = Setup(
-        length_of(disk_radius, "disk_radius"),
-        None if mark_distance is None else length_of(mark_distance, "mark_distance"),
-        pivot,
-        layout_of(tags) if tags else read_layout(layout),
-        None if scale is None else length_of(scale, "scale", "pixels per metre"),
-        None if region is None else read_region(region),
-        read_calibrate({} if calibrate is None else calibrate),
-        read_sigma({} if sigma is None else sigma),
-        None if apart is None else read_apart(apart),
-    )
-    film = Film(video, fps=fps)
-    if tags:
-        return _by_tags(film, tags, setup, progress, watch)
-    look_over = survey(film)
-    known, rim = _learn(film, look_over, setup)
-    tracks = _follow(film, known, look_over.frames, progress, watch)
-    # where the contact was known the paths were curved, and poses stand in their middle
-    tracks, doubtful = _settled(tracks, known.exposure if known.contact is None else 0.0)
-    if refine:
-        known = _timed(known, look_over, tracks, setup)
-        tracks = _again(film, known, tracks, progress)
-    drop_weak(tracks)
-    return _tracking(film, tracks, known, setup, rim, doubtful, refine, look_over)
+    """As `track` of a disk, with all that was found on the way, in pixels; `watch` is told of each frame."""
+    found = run_tracker(video, progress=progress, watch=watch, **given)
+    if not isinstance(found, Tracking):
+        raise TrackError("a pendulum's film has no marks to tell of in detail")
+    return found
 
 
-def _by_tags(
-    film: Film,
-    tags: Sequence[Tag],
-    setup: Setup,
-    progress: bool,
-    watch: Callable[[TrackedFrame], object] | None,
-) -> Tracking:
-    """Printed tags: each frame by itself, in one pass."""
+def _bar(film: Film, frames: int, verb: str, progress: bool) -> Any:
     from tqdm import tqdm
 
+    return tqdm(total=frames, unit="frame", desc=f"{verb} {film.path.name}", disable=not progress)
+
+
+def _track_marks(film: Film, options: TrackOptions, progress: bool, watch: Watch | None) -> Tracking:
+    """Coloured marks: survey, calibrate, follow, refine, to metres, flags."""
+    look_over = survey(film)
+    known, rim = _calibrate(film, look_over, options)
+    tracks = _follow(film, known, look_over.frames, progress, watch)
+    # where the contact was known the paths were curved, and poses stand in their middle
+    tracks, doubtful = _unwrap(tracks, known.exposure if known.contact is None else 0.0)
+    if options.refine:
+        known = recalibrate(known, look_over, tracks, options)
+        tracks = _refine(film, known, tracks, progress)
+    tracks = drop_weak(tracks)
+    return _to_metres(film, tracks, known, options, rim, doubtful, options.refine, look_over)
+
+
+def _track_tags(film: Film, options: TrackOptions, progress: bool, watch: Watch | None) -> Tracking:
+    """Printed tags: each frame by itself, in one pass."""
     frames = film.promised or film.packets
-    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
-
-        def tick(picture: Picture, pose: Pose) -> None:
-            bar.update()
-            if watch is not None:
-                look = DiskAppearance([], 0.0, 1.0, film.light, np.inf)
-                watch(TrackedFrame(picture, pose, look, frames, film.full_range))
-
-        tracks, known = follow_tags(film, film.pictures(), tags, setup, tick)
-    tracks, doubtful = _settled(tracks, known.exposure)
-    return _tracking(film, tracks, known, setup, None, doubtful, False)
+    with _bar(film, frames, "track", progress) as bar:
+        tell = _teller(film, DiskAppearance([], 0.0, 1.0, film.light, np.inf), frames, bar, watch)
+        tracks, known = follow_tags(film, film.pictures(), options, tell)
+    tracks, doubtful = _unwrap(tracks, known.exposure)
+    return _to_metres(film, tracks, known, options, None, doubtful, False)
 
 
-def _settled(tracks: Tracks, open_for: float) -> tuple[Tracks, int]:
+def _teller(
+    film: Film, look: DiskAppearance, frames: int, bar: Any, watch: Watch | None
+) -> Callable[[Picture, Pose], None]:
+    """What a pass calls after each picture: the progress bar moves, and `watch` is told."""
+
+    def tell(picture: Picture, pose: Pose) -> None:
+        bar.update()
+        if watch is not None:
+            watch(TrackedFrame(picture, pose, look, frames, film.full_range))
+
+    return tell
+
+
+def _unwrap(tracks: Tracks, open_for: float) -> tuple[Tracks, int]:
     """Means over the exposure taken to its middle, whole turns counted; how many of these are in doubt."""
-    t, centre, angle = np.array(tracks.t), np.array(tracks.centre), np.array(tracks.angle)
+    centre, angle = tracks.centre, tracks.angle
     if open_for:
-        centre, angle = at_middle(t, centre, angle, open_for)
-    angle, doubtful = recount(t, angle)
-    return replace(tracks, centre=list(centre), angle=list(angle)), doubtful
+        centre, angle = at_middle(tracks.t, centre, angle, open_for)
+    angle, doubtful = recount(tracks.t, angle)
+    return replace(tracks, centre=centre, angle=angle), doubtful
 
 
-def _learn(film: Film, look_over: Survey, setup: Setup) -> tuple[TrackerState, Rim | None]:
+def _calibrate(film: Film, look_over: Survey, options: TrackOptions) -> tuple[TrackerState, Rim | None]:
     """Find the disk in the survey, and learn all that is needed to follow it."""
-    inside = [setup.inside(p) for p in look_over.pictures]
+    inside = [options.inside(p) for p in look_over.pictures]
     missing, what = None, "red, orange, blue and green (clockwise)"
-    if setup.layout.standard:
+    if options.layout.standard:
         sights, missing = sightings(inside)
     else:
-        sights, what = matching(inside, setup.layout, setup.scale), "the layout's colours"
+        sights, what = matching(inside, options.layout, options.scale), "the layout's colours"
     seen = slowest(look_over.bursts, sights)
     if len(seen) < FEWEST:
         raise TrackError(
             f"{film.path}: no disk with marks in {what} was found: "
-            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all {len(setup.layout.places)}"
+            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all {len(options.layout.places)}"
         )
     if missing is not None:
         warnings.warn(
             f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=4
         )
-    return prepare(film, look_over, sights, seen, setup)
+    return prepare(film, look_over, sights, seen, options)
 
 
-def _tracking(
+@dataclass(frozen=True)
+class _Upright:
+    """Poses of a disk that stays in its plane, and what they have in common."""
+
+    tracks: Tracks
+    known: TrackerState
+    camera: Camera
+    rim: Rim | None
+    wobble: Wobble
+    shared: list[Array]  # standard errors (n, 3) of u, v and beta of one cause each, signed alike
+
+
+def _to_metres(
     film: Film,
     tracks: Tracks,
     known: TrackerState,
-    setup: Setup,
+    options: TrackOptions,
     rim: Rim | None,
     doubtful: int,
     twice: bool,
     look_over: Survey | None = None,
 ) -> Tracking:
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
-    camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
-    # Where the layout is taken as said, so is the centre.
-    by_hand = 0.0 if rim is not None and setup.calibrate.layout else setup.sigma.layout
-    centre_sigma = rim.centre_sigma if rim is not None and setup.calibrate.layout else by_hand * camera.scale
-    shared = [unforeseen(tracks, known.exposure**2 / 12)]
-    turned = wobble(tracks, known.look)
-    stood = correct_wobble(tracks, known.look, turned) if turned.amplitude else None
-    if stood is not None:
-        if twice:  # a mark is placed best where it is looked for
-            known = replace(known, look=stood.look)
-            tracks = second_pass(film.pictures(), known, stood.tracks, look_at=stood.look_at)
-            stood = correct_wobble(tracks, known.look, turned, stood) or stood
-        if rim is not None and setup.calibrate.layout and look_over is not None:
-            rim = _rim_upright(look_over, stood, known, rim, setup)
-            stood = stood.centred(rim.centre, upward(stood.look.places - rim.centre, setup))
-            centre_sigma = rim.centre_sigma
-        tracks, lean = stood.about(camera.pivot)
-        known, shared = replace(known, look=stood.look), [*shared, lean]
-        camera = camera_of(tracks, known, size_of(known.look.places, rim, setup), setup)
-    own = taken_to_middle(tracks, covariance(tracks, known.look), known.exposure**2 / 12)
-    alike = in_common(tracks, with_causes(own, 0.0, shared), camera)
-    shared += [alike[:, None] * np.eye(3)[axis] for axis in (0, 1)]  # u and v have causes of their own
-    values, sigma, rho = metres(tracks, with_causes(own, centre_sigma, shared), camera)
-    gone = left_the_wheels(np.array(tracks.t), values, setup.radius, camera.pivot_sigma)
-    for table in (values, sigma, rho):
-        table[gone] = np.nan
+    disk = _upright(film, tracks, known, options, rim, twice, look_over)
+    tracks, camera = disk.tracks, disk.camera
+    # where the layout is taken as said, so is the centre
+    by_hand = 0.0 if rim is not None and options.calibrate.layout else options.sigma.layout
+    centre_sigma = by_hand * camera.scale
+    if disk.rim is not None and options.calibrate.layout:
+        centre_sigma = disk.rim.centre_sigma
+    own = to_mid_exposure(tracks, covariance(tracks, disk.known.look), disk.known.exposure**2 / 12)
+    alike = common_mode_errors(tracks, add_shared_errors(own, 0.0, disk.shared), camera)
+    shared = [*disk.shared, *(alike[:, None] * np.eye(3)[axis] for axis in (0, 1))]  # u and v: two causes
+    values, sigma, rho = metres(tracks, add_shared_errors(own, centre_sigma, shared), camera)
+    gone = left_the_wheels(tracks.t, values, options.disk_radius, camera.pivot_sigma)
     # by how much the centre is off that was said, all frames are: that makes none of them vague
-    vague = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2 > (UNSURE * setup.radius) ** 2
+    spread = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2
+    vague = ~gone & (spread > (UNSURE * options.disk_radius) ** 2)
     for table in (values, sigma, rho):
-        table[vague] = np.nan
-    tracks.flag = [VAGUE if v else flag for v, flag in zip(vague, tracks.flag, strict=True)]
-    tracks.flag = [GONE if g else flag for g, flag in zip(gone, tracks.flag, strict=True)]
-    meta = meta_of(film, tracks, known, camera, setup, doubtful, turned)
+        table[gone | vague] = np.nan
+    flags = [GONE if g else VAGUE if v else f for g, v, f in zip(gone, vague, tracks.flag, strict=True)]
+    tracks = replace(tracks, flag=tuple(flags))
+    meta = meta_of(film, tracks, disk.known, camera, options, doubtful, disk.wobble)
     seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
-    tracks.flag = remarks(np.array(tracks.t), tracks.flag, seen_how, twice)
-    flag = np.array(tracks.flag)
-    measurement = Measurement(np.array(tracks.t), values, sigma, rho, flag, meta, DISK, seen_how)
+    tracks = replace(tracks, flag=tuple(remarks(tracks.t, tracks.flag, seen_how, twice)))
+    m = Measurement(tracks.t, values, sigma, rho, np.array(tracks.flag), meta, DISK, seen_how)
     try:
-        check_length(measurement)
+        check_length(m)
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}") from None
-    return Tracking(measurement, tracks, known, camera, rim)
+    return Tracking(m, tracks, disk.known, camera, disk.rim)
+
+
+def _upright(
+    film: Film,
+    tracks: Tracks,
+    known: TrackerState,
+    options: TrackOptions,
+    rim: Rim | None,
+    twice: bool,
+    look_over: Survey | None,
+) -> _Upright:
+    """Scale and contact, and a wobble undone where one is seen."""
+
+    def camera() -> Camera:
+        return camera_of(tracks, known, size_of(known.look.places, rim, options), options)
+
+    before = camera()
+    # row "exposure 40 ms, fast": errors over their standard errors 1.05 rather than 1.15
+    shared = [interpolation_error(tracks, known.exposure**2 / 12)]
+    turned = wobble(tracks, known.look)
+    stood = correct_wobble(tracks, known.look, turned) if turned.amplitude else None
+    if stood is None:
+        return _Upright(tracks, known, before, rim, turned, shared)
+    if twice:  # a mark is placed best where it is looked for ("wobble": 7 rather than 35 micrometres)
+        known = replace(known, look=stood.look)
+        tracks = second_pass(film.pictures(), known, stood.tracks, look_at=stood.look_at)
+        stood = correct_wobble(tracks, known.look, turned, stood) or stood
+    if rim is not None and options.calibrate.layout and look_over is not None:
+        rim = _rim_upright(look_over, stood, known, rim, options)
+        stood = stood.centred(rim.centre, upward(stood.look.places - rim.centre, options))
+    tracks, lean = stood.about(before.pivot)
+    known = replace(known, look=stood.look)
+    return _Upright(tracks, known, camera(), rim, turned, [*shared, lean])
 
 
 def _rim_upright(
-    look_over: Survey, stood: WobbleCorrection, known: TrackerState, rim: Rim, setup: Setup
+    look_over: Survey, stood: WobbleCorrection, known: TrackerState, rim: Rim, options: TrackOptions
 ) -> Rim:
     """The rim again, from frames whose foreshortening is known; its centre from where it was."""
     tracks, around = stood.tracks, LocalMotion(stood.tracks)
     frames = []
     for picture in look_over.pictures:
-        here = around.at(picture.index) if picture.index < len(tracks.t) else None
+        here = around.at(picture.index) if picture.index < len(tracks) else None
         if here is not None and here.held:
             frames.append((picture, here.pose, here.motion(known.exposure)))
     frames.sort(key=lambda f: stood.look.streak(f[2]))
     frames = frames[:SHARP]
     short = [float(stood.short[picture.index]) for picture, _, _ in frames]
     try:
-        return outline(frames, stood.look, known.view, rim_span(setup), short=short, across=stood.across)
+        return outline(frames, stood.look, known.view, rim_span(options), short=short, across=stood.across)
     except TrackError:  # it was seen once, but not now
         return replace(rim, centre=0j)
 
 
-def _follow(
-    film: Film,
-    known: TrackerState,
-    frames: int,
-    progress: bool,
-    watch: Callable[[TrackedFrame], object] | None,
-) -> Tracks:
-    from tqdm import tqdm
-
-    with tqdm(total=frames, unit="frame", desc=f"track {film.path.name}", disable=not progress) as bar:
-
-        def tick(picture: Picture, pose: Pose) -> None:
-            bar.update()
-            if watch is not None:
-                watch(TrackedFrame(picture, pose, known.look, frames, film.full_range))
-
-        return follow(film.pictures(), known, tick)
+def _follow(film: Film, known: TrackerState, frames: int, progress: bool, watch: Watch | None) -> Tracks:
+    with _bar(film, frames, "track", progress) as bar:
+        return follow(film.pictures(), known, _teller(film, known.look, frames, bar, watch))
 
 
-def _timed(known: TrackerState, look_over: Survey, tracks: Tracks, setup: Setup) -> TrackerState:
-    """Exposure, readout and marks once more, now that every frame's motion is known from its neighbours."""
-    around = LocalMotion(tracks)
-    frames = []
-    for picture in look_over.pictures:
-        here = around.at(picture.index) if picture.index < len(tracks.t) else None
-        if here is not None and here.held and not tracks.flag[picture.index]:
-            frames.append((picture.y, here))
-    if known.readout.value and setup.calibrate.given("readout") is None:
-        moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
-        again = readout(moving, known.look, known.view, around.interval)
-        if again.value:
-            known = replace(known, look=replace(known.look, readout=again.value), readout=again)
-    if known.exposure and setup.calibrate.given("exposure") is None:
-        paths = [(y, here.pose, here.motion) for y, here in frames]
-        known = replace(known, exposure=retimed(paths, known.exposure, known.look, known.view))
-    moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(known.exposure)) for y, here in frames]
-    moving.sort(key=lambda f: known.look.streak(f[2]))
-    slower = moving[: -(-len(moving) // 2)]
-    fixed = None if setup.calibrate.layout else setup.layout.unit
-    look = learn(known.look, slower[:: -(-len(slower) // MOST)], known.view, AGAIN, fixed)
-    return replace(known, look=look)
-
-
-def _again(film: Film, known: TrackerState, tracks: Tracks, progress: bool) -> Tracks:
-    streaks = [s > LONG or is_lost(flag) for s, flag in zip(tracks.streak, tracks.flag, strict=True)]
-    for streaks_only in (False, True) if any(streaks) else (False,):
-        if not progress:
-            tracks = second_pass(film.pictures(), known, tracks, streaks_only=streaks_only)
-            continue
-        from tqdm import tqdm
-
-        with tqdm(total=len(tracks.t), unit="frame", desc=f"refine {film.path.name}") as bar:
+def _refine(film: Film, known: TrackerState, tracks: Tracks, progress: bool) -> Tracks:
+    streaks = (tracks.streak > LONG).any() or any(is_lost(flag) for flag in tracks.flag)
+    for streaks_only in (False, True) if streaks else (False,):
+        with _bar(film, len(tracks), "refine", progress) as bar:
             tracks = second_pass(film.pictures(), known, tracks, lambda _: bar.update(), streaks_only)
     return tracks
 

@@ -1,1 +1,1 @@
-"""What is known of a film before it is measured: setup, scale, exposure, rolling shutter."""
+"""What is known of a film before it is measured: config files, scale, exposure, rolling shutter, rim."""

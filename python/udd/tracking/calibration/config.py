@@ -6,14 +6,14 @@ import math
 import os
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from udd.markers.layout import read_bob, read_layout
 from udd.markers.tags import is_tags, read_tags
+from udd.tracking.options import FIELDS, TrackOptions, read_apart, read_calibrate, read_region, read_sigma
 from udd.video.reader import TrackError
-
-from .setup import read_apart, read_calibrate, read_region, read_sigma
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
 
@@ -24,12 +24,8 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     Parameters
     ----------
     config : path or mapping
-        A TOML file, or what would stand in one: ``disk_radius``, ``mark_distance`` [m], ``fps`` [1/s],
-        ``pivot`` (two numbers [pixels]), ``refine`` (true or false), ``scale`` [pixels per metre],
-        ``region`` (four numbers [pixels]), ``layout`` (a list of marks, each with ``at`` and ``colour``),
-        ``calibrate`` (a table of what is to be found in the film), ``sigma`` (a table of standard errors of
-        what is said), ``apart`` (numbers of two marks, and their distance [m]), ``bob`` (a colour),
-        ``length`` [m].
+        A TOML file, or what would stand in one: the fields of `TrackOptions` by name, each as `udd.track`
+        takes it.
     **given
         The same by name; None is not given.
 
@@ -46,16 +42,24 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     where, said = as_said(config)
     found = {}
     for key, value in said.items():
-        if key not in _KINDS:
-            raise TrackError(f"{where}: there is no setting {key!r}; there are {', '.join(_KINDS)}")
-        kind, read = _KINDS[key]
+        if key not in _READERS:
+            raise TrackError(f"{where}: there is no setting {key!r}; there are {', '.join(_READERS)}")
         try:
-            found[key] = read(value)
+            found[key] = _READERS[key](value)
         except TrackError as error:
             raise TrackError(f"{where}: {error}") from None
         except (TypeError, ValueError, OverflowError):
-            raise TrackError(f"{where}: {key} must be {kind}, not {value!r}") from None
+            raise TrackError(
+                f"{where}: {key} must be {FIELDS[key].metadata['kind']}, not {value!r}"
+            ) from None
     return {**found, **{key: value for key, value in given.items() if value is not None}}
+
+
+def read_options(config: Config | TrackOptions | None, **given: Any) -> TrackOptions:
+    """All options, of a config and of arguments (not None), which win."""
+    if isinstance(config, TrackOptions):
+        return replace(config, **{name: value for name, value in given.items() if value is not None})
+    return TrackOptions(**settings({} if config is None else config, **given))
 
 
 def as_said(config: Config) -> tuple[str, Mapping[str, Any]]:
@@ -110,18 +114,18 @@ def _layout(value: Any) -> Any:
     return read_tags(value) if is_tags(value) else read_layout(value)
 
 
-_KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
-    "disk_radius": ("a positive number of metres", _positive),
-    "mark_distance": ("a positive number of metres", _positive),
-    "fps": ("a positive number of frames per second", _positive),
-    "pivot": ("two numbers of pixels [u, v]", _place),
-    "refine": ("true or false", _switch),
-    "scale": ("a positive number of pixels per metre", _positive),
-    "region": ("four numbers of pixels [u0, v0, u1, v1]", read_region),
-    "layout": ("a list of marks", _layout),
-    "calibrate": ("a table", read_calibrate),
-    "sigma": ("a table of standard errors", read_sigma),
-    "apart": ("two marks' numbers and a distance", read_apart),
-    "bob": ("the colour of a pendulum's bob", _bob),
-    "length": ("a positive number of metres", _positive),
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "disk_radius": _positive,
+    "mark_distance": _positive,
+    "fps": _positive,
+    "pivot": _place,
+    "refine": _switch,
+    "scale": _positive,
+    "region": read_region,
+    "layout": _layout,
+    "calibrate": read_calibrate,
+    "sigma": read_sigma,
+    "apart": read_apart,
+    "bob": _bob,
+    "length": _positive,
 }

@@ -10,23 +10,11 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Item
 
+from udd.tracking.options import FIELDS
 from udd.video.reader import TrackError
 
 from .config import settings
 
-NOTES = {
-    "disk_radius": "m",
-    "mark_distance": "m",
-    "fps": "frames per second",
-    "pivot": "where the wheels hold the disk, pixels (u, v down)",
-    "scale": "pixels per metre",
-    "region": "u0, v0, u1, v1: nothing outside is looked at, pixels",
-    "length": "m",
-    "apart": "two marks, by their numbers from 1, and how far apart their middles are, m",
-    "calibrate": "true: found in the film; false: as given, or not there",
-    "sigma": "standard errors of what is given (pixels, pixels per metre, m): the film improves it",
-    "layout": "m right of and above the disk's centre when beta is 0; sRGB codes",
-}
 TABLES = ("calibrate", "sigma", "layout")  # TOML wants them after the rest
 
 
@@ -101,7 +89,8 @@ def _plain(text: str) -> str:
 
 
 def _noted(item: Item, name: str) -> Item:
-    return item.comment(NOTES[name]) if name in NOTES else item
+    note = FIELDS[name].metadata["note"]
+    return item.comment(note) if note else item
 
 
 def _value(value: Any) -> Any:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
+from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose, moved_by_pose
 from udd.tracking.marks.pose_fit import align
 from udd.video.reader import Plane
 
@@ -18,7 +18,6 @@ MOST = 36  # frames to judge by
 FEWEST = 6
 CERTAIN = 5.0  # standard errors
 LEAST = 0.02  # of the frame interval: what is less does no harm
-FAR = 3.0  # pixels; frames whose marks disagree by more say less
 STEPS = [2.5, 1.2, 0.6]
 
 
@@ -75,21 +74,9 @@ def _compare(
     rows = look.lens.picture(here.centre + arms).imag
     speed = (motion.rate + 1j * motion.spin * arms) * ((rows + 0.5) / y.shape[0] - 0.5)
     moved = np.column_stack([speed.real, speed.imag])
-    maps = np.zeros((len(arms), 2, 3))
-    maps[:, 0, 0] = maps[:, 1, 1] = 1.0
-    maps[:, 0, 2], maps[:, 1, 2] = (1j * arms).real, (1j * arms).imag
-    left = np.where(fit.used[:, None], fit.step.leftover, 0.0)
-    weight = np.array(
-        [
-            s.information if s is not None and used else np.zeros((2, 2))
-            for s, used in zip(fit.sightings, fit.used, strict=True)
-        ]
-    )
-    # pixels that are known too well would drown the others
-    weight = (
-        np.minimum(1.0, 400.0 / np.maximum(np.abs(weight).max(axis=(1, 2)), 1e-9))[:, None, None] * weight
-    )
-    weight /= 1 + (np.abs(left).max() / FAR) ** 2
+    maps = moved_by_pose(arms)
+    left = np.where(fit.used[:, None], fit.step.residuals, 0.0)
+    weight = fit.information
     seen = weight @ maps
     normal = np.einsum("kai,kaj->ij", maps, seen)
     free = moved - maps @ np.linalg.solve(normal, np.einsum("kai,ka->i", seen, moved))

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.tracking.options import TrackOptions
+
 from .rim import Rim
-from .setup import Setup
 
 REACH = 65 / 80  # of the radius: where the marks of the standard disk have their centres
 RIM_EDGE = 0.35  # pixels: how well light and lens let one say where a bright disk ends
@@ -29,7 +30,7 @@ class Scale:
     origin: str
 
 
-def scale(places: NDArray[np.complex128], rim: Rim | None, setup: Setup) -> Scale:
+def scale(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions) -> Scale:
     """Combine the marks' spacing, their distance from the disk's centre known, with the rim's radius.
 
     Each counts by its uncertainty: that of the rim is where its edge lies; that of the marks shows in how far
@@ -37,12 +38,12 @@ def scale(places: NDArray[np.complex128], rim: Rim | None, setup: Setup) -> Scal
     disk. A scale that is said with an error counts by it, too. Two marks whose distance was measured say more
     than all that.
     """
-    said = None if setup.scale is None else Scale(setup.scale, setup.sigma.scale, "given")
-    if said is not None and not (said.sigma and setup.calibrate.scale):
+    said = None if options.scale is None else Scale(options.scale, options.sigma.scale, "given")
+    if said is not None and not (said.sigma and options.calibrate.scale):
         return said
-    film = _found(places, rim, setup)
+    film = _found(places, rim, options)
     if said is None or film is None:
-        return film or said or _by_marks(places, setup)  # one is there
+        return film or said or _by_marks(places, options)  # one is there
     if abs(film.value - said.value) < APART * np.hypot(film.sigma, said.sigma):
         return _both(film, said)
     warnings.warn(
@@ -53,8 +54,10 @@ def scale(places: NDArray[np.complex128], rim: Rim | None, setup: Setup) -> Scal
     return film
 
 
-def _by_rim(rim: Rim, setup: Setup) -> Scale:
-    return Scale(rim.radius / setup.radius, float(np.hypot(rim.sigma, RIM_EDGE)) / setup.radius, "rim")
+def _by_rim(rim: Rim, options: TrackOptions) -> Scale:
+    return Scale(
+        rim.radius / options.disk_radius, float(np.hypot(rim.sigma, RIM_EDGE)) / options.disk_radius, "rim"
+    )
 
 
 def _both(film: Scale, said: Scale) -> Scale:
@@ -64,21 +67,25 @@ def _both(film: Scale, said: Scale) -> Scale:
     return Scale(film.value + share * (said.value - film.value), float(np.sqrt(share)) * said.sigma, origin)
 
 
-def _found(places: NDArray[np.complex128], rim: Rim | None, setup: Setup) -> Scale | None:
+def _found(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions) -> Scale | None:
     """The film's own; None where it shows nothing that was not said."""
-    if setup.apart is not None:
-        one, other, distance = setup.apart
+    if options.apart is not None:
+        one, other, distance = options.apart
         value = float(abs(places[one - 1] - places[other - 1])) / distance
         return Scale(
             value, float(np.hypot(1.4 * PLACED, BY_HAND * value)) / distance, "distance of two marks"
         )
-    shown = None if rim is None else _by_rim(rim, setup)
-    if setup.scale is not None and setup.sigma.layout:
+    shown = None if rim is None else _by_rim(rim, options)
+    if options.scale is not None and options.sigma.layout:
         return shown  # a layout that is known no better was measured with that scale: it is no other evidence
-    marks = _by_marks(places, setup)
+    marks = _by_marks(places, options)
     if shown is None:
         return marks
-    if setup.layout.standard and setup.distance is None and abs(marks.value / shown.value - 1) > UNLIKE:
+    if (
+        options.layout.standard
+        and options.mark_distance is None
+        and abs(marks.value / shown.value - 1) > UNLIKE
+    ):
         return shown
     w_rim, w_marks = shown.sigma**-2, marks.sigma**-2
     value = (w_rim * shown.value + w_marks * marks.value) / (w_rim + w_marks)
@@ -86,9 +93,9 @@ def _found(places: NDArray[np.complex128], rim: Rim | None, setup: Setup) -> Sca
     return Scale(value, float((w_rim + w_marks) ** -0.5), origin)
 
 
-def _by_marks(places: NDArray[np.complex128], setup: Setup) -> Scale:
-    layout = setup.layout
-    reach = layout.reach if not layout.standard else setup.distance or REACH * setup.radius
+def _by_marks(places: NDArray[np.complex128], options: TrackOptions) -> Scale:
+    layout = options.layout
+    reach = layout.reach if not layout.standard else options.mark_distance or REACH * options.disk_radius
     body = layout.unit * reach
     body = body - body.mean()
     away = places - places.mean()
@@ -99,5 +106,5 @@ def _by_marks(places: NDArray[np.complex128], setup: Setup) -> Scale:
     spare = 2 * len(places) - 4
     value = abs(factor)
     glued = float(np.sqrt((np.abs(rest) ** 2).sum() / spare)) if spare else BY_HAND * value
-    known = np.hypot(PLACED, setup.sigma.layout * value)
+    known = np.hypot(PLACED, options.sigma.layout * value)
     return Scale(value, float(np.hypot(glued, known) / np.sqrt(square)), "marks")

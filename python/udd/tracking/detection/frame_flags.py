@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from udd.video.reader import Picture
+from collections.abc import Iterable
 
+import numpy as np
+
+from udd.video.reader import Picture, Plane
+
+COPIED = 10  # codes by which a copy may differ
+UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
 BLANK = 6.0  # brightness contrast of a black frame
 DAMAGED = "damaged: the frame does not decode whole"
 BLACK = "black: the frame shows nothing"
@@ -17,6 +23,17 @@ def unusable(picture: Picture) -> str:
     if picture.damaged:
         return DAMAGED
     return BLACK if float(picture.y[::8, ::8].std()) < BLANK else ""
+
+
+def is_copy(y: Plane, last: Plane, places: Iterable[complex], reach: int) -> bool:
+    """Whether no edge moved within `reach` pixels of some places; a codec does not copy exactly."""
+    changed, size = 0, 0
+    for place in places:
+        r, c = int(place.imag), int(place.real)
+        part = slice(max(0, r - reach), max(0, r + reach)), slice(max(0, c - reach), max(0, c + reach))
+        changed += int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED))
+        size += y[part].size
+    return size > 0 and changed < UNCHANGED
 
 
 def lost(why: str) -> str:

@@ -44,6 +44,15 @@ class Motion:
     bending: complex = 0j
     twisting: float = 0.0
 
+    @classmethod
+    def of_rates(
+        cls, rate: complex, spin: float, bending: complex, twisting: float, open_for: float
+    ) -> Motion:
+        """What an exposure sees of a path with these derivatives."""
+        half = 0.5 * open_for**2
+        shift, turn = rate * open_for, spin * open_for
+        return cls(shift, turn, bending * half, twisting * half, rate, spin, bending, twisting)
+
     @property
     def row(self) -> NDArray[np.float64]:
         """As six numbers: shift u, v, turn, bend u, v, twist."""

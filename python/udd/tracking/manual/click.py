@@ -6,8 +6,8 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from udd.tracking.calibration.config import Config, as_said, settings
-from udd.tracking.calibration.setup import length_of
 from udd.tracking.detection.survey import survey
+from udd.tracking.options import length_of
 from udd.video.reader import Film, TrackError
 
 from .questions import ClickSession, check

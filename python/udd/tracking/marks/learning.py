@@ -97,7 +97,7 @@ def places(look: DiskAppearance, frames: Sequence[Frame], view: NDArray[np.bool_
             continue
         for k, (mark, s) in enumerate(zip(look.marks, fit.sightings, strict=True)):
             if s is not None and fit.used[k] and s.complete > 0.6:
-                left = complex(fit.step.leftover[k][0], fit.step.leftover[k][1])
+                left = complex(fit.step.residuals[k][0], fit.step.residuals[k][1])
                 at = pose.centre + mark.place * np.exp(1j * pose.angle) + left
                 row[k] = complex(look.lens.picture(at))
     return out
@@ -214,7 +214,7 @@ def _replace_places(marks: list[Mark], fits: list[Seen]) -> list[Mark]:
             by_pose[at] = [[1, 0, arm.real], [0, 1, arm.imag]]
             by_place[at, at] = turn
             if s is not None and used[k]:
-                away = float(np.hypot(*step.leftover[k]))
+                away = float(np.hypot(*step.residuals[k]))
                 weight[at, at] = s.information / (1 + (away / FAR_OFF) ** 2)
                 offset[at] = s.offset
         seen = weight @ by_pose

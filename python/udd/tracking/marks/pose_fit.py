@@ -23,6 +23,13 @@ class Fit:
     used: NDArray[np.bool_]
     moved: float  # size of the last correction, in pixels at the marks
 
+    @property
+    def information(self) -> NDArray[np.float64]:
+        """(marks, 2, 2) of each mark's place, 0 where it is not used."""
+        nothing = np.zeros((2, 2))
+        seen = zip(self.sightings, self.used, strict=True)
+        return np.array([s.information if s is not None and used else nothing for s, used in seen])
+
 
 def align(
     y: Plane,

@@ -22,7 +22,7 @@ class Step:
 
     change: Array
     information: Array
-    leftover: Array  # (marks, 2): what remains of each offset [pixels], NaN where not seen
+    residuals: Array  # (marks, 2): what remains of each offset [pixels], NaN where not seen
     chi2: Array  # (marks,): squared misfit in units of unit noise
 
 
@@ -47,8 +47,8 @@ def solve(
     if eigen[0] <= 1e-4 * max(eigen[-1], 1e-12):
         return None
     change = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-    leftover = offset - maps @ change
-    chi2 = (leftover[:, None, :] @ information @ leftover[:, :, None])[:, 0, 0]
+    residuals = offset - maps @ change
+    chi2 = (residuals[:, None, :] @ information @ residuals[:, :, None])[:, 0, 0]
     unseen = np.array([s is None for s in sightings])
-    leftover[unseen], chi2[unseen] = np.nan, np.nan
-    return Step(change, normal, leftover, chi2)
+    residuals[unseen], chi2[unseen] = np.nan, np.nan
+    return Step(change, normal, residuals, chi2)

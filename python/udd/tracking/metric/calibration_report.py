@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.calibration_items import Estimate, table
 from udd.tracking.calibration.scale import Scale
-from udd.tracking.calibration.setup import Setup
 from udd.tracking.geometry.contact_point import pivot as rolling
 from udd.tracking.geometry.contact_point import support
 from udd.tracking.geometry.lens import Lens, middle_of
-from udd.tracking.passes.first_pass import TrackerState, Tracks
+from udd.tracking.options import TrackOptions
+from udd.tracking.passes.first_pass import TrackerState
+from udd.tracking.passes.tracks import Tracks
 from udd.tracking.passes.wobble import Wobble
 from udd.video.reader import Film, TrackError
 
@@ -26,7 +28,7 @@ MINOR = 0.1  # share of what is said below which the film alone is named
 APART = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
 
 
-def camera_of(tracks: Tracks, known: TrackerState, size: Scale, setup: Setup) -> Camera:
+def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOptions) -> Camera:
     """Scale and contact point, from the rolling constraint, by hand, or at worst from the support.
 
     A contact that is said with an error counts by it beside the rolling constraint's own.
@@ -36,9 +38,9 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, setup: Setup) ->
     TrackError
         Neither the motion nor a support tells where the contact is, and nobody said it.
     """
-    angle, centre = np.array(tracks.angle), np.array(tracks.centre)
+    angle, centre = tracks.angle, tracks.centre
     good = np.isfinite(angle)
-    found = rolling(np.array(tracks.t), centre, angle, good, known.look.reach)
+    found = rolling(tracks.t, centre, angle, good, known.look.reach)
     drive, drive_sigma = complex(np.nan, np.nan), np.nan
     if found is not None:
         drive = complex(np.conj(found.drive) / size.value)
@@ -47,12 +49,12 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, setup: Setup) ->
     def camera(place: complex, sigma: float, origin: str) -> Camera:
         return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive, drive_sigma)
 
-    if setup.pivot is not None:
-        place = complex(float(setup.pivot[0]), float(setup.pivot[1]))
+    if options.pivot is not None:
+        place = complex(float(options.pivot[0]), float(options.pivot[1]))
         if not np.isfinite(place):
-            raise TrackError(f"pivot must be two finite numbers, not {setup.pivot!r}")
-        place, said = complex(known.look.lens.plane(place)), setup.sigma.pivot
-        if found is None or not said or not setup.calibrate.pivot:
+            raise TrackError(f"pivot must be two finite numbers, not {options.pivot!r}")
+        place, said = complex(known.look.lens.plane(place)), options.sigma.pivot
+        if found is None or not said or not options.calibrate.pivot:
             return camera(place, said / size.value, "given")
         of_film = float(found.covariance[0, 0])
         if abs(found.place - place) < APART * np.hypot(said, np.sqrt(of_film)):
@@ -86,12 +88,12 @@ def meta_of(
     tracks: Tracks,
     known: TrackerState,
     camera: Camera,
-    setup: Setup,
+    options: TrackOptions,
     doubtful: int,
     turned: Wobble,
 ) -> dict[str, Any]:
     """The header of the measurement."""
-    missing = max(0, film.promised - len(tracks.t))
+    missing = max(0, film.promised - len(tracks))
     if missing or film.broken:
         warnings.warn(
             f"{film.path}: {missing or film.broken} frames are missing or do not decode; "
@@ -102,15 +104,15 @@ def meta_of(
     middle = (middle_of(known.view.shape) - camera.pivot) / camera.scale
     return {
         "source": film.path.name,
-        "R": setup.radius,
+        "R": options.disk_radius,
         "fps": film.fps,
-        "frames": len(tracks.t),
+        "frames": len(tracks),
         "frames_missing": missing,
         "frames_lost": sum(flag != "" for flag in tracks.flag),
         "turns_doubtful": doubtful,
         "exposure": known.exposure,
-        "readout": known.readout.value,
-        "readout_sigma": known.readout.sigma,
+        "readout": known.estimates["readout"].value,
+        "readout_sigma": known.estimates["readout"].sigma,
         "px_per_m": camera.scale,
         "px_per_m_sigma": camera.scale_sigma,
         "px_per_m_from": camera.scale_from,
@@ -122,13 +124,13 @@ def meta_of(
         "drive_seen": float(camera.drive.imag),
         "drive_lean": float(np.arctan2(camera.drive.real, camera.drive.imag)),
         "marks_px": [[m.place.real, m.place.imag] for m in look.marks],
-        "marks_rgb": [list(c) for c in setup.layout.colours],
+        "marks_rgb": [list(c) for c in options.layout.colours],
         "psf_px": look.psf,
         "lens": _numbers(look.lens),
         "wobble": turned.amplitude if math.isfinite(turned.least) else None,
         "wobble_sigma": turned.sigma if math.isfinite(turned.least) else None,
         "wobble_axis": turned.axis,
-        "calibration": table(tracks, known, camera, setup) | {"wobble": _wobble(turned)},
+        "calibration": table(estimates(tracks, known, camera, options, turned)),
     }
 
 
@@ -136,57 +138,31 @@ def _numbers(lens: Lens) -> list[float]:
     return [] if lens.plain else list(lens.row)
 
 
-def table(tracks: Tracks, known: TrackerState, camera: Camera, setup: Setup) -> dict[str, list[Any]]:
-    """Every item of the self-calibration as [value, standard error, how]; None: not known.
+def estimates(
+    tracks: Tracks, known: TrackerState, camera: Camera, options: TrackOptions, turned: Wobble
+) -> dict[str, Estimate]:
+    """What is known of every item.
 
     Lengths in m, times in s, the contact in pixels of the picture, the rest bare numbers; `how` is "found",
     "none found" (0 is as good), "given" (also where it was switched off), or says from what.
     """
-    wanted, lens = setup.calibrate, known.look.lens
-    bent = np.zeros(5) if known.bent is None else known.bent.sigma
-    lens_how = "found" if known.bent is not None and known.bent.found else "none found"
-
-    def how(name: str, found: str) -> str:
-        return found if wanted.given(name) is None else "given"
-
-    out: dict[str, list[Any]] = {}
+    out = dict(known.estimates)
+    fixed = not options.calibrate.layout
     for k, (place, sigma) in enumerate(zip(known.look.places, places_sigma(tracks, known), strict=True), 1):
         at = place / camera.scale
-        said = [[float(at.real), float(-at.imag)], sigma / camera.scale, how("layout", "found")]
-        out[f"mark {k}"] = [said[0], 0.0 if said[2] == "given" else said[1], said[2]]
-    out["scale"] = [camera.scale, camera.scale_sigma, camera.scale_from]
-    out["lens"] = [lens.curve, bent[0], how("lens", lens_how)]
-    names = ("tilt across", "tilt upward", "aspect", "shear")
-    values = (lens.tilt_u, lens.tilt_v, lens.aspect, lens.shear)
-    for name, value, sigma in zip(names, values, bent[1:], strict=True):
-        out[name] = [value, sigma, how("tilt", lens_how)]
-    rolling_how = "found" if known.readout.value else "none found"
-    out["readout"] = [known.readout.value, known.readout.sigma, how("readout", rolling_how)]
-    shut = "found" if known.exposure or math.isfinite(known.exposure_sigma) else "too slow to tell"
-    out["exposure"] = [known.exposure, known.exposure_sigma, how("exposure", shut)]
-    at = complex(lens.picture(camera.pivot))
-    out["pivot"] = [[at.real, at.imag], camera.pivot_sigma * camera.scale, camera.pivot_from]
-    out["W"] = [camera.drive.imag, camera.drive_sigma, "rolling constraint"]
-    return {name: [_plain(value), _plain(sigma), how] for name, (value, sigma, how) in out.items()}
-
-
-def _wobble(found: Wobble) -> list[Any]:
-    if not math.isfinite(found.least):
-        return [None, None, "too few marks to tell"]
-    how = "found" if found.amplitude else f"none seen (less than {math.degrees(found.least):.1f} degrees)"
-    return [found.amplitude, found.sigma, how]
-
-
-def _plain(value: Any) -> Any:
-    """Numbers as they are, None for what is not finite."""
-    if isinstance(value, list):
-        return [_plain(v) for v in value]
-    return float(value) if math.isfinite(value) else None
+        error = 0.0 if fixed else float(sigma / camera.scale)
+        out[f"mark {k}"] = Estimate([float(at.real), float(-at.imag)], error, "given" if fixed else "found")
+    out["scale"] = Estimate(camera.scale, camera.scale_sigma, camera.scale_from)
+    at = complex(known.look.lens.picture(camera.pivot))
+    out["pivot"] = Estimate([at.real, at.imag], camera.pivot_sigma * camera.scale, camera.pivot_from)
+    out["W"] = Estimate(camera.drive.imag, camera.drive_sigma, "rolling constraint")
+    out["wobble"] = turned.estimate
+    return out
 
 
 def places_sigma(tracks: Tracks, known: TrackerState) -> NDArray[np.float64]:
     """Standard error of each mark's place [pixels]: how its mean misfit differs between parts of the film."""
-    left, angle = np.array(tracks.leftover), np.array(tracks.angle)
+    left, angle = tracks.residuals, tracks.angle
     turned = (left[..., 0] + 1j * left[..., 1]) * np.exp(-1j * angle)[:, None]
     out = np.full(left.shape[1], np.nan)
     for k in range(left.shape[1]):

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from udd.tracking.geometry.pose import moved_by_pose
-from udd.tracking.passes.first_pass import Tracks
+from udd.tracking.passes.tracks import Tracks
 
 from .pixels_to_metres import Camera
 
@@ -23,7 +23,7 @@ SECOND = np.array([1.0, -2.0, 1.0])  # difference
 SCATTER = 2.6**0.5
 
 
-def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
+def common_mode_errors(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
     """Standard error (n,) of u and of v that `covariance` lacks; 0 where it is less than its own error.
 
     Codecs move all that goes the same way alike, by a vector or by leaving out what changes little. A disk
@@ -33,11 +33,11 @@ def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
     elsewhere, that difference is not noise, but seen from the wheels it changes little from frame to frame:
     therefore the second difference of the second differences is what counts.
     """
-    out = np.zeros(len(tracks.t))
+    out = np.zeros(len(tracks))
     if not np.isfinite(camera.drive):
         return out
     seen, expected = _jumps(tracks, covariance, camera)
-    streak = np.array(tracks.streak)
+    streak = tracks.streak
     known = np.flatnonzero(np.isfinite(seen))
     order = known[np.argsort(streak[known], kind="stable")]
     if len(order) < GROUP:
@@ -50,8 +50,8 @@ def in_common(tracks: Tracks, covariance: Array, camera: Camera) -> Array:
 
 def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array]:
     """Squares of differences and what is expected, for unit weights [pixels^2], per frame; NaN for none."""
-    t, angle = np.array(tracks.t), np.array(tracks.angle)
-    away = np.array(tracks.centre) - camera.pivot
+    t, angle = tracks.t, tracks.angle
+    away = tracks.centre - camera.pivot
     drive = complex(np.conj(camera.drive)) * camera.scale
     good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
     maps = moved_by_pose(-away)  # of a pose's error to that of c - p where the angle is taken out

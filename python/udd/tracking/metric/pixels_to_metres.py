@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd.markers.layout import STANDARD
 from udd.measurement import Measurement
 from udd.tracking.geometry.lens import PLAIN, Lens
-from udd.tracking.passes.first_pass import Tracks
+from udd.tracking.passes.tracks import Tracks
 
 Array = NDArray[np.float64]
 OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
@@ -100,7 +100,7 @@ def _of_pendulum(m: Measurement) -> Pixels:
 
 def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array, Array]:
     """Values (n, 3), standard errors (n, 3) and correlations (n, 3) of Y, Z [m] and beta [rad]."""
-    centre, angle = np.array(tracks.centre), np.array(tracks.angle)
+    centre, angle = tracks.centre, tracks.angle
     away = (centre - camera.pivot) / camera.scale
     values = np.column_stack([away.real, -away.imag, angle])
     to = np.array([1 / camera.scale, -1 / camera.scale, 1.0])

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.tracking.geometry.pose import DiskAppearance
-from udd.tracking.passes.first_pass import Tracks
+from udd.tracking.passes.tracks import Tracks
 
-from .streak_errors import left_over, unit_covariance
+from .streak_errors import mark_residuals, unit_covariance
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not speak for the others
@@ -25,17 +25,17 @@ def covariance(tracks: Tracks, look: DiskAppearance) -> Array:
     are neither; the marks' disagreement shows by how much, along their streaks and across: a rigid disk
     leaves 2 m - 3 of the 2 m coordinates of m marks over.
     """
-    off, used = left_over(tracks), np.isfinite(np.array(tracks.chi2))
+    off, used = mark_residuals(tracks), np.isfinite(tracks.chi2)
     spare = np.maximum(2 * used.sum(axis=1) - 3, 0)
-    chi2 = np.einsum("nmi,nmij,nmj->nm", off, np.array(tracks.marks, dtype=float), off)
+    chi2 = np.einsum("nmi,nmij,nmj->nm", off, tracks.marks.astype(float), off)
     total = np.where(used, chi2, 0.0).sum(axis=1)
-    usual, belief, group = _usual(total, spare, np.array(tracks.streak))
+    usual, belief, group = _usual(total, spare, tracks.streak)
     # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
     inflation = (belief * usual + total) / (belief + spare)
     return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, off, group))
 
 
-def with_causes(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
+def add_shared_errors(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
     """The covariance with causes that move all marks together, the centre known to so much.
 
     Where the centre is among the marks only the rim says; what it is off by turns with the disk. `shared`

@@ -6,18 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.tracking.geometry.pose import DiskAppearance, moved_by_pose
-from udd.tracking.passes.first_pass import Tracks
 from udd.tracking.passes.second_pass import LocalMotion
+from udd.tracking.passes.tracks import Tracks
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0  # times the median square; a mark beyond does not speak for the others
 LEAST = 0.05  # share of the misfit that either direction has at least
 
 
-def left_over(tracks: Tracks) -> Array:
+def mark_residuals(tracks: Tracks) -> Array:
     """What each mark is off, (n, marks, 2), without what it is off in all frames: that is its place."""
-    turn = np.exp(1j * np.array(tracks.angle))[:, None]
-    off = np.array(tracks.leftover) @ np.array([1, 1j]) * turn.conj()
+    turn = np.exp(1j * tracks.angle)[:, None]
+    off = tracks.residuals @ np.array([1, 1j]) * turn.conj()
     seen = np.isfinite(off).any(axis=0)
     off[:, seen] -= np.nanmedian(off[:, seen].real, axis=0) + 1j * np.nanmedian(off[:, seen].imag, axis=0)
     off *= turn
@@ -32,9 +32,9 @@ def unit_covariance(tracks: Tracks, look: DiskAppearance, off: Array, group: NDA
     `off` is what the marks leave over.
     `group` numbers the frames (below 0: none) whose streaks are so alike that the ratio is taken to be, too.
     """
-    out = np.full((len(tracks.t), 3, 3), np.nan)
+    out = np.full((len(tracks), 3, 3), np.nan)
     around = LocalMotion(tracks)
-    held = np.isfinite(np.array(tracks.information)).all(axis=(1, 2))
+    held = tracks.held
     for number in np.unique(group[group >= 0]):
         members = [int(k) for k in np.flatnonzero((group == number) & held)]
         frames = [_marks(tracks, look, off, around, k) for k in members]

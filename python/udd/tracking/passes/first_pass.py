@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.tracking.calibration.rolling_shutter import Readout
+from udd.calibration_items import Estimate
 from udd.tracking.detection.candidates import candidates, classify
-from udd.tracking.detection.frame_flags import REPEATED, lost, unusable
+from udd.tracking.detection.frame_flags import REPEATED, is_copy, lost, unusable
 from udd.tracking.geometry.contact_point import Contact
-from udd.tracking.geometry.lens import Bent
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT
 from udd.tracking.marks.pose_fit import Fit, align
 from udd.video.reader import Picture
+
+from .tracks import FrameTrack, Tracks, found_in, lost_in
 
 Array = NDArray[np.float64]
 CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
@@ -29,28 +30,9 @@ FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
 STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
 BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
 SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
-COPIED = 10  # codes by which a copy may differ
-UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixel changes more
 
 
-@dataclass
-class Tracks:
-    """What the pictures say, frame by frame, in pixels and radians."""
-
-    t: list[float]
-    centre: list[complex]
-    angle: list[float]  # unwrapped
-    information: list[Array]  # (3, 3) of (u, v, beta) for the assumed pixel noise
-    leftover: list[Array]  # (marks, 2) misfit of each [pixels], NaN where not used
-    chi2: list[Array]  # (marks,)
-    marks: list[Array]  # (marks, 2, 2) information of (u, v) of each, of the pose's, 0 where not used
-    complete: list[Array]  # (marks,) share of each mark's edges in view
-    streak: list[float]  # blur length at the marks [pixels]
-    flag: list[str]
-    method: list[str]  # "fast" or "refined", empty where the disk was not held
-
-
-@dataclass
+@dataclass(frozen=True)
 class TrackerState:
     """All that is known before the loop starts."""
 
@@ -60,9 +42,7 @@ class TrackerState:
     exposure: float  # [s]
     white: float  # brightness code of the bare disk
     contact: Contact | None
-    readout: Readout
-    exposure_sigma: float = np.inf
-    bent: Bent | None = None  # the lens with its uncertainty
+    estimates: Mapping[str, Estimate]  # rows of the table of calibrations, for what is known by now
 
 
 @dataclass(frozen=True)
@@ -83,20 +63,23 @@ def follow(
 
     After each picture `tick` is told where the disk is in it, NaN where it is not held.
     """
-    tracks = Tracks(*([] for _ in fields(Tracks)))
+    frames: list[FrameTrack] = []
     past: list[PoseSample] = []
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
-        flag, fit, pose, motion = _one(picture, known, past, last)
+        flag, fit, pose, motion = _track_frame(picture, known, past, last)
         last = picture.y
-        append(tracks, picture.t, flag, fit, pose, known.look.streak(motion), len(known.look.marks))
-        if fit is not None:
+        streak = known.look.streak(motion)
+        if fit is None:
+            frames.append(lost_in(picture.t, flag, streak, len(known.look.marks)))
+        else:
+            frames.append(found_in(picture.t, fit, pose, streak, "fast"))
             past = [*past[-2:], PoseSample(picture.t, pose, motion.spin)]
         tick(picture, pose)
-    return tracks
+    return Tracks.of(frames)
 
 
-def _one(
+def _track_frame(
     picture: Picture, known: TrackerState, past: list[PoseSample], last: NDArray[np.uint8] | None
 ) -> tuple[str, Fit | None, Pose, Motion]:
     nowhere = Pose(complex(np.nan, np.nan), np.nan)
@@ -109,21 +92,21 @@ def _one(
     if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
         motion = _motion(past, guess, picture.t, known)
-        fit = hold(picture, known, pose, motion, CLOSE)
+        fit = fit_and_check(picture, known, pose, motion, CLOSE)
         if fit is not None:
             better = _motion(past, pose, picture.t, known)
             if abs(known.look.streak(better) - known.look.streak(motion)) > 0.3:
                 motion = better
-                fit = hold(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
+                fit = fit_and_check(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
             return "", fit, pose, motion
-    best = _anywhere(picture, known, guess, past)
+    best = _reacquire(picture, known, guess, past)
     if best is None:
         return lost("fewer than two marks agree"), None, nowhere, Motion()
     fit, pose, motion = best
     return "", fit, pose, motion
 
 
-def hold(
+def fit_and_check(
     picture: Picture, known: TrackerState, pose: Pose, motion: Motion, rounds: list[float]
 ) -> Fit | None:
     """Align and check; a mark that disagrees with three others is left out."""
@@ -139,7 +122,7 @@ def hold(
 
 
 def _worst(fit: Fit) -> tuple[int, float]:
-    off = np.where(fit.used, np.hypot(*fit.step.leftover.T), 0.0)
+    off = np.where(fit.used, np.hypot(*fit.step.residuals.T), 0.0)
     k = int(np.argmax(off))
     return k, float(off[k])
 
@@ -163,7 +146,7 @@ def _on_the_disk(picture: Picture, known: TrackerState, pose: Pose) -> bool:
     return bool(np.mean(np.abs(level - known.white) < 0.2 * known.white) > 0.7)
 
 
-def _anywhere(
+def _reacquire(
     picture: Picture, known: TrackerState, guess: Pose | None, past: list[PoseSample]
 ) -> tuple[Fit, Pose, Motion] | None:
     """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
@@ -183,12 +166,12 @@ def _anywhere(
             return None
     patches = classify(picture, known.colours, known.view, box)
     best: tuple[float, Fit, Pose, Motion] | None = None
-    for start in candidates(patches, known.look, guess if fresh else None)[:MOST_TRIED]:
+    for start in candidates(patches, known.look)[:MOST_TRIED]:
         if guess is not None:
             start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
         for motion in _motions(past, start, picture.t, known, fresh):
             pose = Pose(start.centre, start.angle)
-            fit = hold(picture, known, pose, motion, FAR)
+            fit = fit_and_check(picture, known, pose, motion, FAR)
             if fit is not None:
                 score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
                 if best is None or score > best[0]:
@@ -218,8 +201,6 @@ def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose |
     last = past[-1]
     dt = t - last.t
     recent = [h for h in past if t - h.t < 0.5] or [last]
-    if len(recent) == 3 and dt > 1.6 * (last.t - recent[-2].t):
-        recent = recent[-2:]  # a parabola does not reach across a gap
     times = np.array([h.t - t for h in recent])
     weights = np.array([np.prod([-b / (a - b) for b in times if b != a]) for a in times])  # Lagrange at 0
     if len(recent) == 1:
@@ -254,13 +235,11 @@ def _motion(past: list[PoseSample], pose: Pose, t: float, known: TrackerState) -
 
 def along_contact(known: TrackerState, pose: Pose, spin: float, change: float = 0.0) -> Motion:
     """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
-    contact, open_for = known.contact, known.exposure
+    contact = known.contact
     assert contact is not None
     rate = contact.velocity(pose.centre, spin)
     bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
-    half = 0.5 * open_for**2
-    shift, turn = rate * open_for, spin * open_for
-    return Motion(shift, turn, bending * half, change * half, rate, spin, bending, change)
+    return Motion.of_rates(rate, spin, bending, change, known.exposure)
 
 
 def repeats(
@@ -270,49 +249,5 @@ def repeats(
     reach = look.reach
     if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
         return False
-    changed, size = 0, 0
-    for place in look.lens.picture(before.centre + look.places * np.exp(1j * before.angle)):
-        r, c, n = int(place.imag), int(place.real), int(SURROUNDINGS * np.hypot(*look.marks[0].half))
-        part = slice(max(0, r - n), max(0, r + n)), slice(max(0, c - n), max(0, c + n))
-        # a codec does not copy exactly, but it moves no edge
-        changed += int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED))
-        size += y[part].size
-    return size > 0 and changed < UNCHANGED
-
-
-def append(
-    tracks: Tracks, t: float, flag: str, fit: Fit | None, pose: Pose, streak: float, marks: int
-) -> None:
-    """One more row."""
-    tracks.t.append(t)
-    tracks.flag.append(flag)
-    tracks.centre.append(pose.centre)
-    tracks.angle.append(pose.angle)
-    tracks.streak.append(streak)
-    tracks.information.append(np.full((3, 3), np.nan))
-    tracks.leftover.append(np.full((marks, 2), np.nan))
-    tracks.chi2.append(np.full(marks, np.nan))
-    tracks.marks.append(np.zeros((marks, 2, 2), dtype=np.float32))
-    tracks.complete.append(np.zeros(marks))
-    tracks.method.append("" if fit is None else "fast")
-    if fit is not None:
-        put(tracks, -1, fit, pose, streak)
-
-
-def put(tracks: Tracks, k: int, fit: Fit, pose: Pose, streak: float) -> None:
-    """Write what was found in a frame into its row."""
-    tracks.centre[k], tracks.angle[k], tracks.streak[k] = pose.centre, pose.angle, streak
-    used = fit.used[:, None]
-    tracks.information[k] = fit.step.information
-    tracks.leftover[k] = np.where(used, fit.step.leftover, np.nan)
-    tracks.chi2[k] = np.where(fit.used, fit.step.chi2, np.nan)
-    tracks.marks[k] = np.array(
-        [
-            s.information if s and u else np.zeros((2, 2))
-            for s, u in zip(fit.sightings, fit.used, strict=True)
-        ],
-        dtype=np.float32,
-    )
-    tracks.complete[k] = np.array(
-        [s.complete if s and u else 0.0 for s, u in zip(fit.sightings, fit.used, strict=True)]
-    )
+    places = look.lens.picture(before.centre + look.places * np.exp(1j * before.angle))
+    return is_copy(y, last, places, int(SURROUNDINGS * np.hypot(*look.marks[0].half)))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .first_pass import Tracks
+from .tracks import Tracks
 
 LATE = 1.5  # usual intervals: after a longer one frames are missing
 AROUND = 5  # intervals on each side that say what is usual
@@ -16,23 +17,23 @@ ENOUGH = 3  # marks: two leave one coordinate to judge by
 
 def quality(tracks: Tracks, given: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
     """The columns of `Measurement.quality`; `given`: frames whose pose stands in the table."""
-    used = np.isfinite(np.array(tracks.chi2))
-    left = np.array(tracks.leftover)
+    used = np.isfinite(tracks.chi2)
+    left = tracks.residuals
     with np.errstate(invalid="ignore", divide="ignore"):
         square = np.where(used, (left**2).sum(axis=2), 0.0).sum(axis=1) / (2 * used.sum(axis=1))
     held = used.any(axis=1)
     method = np.where(given, np.array(tracks.method, dtype=np.str_), "none")
     return {
         "marks": used.sum(axis=1),
-        "complete": np.round(np.array(tracks.complete).mean(axis=1), 4),
+        "complete": np.round(tracks.complete.mean(axis=1), 4),
         "residual_px": np.where(held, np.round(np.sqrt(square), 5), np.nan),
-        "blur_px": np.where(held, np.round(np.array(tracks.streak), 3), np.nan),
+        "blur_px": np.where(held, np.round(tracks.streak, 3), np.nan),
         "method": np.where(method == "", "none", method),
     }
 
 
 def remarks(
-    t: NDArray[np.float64], flags: list[str], table: dict[str, NDArray[Any]], twice: bool
+    t: NDArray[np.float64], flags: Sequence[str], table: dict[str, NDArray[Any]], twice: bool
 ) -> list[str]:
     """The flags, with `gap` and `degraded` where a frame holds a pose; `twice`: of two passes."""
     missing = missing_before(t)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
-from udd.tracking.calibration.setup import Setup
 from udd.tracking.detection.colour_blobs import blobs
-from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, lost
+from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, is_copy, lost
 from udd.tracking.detection.survey import survey
+from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 from udd.video.srgb import light_of
 
@@ -27,7 +27,6 @@ SHARE = 0.4  # of its colour and light from which on a pixel counts as the bob's
 HALF_HIDDEN = 0.93  # share of the usual size below which the middle is not the bob's
 TOO_MUCH = 1.15  # and above which something else of its colour is there
 MOVED = 3.0  # pixels: a bob that was to move by less may look like a copy
-COPIED, UNCHANGED = 10, 12  # codes, pixels: what a codec changes in a copy
 SURE = 0.02  # of the length by which the pivot may be unsure
 
 
@@ -50,10 +49,8 @@ class Circle:
     rest: Array
 
 
-def track_bob(
-    film: Film, length: float | None, setup: Setup, tick: Callable[[Picture], object]
-) -> Measurement:
-    """The pendulum's angle in each frame; the setup's layout is the bob's colour, `length` in m.
+def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], object]) -> Measurement:
+    """The pendulum's angle in each frame; the options' layout is the bob's colour.
 
     Raises
     ------
@@ -63,14 +60,14 @@ def track_bob(
     some = [burst[0] for burst in survey(film).bursts if not burst[0].damaged]
     behind, noise = _background(some)
     rows: list[tuple[float, str, Blob | None]] = []
-    size = _size(film, some, behind, setup)
+    size = _size(film, some, behind, options)
     last: NDArray[np.uint8] | None = None
     path: list[complex] = []
     for picture in film.pictures():
         tick(picture)
         blob, flag = None, _flag(picture, behind)
         if not flag:
-            blob = locate_bob(picture, behind, setup, size, film.full_range)
+            blob = locate_bob(picture, behind, options, size, film.full_range)
             flag = "" if blob is not None else lost("the bob is not seen, or partly hidden")
         if blob is not None and last is not None and _copy(picture.y, last, blob, path):
             blob, flag = None, REPEATED
@@ -78,7 +75,7 @@ def track_bob(
             path = [*path[-2:], blob.centre]
         rows.append((picture.t, flag, blob))
         last = picture.y
-    return _angles(film, rows, length, setup, noise)
+    return _angles(film, rows, options, noise)
 
 
 def _background(some: Sequence[Picture]) -> tuple[Picture, float]:
@@ -97,18 +94,18 @@ def _flag(picture: Picture, behind: Picture) -> str:
     return BLACK if black else ""
 
 
-def _more(picture: Picture, behind: Picture, setup: Setup) -> NDArray[np.float32]:
+def _more(picture: Picture, behind: Picture, options: TrackOptions) -> NDArray[np.float32]:
     """How much more of the colour than the background has each pixel, at half the resolution."""
-    chroma = setup.layout.chroma[0]
+    chroma = options.layout.chroma[0]
     a, b = (chroma / np.hypot(*chroma)).astype(np.float32)
     du, dv = picture.u.astype(np.float32) - behind.u, picture.v.astype(np.float32) - behind.v
-    inside = setup.view(picture.y.shape)[::2, ::2][: du.shape[0], : du.shape[1]]
+    inside = options.view(picture.y.shape)[::2, ::2][: du.shape[0], : du.shape[1]]
     return np.where(inside, a * du + b * dv, np.float32(0))
 
 
-def _size(film: Film, some: Sequence[Picture], behind: Picture, setup: Setup) -> float:
+def _size(film: Film, some: Sequence[Picture], behind: Picture, options: TrackOptions) -> float:
     """The bob's usual area [pixels]."""
-    blobs_seen = [locate_bob(p, behind, setup, None, film.full_range) for p in some]
+    blobs_seen = [locate_bob(p, behind, options, None, film.full_range) for p in some]
     areas = [blob.area for blob in blobs_seen if blob is not None]
     if len(areas) < 5:
         raise TrackError(f"{film.path}: no bob of that colour moves in this film")
@@ -116,7 +113,7 @@ def _size(film: Film, some: Sequence[Picture], behind: Picture, setup: Setup) ->
 
 
 def locate_bob(
-    picture: Picture, behind: Picture, setup: Setup, size: float | None, full_range: bool = False
+    picture: Picture, behind: Picture, options: TrackOptions, size: float | None, full_range: bool = False
 ) -> Blob | None:
     """The middle of the largest patch that has the colour, weighted by how much of each pixel is the bob's.
 
@@ -125,7 +122,7 @@ def locate_bob(
     """
     import cv2
 
-    more = _more(picture, behind, setup)
+    more = _more(picture, behind, options)
     found = blobs(more > STRONG, SMALL // 4, 1)
     if not len(found.centre):
         return None
@@ -178,10 +175,7 @@ def _copy(y: NDArray[np.uint8], last: NDArray[np.uint8], blob: Blob, path: Seque
     """Whether a frame repeats the last although the bob was moving."""
     if len(path) < 3 or abs(2 * (path[-1] - path[-2]) - (path[-2] - path[-3])) < MOVED:
         return False  # it was about to stand still
-    n = int(1.5 * np.sqrt(blob.area))
-    r, c = int(blob.centre.imag), int(blob.centre.real)
-    part = slice(max(0, r - n), r + n), slice(max(0, c - n), c + n)
-    return int(np.count_nonzero(np.abs(y[part].astype(np.int16) - last[part]) > COPIED)) < UNCHANGED
+    return is_copy(y, last, [blob.centre], int(1.5 * np.sqrt(blob.area)))
 
 
 def circle(points: NDArray[np.complex128]) -> Circle:
@@ -224,7 +218,7 @@ def _exposure(t: Array, at: NDArray[np.complex128], moments: Array) -> tuple[flo
 
 
 def _angles(
-    film: Film, rows: list[tuple[float, str, Blob | None]], length: float | None, setup: Setup, noise: float
+    film: Film, rows: list[tuple[float, str, Blob | None]], options: TrackOptions, noise: float
 ) -> Measurement:
     t = np.array([row[0] for row in rows])
     flag = [row[1] for row in rows]
@@ -234,13 +228,13 @@ def _angles(
     seen = np.isfinite(at)
     if seen.sum() < 10:
         raise TrackError(f"{film.path}: the bob is seen in {seen.sum()} frames, at least 10 are needed")
-    given = setup.calibrate.given("exposure")
+    given = options.calibrate.given("exposure")
     open_for, open_sigma = (given, 0.0) if given is not None else _exposure(t[seen], at[seen], moments[seen])
     at, _ = at_middle(t, at, np.zeros(len(t)), open_for)
     path = circle(at[seen])
     pivot, pivot_sigma, origin = path.centre, path.sigma[0], "circle of the bob"
-    if setup.pivot is not None:
-        pivot, pivot_sigma, origin = complex(*setup.pivot), 0.0, "given"
+    if options.pivot is not None:
+        pivot, pivot_sigma, origin = complex(*options.pivot), 0.0, "given"
         radius = float(np.median(np.abs(at[seen] - pivot)))
     elif path.sigma[0] > SURE * path.radius:
         raise TrackError(
@@ -264,8 +258,9 @@ def _angles(
         "blur_px": np.where(seen, np.round(rate * open_for, 3), np.nan),
         "method": np.where(seen, "fast", "none"),
     }
-    scale = setup.scale or (radius / length if length else None)
-    how = "given" if setup.scale else "length"
+    length = options.length
+    scale = options.scale or (radius / length if length else None)
+    how = "given" if options.scale else "length"
     meta: dict[str, Any] = {
         "source": film.path.name,
         "fps": film.fps,
@@ -278,7 +273,7 @@ def _angles(
         "pivot_from": origin,
         "length_px": radius,
         "bob_px": float(np.sqrt(usual / np.pi)),
-        "marks_rgb": [list(setup.layout.colours[0])],
+        "marks_rgb": [list(options.layout.colours[0])],
         "grain": noise,
         "calibration": {
             "pivot": [[pivot.real, pivot.imag], pivot_sigma, origin],

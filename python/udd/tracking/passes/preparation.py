@@ -7,30 +7,34 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.calibration_items import Calibrate, Estimate
 from udd.tracking.calibration.exposure import Exposure, exposure
+from udd.tracking.calibration.exposure import again as retimed
 from udd.tracking.calibration.rim import SPAN, Rim, outline
 from udd.tracking.calibration.rolling_shutter import Readout, readout
-from udd.tracking.calibration.setup import Setup
 from udd.tracking.detection.candidates import colours_of
 from udd.tracking.detection.colour_blobs import Sight
 from udd.tracking.detection.colour_mixing import mixed
 from udd.tracking.detection.illumination import evenness
 from udd.tracking.detection.occluder import visible
-from udd.tracking.detection.survey import Moving, Survey, moving, repeats_last
+from udd.tracking.detection.survey import Moving, Survey, moving
 from udd.tracking.geometry.contact_point import Contact, rough_contact
-from udd.tracking.geometry.lens import Lens, calibrate
+from udd.tracking.geometry.lens import Bent, Lens, calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
-from udd.tracking.marks.learning import first_look, places, refine
+from udd.tracking.marks.learning import MOST, first_look, places, refine
 from udd.tracking.marks.localization import MISFIT
 from udd.tracking.marks.pose_fit import align
+from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
 from .first_pass import TrackerState
+from .second_pass import LocalMotion
+from .tracks import Tracks
 
-FEWEST = 3  # frames in motion from which marks are learned a second time
+AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known
 SHARP = 60  # slow frames from which the rim is measured
 FOR_LENS = 90  # frames from which tilt and lens are measured
-LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
+LENS_ROUNDS = 3  # marks are measured again without the distortion found (row "lens": once is twice as bad)
 SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 SURE = 4.0  # standard errors of the layout by which it may be further off, up to as much again
@@ -42,7 +46,7 @@ def prepare(
     look_over: Survey,
     sights: list[Sight | None],
     seen: list[tuple[Picture, Sight]],
-    setup: Setup,
+    options: TrackOptions,
 ) -> tuple[TrackerState, Rim | None]:
     """Learn from the survey's pictures, in which the disk was found at `sights` (`seen`: slowest first).
 
@@ -51,10 +55,10 @@ def prepare(
     TrackError
         No picture is sharp enough, or the rim does not stand out from the background and is needed.
     """
-    body, wanted = setup.layout.unit, setup.calibrate
+    body, wanted = options.layout.unit, options.calibrate
     fixed = None if wanted.layout else body
     view, white = visible(seen, body)
-    view = view & setup.view(view.shape)
+    view = view & options.view(view.shape)
     look = first_look(seen, view, white, film.light, body)
     colours = colours_of([p for p, _ in seen], [Pose(s.centre, s.angle) for _, s in seen], look, view)
     even = evenness(seen, view, body, film.light)
@@ -75,7 +79,6 @@ def prepare(
     given = wanted.given("exposure")
     open_for = exposure(in_motion, look, view) if given is None else Exposure(given, 0.0)
     in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
-    in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
     frames = [
         (
             m.picture.y,
@@ -91,9 +94,6 @@ def prepare(
     if rolling.value:
         look = replace(look, readout=rolling.value)
         look = refine(look, frames, view, fixed=fixed)
-        if given is None:
-            rolling = readout(frames, look, view, interval)
-            look = replace(look, readout=rolling.value)
     for _ in range(LENS_ROUNDS):
         at = places(look, frames[:FOR_LENS], view)
         bent = calibrate(at, view.shape, body, wanted.given("lens"), wanted.given("tilt"))
@@ -103,10 +103,6 @@ def prepare(
         for (_, pose, _), m in zip(frames, in_motion, strict=True):
             pose.centre, pose.angle = _in_plane(bent.lens, m.sight, body)
         look = refine(look, frames, view, fixed=fixed)
-    else:
-        frames = frames[:0]
-    if len(frames) >= FEWEST:
-        look = refine(look, frames, view, 2, fixed)
     sharp: list[tuple[Picture, Pose, Motion]] = []
     for picture, sight in seen[:SHARP]:
         pose, motion = Pose(*_in_plane(look.lens, sight, body)), paths.get(picture.index, Motion())
@@ -114,13 +110,73 @@ def prepare(
             sharp.append((picture, pose, motion))
     if not sharp:
         raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
-    rim = _rim(film, sharp, look, view, setup)
+    rim = _rim(film, sharp, look, view, options)
     if rim is not None:
         look = replace(look, rim=rim.radius - RIM_SMEAR)
-    look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, setup)
+    look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, options)
     contact = _contact(in_motion, look)
-    known = TrackerState(look, view, colours, open_for.value, white, contact, rolling, open_for.sigma, bent)
-    return known, rim
+    estimates = {
+        **lens_estimates(bent, look.lens, wanted),
+        **readout_estimate(rolling, wanted),
+        **exposure_estimate(open_for, wanted),
+    }
+    return TrackerState(look, view, colours, open_for.value, white, contact, estimates), rim
+
+
+def lens_estimates(bent: Bent, lens: Lens, wanted: Calibrate) -> dict[str, Estimate]:
+    """Lens and tilt as rows of the table."""
+    names = ("lens", "tilt across", "tilt upward", "aspect", "shear")
+    values = (lens.curve, lens.tilt_u, lens.tilt_v, lens.aspect, lens.shear)
+    how = "found" if bent.found else "none found"
+    items = ("lens", *["tilt"] * 4)
+    return {
+        name: wanted.estimate(item, value, float(sigma), how)
+        for name, item, value, sigma in zip(names, items, values, bent.sigma, strict=True)
+    }
+
+
+def readout_estimate(found: Readout, wanted: Calibrate) -> dict[str, Estimate]:
+    """The readout as a row of the table."""
+    how = "found" if found.value else "none found"
+    return {"readout": wanted.estimate("readout", found.value, found.sigma, how)}
+
+
+def exposure_estimate(found: Exposure, wanted: Calibrate) -> dict[str, Estimate]:
+    """The exposure as a row of the table."""
+    how = "found" if found.value or np.isfinite(found.sigma) else "too slow to tell"
+    return {"exposure": wanted.estimate("exposure", found.value, found.sigma, how)}
+
+
+def recalibrate(
+    known: TrackerState, look_over: Survey, tracks: Tracks, options: TrackOptions
+) -> TrackerState:
+    """Exposure, readout and marks once more, now that every frame's motion is known from its neighbours."""
+    around, wanted = LocalMotion(tracks), options.calibrate
+    frames = []
+    for picture in look_over.pictures:
+        here = around.at(picture.index) if picture.index < len(tracks) else None
+        if here is not None and here.held and not tracks.flag[picture.index]:
+            frames.append((picture.y, here))
+    if known.look.readout and wanted.given("readout") is None:
+        moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
+        rolling = readout(moving, known.look, known.view, around.interval)
+        if rolling.value:
+            estimates = {**known.estimates, **readout_estimate(rolling, wanted)}
+            known = replace(known, look=replace(known.look, readout=rolling.value), estimates=estimates)
+    # row "exposure 40 ms, fast": 0.03 mm, 0.15 without
+    if known.exposure and wanted.given("exposure") is None:
+        paths = [(y, here.pose, here.motion) for y, here in frames]
+        value = retimed(paths, known.exposure, known.look, known.view)
+        found = Exposure(value, known.estimates["exposure"].sigma)
+        known = replace(
+            known, exposure=value, estimates={**known.estimates, **exposure_estimate(found, wanted)}
+        )
+    moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(known.exposure)) for y, here in frames]
+    moving.sort(key=lambda f: known.look.streak(f[2]))
+    slower = moving[: -(-len(moving) // 2)]
+    fixed = None if wanted.layout else options.layout.unit
+    look = refine(known.look, slower[:: -(-len(slower) // MOST)], known.view, AGAIN, fixed)
+    return replace(known, look=look)
 
 
 def _rim(
@@ -128,23 +184,23 @@ def _rim(
     sharp: list[tuple[Picture, Pose, Motion]],
     look: DiskAppearance,
     view: NDArray[np.bool_],
-    setup: Setup,
+    options: TrackOptions,
 ) -> Rim | None:
     """The disk's outline; None where it does not show and the layout says where its centre is."""
     try:
-        return outline(sharp, look, view, rim_span(setup))
+        return outline(sharp, look, view, rim_span(options))
     except TrackError as error:
-        if not setup.layout.standard:
+        if not options.layout.standard:
             return None
         raise TrackError(f"{film.path}: {error}") from None
 
 
-def rim_span(setup: Setup) -> tuple[float, float]:
+def rim_span(options: TrackOptions) -> tuple[float, float]:
     """Where to look for the rim, in units of the marks' reach."""
-    if setup.layout.standard:
+    if options.layout.standard:
         return SPAN
-    ratio = setup.radius / setup.layout.reach
-    near = NEAR_RIM + min(SURE * setup.sigma.layout / setup.radius, NEAR_RIM)
+    ratio = options.disk_radius / options.layout.reach
+    near = NEAR_RIM + min(SURE * options.sigma.layout / options.disk_radius, NEAR_RIM)
     return (1 - near) * ratio, (1 + near) * ratio
 
 
@@ -168,27 +224,27 @@ def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[c
     return complex(marks.mean() - factor * arms.mean()), sight.angle + turn
 
 
-def _centred(look: DiskAppearance, centre: complex, setup: Setup) -> DiskAppearance:
+def _centred(look: DiskAppearance, centre: complex, options: TrackOptions) -> DiskAppearance:
     """Marks as seen from the disk's own centre, turned to beta = 0."""
-    turn = upward(look.places - centre, setup)
+    turn = upward(look.places - centre, options)
     marks = [
         replace(m, place=(m.place - centre) / turn, turn=m.turn - float(np.angle(turn))) for m in look.marks
     ]
     return replace(look, marks=marks)
 
 
-def upward(places: NDArray[np.complex128], setup: Setup) -> complex:
+def upward(places: NDArray[np.complex128], options: TrackOptions) -> complex:
     """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
 
     Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
     all the marks of any other layout. Of one that is said with an error the first mark says it.
     """
-    body = setup.layout.unit
-    if setup.sigma.layout and setup.calibrate.layout:
-        first = setup.layout.first
+    body = options.layout.unit
+    if options.sigma.layout and options.calibrate.layout:
+        first = options.layout.first
         turn = complex(places[first] / body[first])
         return turn / abs(turn)
-    if not setup.layout.standard:
+    if not options.layout.standard:
         turn = complex(np.vdot(body - body.mean(), places - places.mean()))
         return turn / abs(turn)
     turns = places / np.abs(places) / body

@@ -13,22 +13,22 @@ from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT
 from udd.video.reader import Picture
 
-from .first_pass import TrackerState, Tracks, hold, put
+from .first_pass import TrackerState, fit_and_check
+from .tracks import FrameTrack, Tracks, found_in, lost_in
 
 Array = NDArray[np.float64]
 EACH_SIDE = 2  # neighbours on each side
 NEAR = 3.5  # intervals within which a neighbour tells anything
 KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
 FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
-APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
-APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
-LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
+# pixels; longer streaks are gone over once more, with what their neighbours turned out to be (rows "exposure
+# 40 ms, fast" and "shared: hard": a tenth to a fifth of the error)
+LONG = 25.0
 WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
 WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
 # where the second derivative jumps, as friction makes it where a disk turns back: its error times interval^2
 # against the miss, rms over the times at which it may jump, for the mean over a whole interval
 JUMP = 1.10
-FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
 
 
 @dataclass(frozen=True)
@@ -44,17 +44,7 @@ class Local:
 
     def motion(self, open_for: float) -> Motion:
         """What the exposure sees of it."""
-        half = 0.5 * open_for**2
-        return Motion(
-            self.rate * open_for,
-            self.spin * open_for,
-            self.bending * half,
-            self.twisting * half,
-            self.rate,
-            self.spin,
-            self.bending,
-            self.twisting,
-        )
+        return Motion.of_rates(self.rate, self.spin, self.bending, self.twisting, open_for)
 
 
 def refine(
@@ -67,65 +57,67 @@ def refine(
 ) -> Tracks:
     """Fit every frame again from what the first pass says about it and its neighbours.
 
-    A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
+    A frame that the second pass does not hold keeps the first pass's pose. One that
     the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
     streaks stay as they are. `look_at` gives each frame's look where it is not always the same.
     """
-    tracks = replace(
-        first,
-        **{name: list(getattr(first, name)) for name in Tracks.__dataclass_fields__},
-    )
+    better: dict[int, FrameTrack] = {}
     around = LocalMotion(first)
     for k, picture in enumerate(pictures):
-        if k < len(first.t) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
+        if k < len(first) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
             seen = known if look_at is None else replace(known, look=look_at(k))
-            _again(picture, k, seen, around, tracks)
+            frame = _refine_frame(picture, k, seen, around, first)
+            if frame is not None:
+                better[k] = frame
         tick(picture.index)
-    return tracks
+    return first.with_frames(better)
 
 
-def _again(picture: Picture, k: int, known: TrackerState, around: LocalMotion, tracks: Tracks) -> None:
+def _refine_frame(
+    picture: Picture, k: int, known: TrackerState, around: LocalMotion, tracks: Tracks
+) -> FrameTrack | None:
     if tracks.flag[k] and not is_lost(tracks.flag[k]):
-        return
+        return None
     here = around.at(k)
     if here is None:
-        return
+        return None
     motion = here.motion(known.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
-    fit = hold(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
-    reach = known.look.reach
+    fit = fit_and_check(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
     streak = known.look.streak(motion)
     if fit is None:
-        return
-    away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
-    if away > (APART if here.held else FORESEEN_APART) + APART_BY_STREAK * streak:
-        return
-    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.held:
-        return  # two pale streaks agree with much
-    put(tracks, k, fit, pose, streak)
-    tracks.flag[k], tracks.method[k] = "", "refined"
+        return None
+    return found_in(float(tracks.t[k]), fit, pose, streak, "refined")
 
 
 def weak(tracks: Tracks) -> NDArray[np.bool_]:
     """Frames with long streaks of too few marks, or of marks that disagree."""
     used = np.array([np.isfinite(c).sum() for c in tracks.chi2])
-    off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.leftover])
-    long = np.array(tracks.streak) > LONG
-    return np.asarray(long & ((used < WEAK_MARKS) | (off > WEAK_OFF + 0.03 * np.array(tracks.streak))))
+    off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.residuals])
+    long = tracks.streak > LONG
+    return np.asarray(long & ((used < WEAK_MARKS) | (off > WEAK_OFF + 0.03 * tracks.streak)))
 
 
-def drop_weak(tracks: Tracks) -> None:
-    """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
-    for k in np.flatnonzero(weak(tracks)):
-        if tracks.flag[k] == "":
-            tracks.flag[k], tracks.method[k] = lost("too few marks in a long streak"), ""
-            tracks.centre[k], tracks.angle[k] = complex(np.nan, np.nan), np.nan
-            tracks.information[k] = np.full((3, 3), np.nan)
-            tracks.chi2[k] = np.full_like(tracks.chi2[k], np.nan)
-            tracks.leftover[k] = np.full_like(tracks.leftover[k], np.nan)
+def drop_weak(tracks: Tracks) -> Tracks:
+    """Give up the frames in which a long streak of two marks is all there is: it fits in many places.
+
+    Row "shared: hard": a tenth of the error.
+    """
+    why, marks = lost("too few marks in a long streak"), tracks.chi2.shape[1]
+    return tracks.with_frames(
+        {
+            k: replace(
+                lost_in(float(tracks.t[k]), why, float(tracks.streak[k]), marks),
+                marks=tracks.marks[k],
+                complete=tracks.complete[k],
+            )
+            for k in map(int, np.flatnonzero(weak(tracks)))
+            if not tracks.flag[k]
+        }
+    )
 
 
-def unforeseen(tracks: Tracks, variance: float) -> Array:
+def interpolation_error(tracks: Tracks, variance: float) -> Array:
     """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
 
     A streak stands for the mean of its path, which is off its middle by half the second derivative times the
@@ -134,11 +126,11 @@ def unforeseen(tracks: Tracks, variance: float) -> Array:
     """
     around = LocalMotion(tracks)
     factor = 0.5 * JUMP * variance / around.interval**2
-    missed = [around.surprise(k) for k in range(len(tracks.t))]
+    missed = [around.leave_one_out_residual(k) for k in range(len(tracks))]
     return factor * np.array([(centre.real, centre.imag, angle) for centre, angle in missed])
 
 
-def taken_to_middle(tracks: Tracks, covariance: Array, variance: float) -> Array:
+def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array:
     """Covariances (n, 3, 3) of poses in the middle of paths whose bending poses with those errors told.
 
     What the mean of a path is off its middle by is taken off, half the second derivative times `variance`
@@ -159,8 +151,8 @@ class LocalMotion:
     """A first pass, to be looked at around each of its frames."""
 
     def __init__(self, tracks: Tracks) -> None:
-        self.t = np.array(tracks.t)
-        self.centre, self.angle = np.array(tracks.centre), np.array(tracks.angle)
+        self.t = tracks.t
+        self.centre, self.angle = tracks.centre, tracks.angle
         self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
@@ -173,7 +165,7 @@ class LocalMotion:
         x = (self.t[near] - self.t[k]) / self.interval
         return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], held
 
-    def surprise(self, k: int) -> tuple[complex, float]:
+    def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
         """How far centre and angle are from what the neighbours alone foretell; 0 where these are too few."""
         near, x, _ = self._near(k)
         others = near != k

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.markers.layout import laid
 from udd.markers.tags import Tag, dictionary
+from udd.tracking.calibration.exposure import Exposure
 from udd.tracking.calibration.rolling_shutter import Readout
-from udd.tracking.calibration.setup import Setup
 from udd.tracking.detection.frame_flags import REPEATED, lost, unusable
 from udd.tracking.detection.tag_corners import sharpened
 from udd.tracking.geometry.lens import calibrate
@@ -19,9 +19,12 @@ from udd.tracking.geometry.pose import DiskAppearance, Mark, Pose
 from udd.tracking.marks.localization import Sighting
 from udd.tracking.marks.pose_fit import Fit
 from udd.tracking.marks.rigid_fit import solve
+from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
-from .first_pass import PoseSample, TrackerState, Tracks, append, predict, repeats
+from .first_pass import PoseSample, TrackerState, predict, repeats
+from .preparation import exposure_estimate, lens_estimates, readout_estimate
+from .tracks import FrameTrack, Tracks, found_in, lost_in
 
 Array = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -35,21 +38,21 @@ FOR_LENS = 400  # frames at most from which tilt and lens are measured
 class Finder:
     """Corners of the known tags in a picture (n, NaN where not seen)."""
 
-    def __init__(self, tags: Sequence[Tag], setup: Setup, light: Array) -> None:
+    def __init__(self, tags: Sequence[Tag], options: TrackOptions, light: Array) -> None:
         import cv2
 
         how = cv2.aruco.DetectorParameters()
         how.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         self.light, self.cells = light.astype(np.float32), int(dictionary(tags[0].dictionary).markerSize) + 2
-        self.setup, self.row = setup, {tag.number: k for k, tag in enumerate(tags)}
+        self.options, self.row = options, {tag.number: k for k, tag in enumerate(tags)}
         self.detector = cv2.aruco.ArucoDetector(dictionary(tags[0].dictionary), how)
 
     def __call__(self, picture: Picture) -> Complexes:
         """Look at one picture."""
         out = np.full((len(self.row), 4), complex(np.nan, np.nan))
         y, away = picture.y, 0j
-        if self.setup.region is not None:
-            inside = self.setup.view(y.shape)
+        if self.options.region is not None:
+            inside = self.options.view(y.shape)
             rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
             y = np.ascontiguousarray(y[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
             away = complex(columns[0], rows[0])
@@ -69,8 +72,7 @@ class Finder:
 def follow_tags(
     film: Film,
     pictures: Iterable[Picture],
-    tags: Sequence[Tag],
-    setup: Setup,
+    options: TrackOptions,
     tick: Callable[[Picture, Pose], object],
 ) -> tuple[Tracks, TrackerState]:
     """Find the tags in every picture and lay one rigid body through their corners.
@@ -80,13 +82,13 @@ def follow_tags(
     TrackError
         The film is empty, or fewer than 10 frames show a tag.
     """
-    find, body = Finder(tags, setup, film.light), setup.layout.unit
+    find, body = Finder(options.tags, options, film.light), options.layout.unit
     seen: list[Complexes] = []
     notes: list[tuple[float, str]] = []
     last: NDArray[np.uint8] | None = None
     shape = (film.size[1], film.size[0])
     past: list[PoseSample] = []
-    rough = _rough_look(film, setup)
+    rough = _rough_look(film, options)
     for picture in pictures:
         shape = (picture.y.shape[0], picture.y.shape[1])
         at, flag = np.full(len(body), complex(np.nan, np.nan)), unusable(picture)
@@ -116,7 +118,7 @@ def follow_tags(
             f"{film.path}: none of the tags was found in more than {np.isfinite(points).any(axis=1).sum()} "
             f"of {len(points)} frames; at least {FEWEST} are needed"
         )
-    return _laid(points, notes, film, setup, shape)
+    return _laid(points, notes, film, options, shape)
 
 
 def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
@@ -126,16 +128,20 @@ def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
     return Pose(centre, float(np.angle(turn))), abs(turn)
 
 
-def _rough_look(film: Film, setup: Setup) -> DiskAppearance:
-    marks = [Mark(complex(z), (ABOUT, ABOUT), 0.0, 0.0) for z in setup.layout.unit]
+def _rough_look(film: Film, options: TrackOptions) -> DiskAppearance:
+    marks = [Mark(complex(z), (ABOUT, ABOUT), 0.0, 0.0) for z in options.layout.unit]
     return DiskAppearance(marks, 0.0, 1.0, film.light, np.inf)
 
 
 def _laid(
-    points: Complexes, notes: list[tuple[float, str]], film: Film, setup: Setup, shape: tuple[int, int]
+    points: Complexes,
+    notes: list[tuple[float, str]],
+    film: Film,
+    options: TrackOptions,
+    shape: tuple[int, int],
 ) -> tuple[Tracks, TrackerState]:
     """Lens, size and layout from all frames; then every frame's pose."""
-    body, wanted = setup.layout.unit, setup.calibrate
+    body, wanted = options.layout.unit, options.calibrate
     good = np.flatnonzero(np.isfinite(points).sum(axis=1) >= 4)
     some = good[:: max(1, len(good) // FOR_LENS)]
     bent = calibrate(points[some], shape, body, wanted.given("lens"), wanted.given("tilt"))
@@ -146,7 +152,7 @@ def _laid(
         places = places + _displaced(flat[good], places)
     marks = [Mark(complex(z), (0.0, 0.0), 0.0, 0.0) for z in places]
     look = DiskAppearance(marks, 0.0, 1.0, film.light, np.inf, bent.lens)
-    tracks = Tracks(*([] for _ in fields(Tracks)))
+    frames: list[FrameTrack] = []
     angle = 0.0
     for at, (t, flag) in zip(flat, notes, strict=True):
         pose, fit = Pose(complex(np.nan, np.nan), np.nan), None
@@ -155,24 +161,20 @@ def _laid(
             fit = _fit(at, pose, look)
             flag = "" if fit is not None else lost("the tags disagree")
         if fit is None:
-            pose = Pose(complex(np.nan, np.nan), np.nan)
+            frames.append(lost_in(t, flag, np.nan, len(marks)))
         else:
             pose.angle += 2 * np.pi * round((angle - pose.angle) / (2 * np.pi))
             angle = pose.angle
-        append(tracks, t, flag, fit, pose, np.nan, len(marks))
-    given, readout = wanted.given("exposure"), wanted.given("readout")
-    known = TrackerState(
-        look,
-        np.ones(shape, dtype=bool),
-        np.zeros((len(marks), 2)),
-        given or 0.0,
-        255.0,
-        None,
-        Readout(readout or 0.0, np.inf if readout is None else 0.0),
-        np.inf if given is None else 0.0,
-        bent,
-    )
-    return tracks, known
+            frames.append(found_in(t, fit, pose, np.nan, "fast"))
+    open_for, readout = wanted.given("exposure"), wanted.given("readout")
+    estimates = {
+        **lens_estimates(bent, look.lens, wanted),
+        **readout_estimate(Readout(readout or 0.0, np.inf if readout is None else 0.0), wanted),
+        **exposure_estimate(Exposure(open_for or 0.0, np.inf if open_for is None else 0.0), wanted),
+    }
+    view, colours = np.ones(shape, dtype=bool), np.zeros((len(marks), 2))
+    known = TrackerState(look, view, colours, open_for or 0.0, 255.0, None, estimates)
+    return Tracks.of(frames), known
 
 
 def _displaced(points: Complexes, places: Complexes) -> Complexes:
@@ -205,7 +207,7 @@ def _fit(at: Complexes, pose: Pose, look: DiskAppearance) -> Fit | None:
             return None
         pose.centre += complex(step.change[0], step.change[1])
         pose.angle += float(step.change[2])
-        far = np.hypot(*step.leftover.T)
+        far = np.hypot(*step.residuals.T)
         fit = Fit(step, sightings, used, float(np.hypot(*step.change[:2])))
         worst = np.nan_to_num(far) > OFF
         if worst.any() and used.sum() > 4:

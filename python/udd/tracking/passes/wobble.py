@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.calibration_items import Estimate
 from udd.tracking.geometry.pose import DiskAppearance
 
-from .first_pass import Tracks
+from .tracks import Tracks
 
 Array = NDArray[np.float64]
 SHORT = 12.0  # pixels: longer streaks say too little about where a mark is
@@ -36,6 +37,14 @@ class Wobble:
     axis: float
     least: float
 
+    @property
+    def estimate(self) -> Estimate:
+        """A row of the table of calibrations."""
+        if not math.isfinite(self.least):
+            return Estimate(math.nan, math.nan, "too few marks to tell")
+        how = "found" if self.amplitude else f"none seen (less than {math.degrees(self.least):.1f} degrees)"
+        return Estimate(self.amplitude, self.sigma, how)
+
 
 def strains(tracks: Tracks, look: DiskAppearance) -> tuple[Array, Array]:
     """Frames and how the marks of each are stretched, (n, 3): along u, across (shear / 2), along v.
@@ -44,7 +53,7 @@ def strains(tracks: Tracks, look: DiskAppearance) -> tuple[Array, Array]:
     directions is what is asked for.
     """
     places = look.places
-    left, angle = np.array(tracks.leftover), np.array(tracks.angle)
+    left, angle = tracks.residuals, tracks.angle
     short = np.array([s < SHORT and not flag for s, flag in zip(tracks.streak, tracks.flag, strict=True)])
     rows, out = [], []
     for k in np.flatnonzero(short & (np.isfinite(left[..., 0]).sum(axis=1) >= 4)):
@@ -71,7 +80,7 @@ def wobble(tracks: Tracks, look: DiskAppearance) -> Wobble:
     other ways is taken off.
     """
     rows, strain = strains(tracks, look)
-    t = np.array(tracks.t)[rows]
+    t = tracks.t[rows]
     unseen = Wobble(0.0, math.inf, 0.0, math.inf)
     if len(rows) < FEWEST:
         return unseen

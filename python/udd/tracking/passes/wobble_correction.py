@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from udd.tracking.geometry.pose import DiskAppearance, moved_by_pose
 
-from .first_pass import Tracks
+from .tracks import Tracks
 from .wobble import SINE, Wobble
 
 ROUNDS = 6  # each finds two thirds of what marks are off: poses and foreshortening take the rest
@@ -32,14 +32,12 @@ class WobbleCorrection:
 
     def centred(self, at: complex, by: complex) -> WobbleCorrection:
         """With the marks' origin moved to a point among them, and they turned back by an angle."""
-        angle = np.array(self.tracks.angle)
+        angle = self.tracks.angle
         arm = at * np.exp(1j * angle)
-        centre = (
-            np.array(self.tracks.centre) + arm + self.short * (arm * np.conj(self.across)).real * self.across
-        )
+        centre = self.tracks.centre + arm + self.short * (arm * np.conj(self.across)).real * self.across
         change = float(np.angle(by))
         marks = [replace(m, place=(m.place - at) / by, turn=m.turn - change) for m in self.look.marks]
-        tracks = replace(self.tracks, centre=list(centre), angle=list(angle + change))
+        tracks = replace(self.tracks, centre=centre, angle=angle + change)
         return replace(self, tracks=tracks, look=replace(self.look, marks=marks))
 
     def look_at(self, k: int) -> DiskAppearance:
@@ -59,11 +57,11 @@ class WobbleCorrection:
 
         The wheels hold the disk at the contact, about which it is foreshortened.
         """
-        away = np.where(self.held, np.array(self.tracks.centre) - pivot, 0)
+        away = np.where(self.held, self.tracks.centre - pivot, 0)
         away = (away * np.conj(self.across)).real * self.across
         moved = self.answer + np.column_stack([away.real, away.imag, np.zeros(len(away))])
-        centre = np.array(self.tracks.centre) - self.short * away
-        return replace(self.tracks, centre=list(centre)), moved * self.sigma[:, None]
+        centre = self.tracks.centre - self.short * away
+        return replace(self.tracks, centre=centre), moved * self.sigma[:, None]
 
 
 def correct_wobble(
@@ -76,12 +74,12 @@ def correct_wobble(
     which they were displaced. `before`: what the marks that the tracks come from were displaced for.
     """
     across = complex(np.exp(1j * found.axis))
-    held = np.asarray(np.isfinite(np.array(tracks.information)).all(axis=(1, 2)))
+    held = tracks.held
     frames = {int(k): _Frame.of(tracks, look, int(k)) for k in np.flatnonzero(held)}
     whole = [k for k in frames if np.isfinite(tracks.chi2[k]).all()]
     if not whole:
         return None
-    n = len(tracks.t)
+    n = len(tracks)
     short = np.zeros(n) if before is None else before.short.copy()
     larger, noise = (float(np.median(x)) for x in np.transpose([frames[k].told(across) for k in whole]))
     usual, prior = -(found.amplitude**2) / 4, found.amplitude**4 / SINE  # mean and variance of cos(A sin) - 1
@@ -101,18 +99,19 @@ def correct_wobble(
         lefts = [(frames[k].turn, further(k, places)[1]) for k in whole]
         off = np.array([np.conj(turn) * (left[::2] + 1j * left[1::2]) for turn, left in lefts])
         places = places + np.median(off.real, axis=0) + 1j * np.median(off.imag, axis=0)
-    names = ("centre", "angle", "chi2", "leftover")
-    tracks = replace(tracks, **{name: list(getattr(tracks, name)) for name in names})
+    centre, angle = tracks.centre.copy(), tracks.angle.copy()
+    chi2, residuals = tracks.chi2.copy(), tracks.residuals.copy()
     sigma, answer = np.zeros(n), np.zeros((n, 3))
     for k, f in frames.items():
         change, flat, more, precise = further(k, places)
         left, used = flat.reshape(-1, 2), np.isfinite(tracks.chi2[k])
         short[k] += more
         sigma[k], answer[k] = precise**-0.5, f.response(f.across(across))[0]
-        tracks.centre[k] -= complex(change[0], change[1])
-        tracks.angle[k] -= float(change[2])
-        tracks.chi2[k] = np.where(used, np.einsum("ka,kab,kb->k", left, tracks.marks[k], left), np.nan)
-        tracks.leftover[k] = np.where(used[:, None], left, np.nan)
+        centre[k] -= complex(change[0], change[1])
+        angle[k] -= float(change[2])
+        chi2[k] = np.where(used, np.einsum("ka,kab,kb->k", left, tracks.marks[k], left), np.nan)
+        residuals[k] = np.where(used[:, None], left, np.nan)
+    tracks = replace(tracks, centre=centre, angle=angle, chi2=chi2, residuals=residuals)
     marks = [replace(m, place=complex(z)) for m, z in zip(look.marks, places, strict=True)]
     return WobbleCorrection(tracks, replace(look, marks=marks), across, short, sigma, answer, held)
 
@@ -137,7 +136,7 @@ class _Frame:
         for j, information in enumerate(tracks.marks[k]):
             weight[2 * j : 2 * j + 2, 2 * j : 2 * j + 2] = information
         solved = np.asarray(np.linalg.solve(design.T @ weight @ design, design.T @ weight), dtype=np.float64)
-        return cls(turn, arms, np.nan_to_num(tracks.leftover[k]).ravel(), weight, design, solved)
+        return cls(turn, arms, np.nan_to_num(tracks.residuals[k]).ravel(), weight, design, solved)
 
     def across(self, direction: complex) -> Complexes:
         """How far a stretch of 1 in a direction moves the marks."""

@@ -1,58 +1,22 @@
-"""What is said by hand before a film is tracked, and which calibrations are left to the film."""
+"""What `udd.track` can be told of a film: one record, read and checked once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.markers.layout import STANDARD, Layout, read_layout
+from udd.calibration_items import SWITCHES, Calibrate
+from udd.markers.layout import STANDARD, Layout, read_bob, read_layout
+from udd.markers.tags import Tag, is_tags, layout_of, read_tags
 from udd.video.reader import Picture, TrackError
 
 Region = tuple[float, float, float, float]
-MarkSeparation = tuple[
-    int, int, float
-]  # numbers of two marks, from 1, and how far apart their middles are [m]
-
-
-@dataclass(frozen=True)
-class Calibrate:
-    """What the film itself is asked for. True: find it; False: not there, or as given; a number: it is that.
-
-    Attributes
-    ----------
-    layout : bool
-        Where the marks sit on the disk; False: just where the layout says.
-    scale : bool
-        Pixels per metre; False needs `scale`.
-    lens : bool or float
-        Relative displacement at the picture's corner.
-    tilt : bool
-        How the camera stands to the disk's plane.
-    readout : bool or float
-        Time that a rolling shutter takes from the first row to the last [s].
-    exposure : bool or float
-        Time for which the shutter is open [s].
-    pivot : bool
-        Where the wheels hold the disk; False needs `pivot`.
-    """
-
-    layout: bool = True
-    scale: bool = True
-    lens: bool | float = True
-    tilt: bool = True
-    readout: bool | float = True
-    exposure: bool | float = True
-    pivot: bool = True
-
-    def given(self, name: str) -> float | None:
-        """The value to take where an item is not to be found; None where it is."""
-        value = getattr(self, name)
-        return None if value is True else float(value)
+MarkSeparation = tuple[int, int, float]  # numbers of two marks, from 1, and their distance [m]
 
 
 @dataclass(frozen=True)
@@ -74,23 +38,106 @@ class Sigma:
     layout: float = 0.0
 
 
-@dataclass(frozen=True)
-class Setup:
-    """All that may be said by hand."""
+def _told(kind: str, note: str = "") -> dict[str, str]:
+    """What a config file must say of an option, and the remark with which one is written."""
+    return {"kind": kind, "note": note}
 
-    radius: float = 0.08
-    distance: float | None = None
-    pivot: tuple[float, float] | None = None
-    layout: Layout = STANDARD
-    scale: float | None = None  # pixels per metre
-    region: Region | None = None  # u from, v from, u to, v to [pixels]
-    calibrate: Calibrate = Calibrate()
-    sigma: Sigma = Sigma()
-    apart: MarkSeparation | None = None
+
+class MoreOptions(TypedDict, total=False):
+    """The options that few films need."""
+
+    mark_distance: float | None
+    region: Region | None
+    sigma: Sigma | Mapping[str, float] | None
+    apart: MarkSeparation | None
+    length: float | None
+
+
+@dataclass(frozen=True)
+class TrackOptions:
+    """All that can be told of a film, read and free of contradictions; `udd.track` says what each is.
+
+    Attributes
+    ----------
+    tags : tuple of Tag
+        The layout's printed tags, empty for coloured marks.
+    """
+
+    disk_radius: float = field(default=0.08, metadata=_told("a positive number of metres", "m"))
+    mark_distance: float | None = field(default=None, metadata=_told("a positive number of metres", "m"))
+    fps: float | None = field(
+        default=None, metadata=_told("a positive number of frames per second", "frames per second")
+    )
+    pivot: tuple[float, float] | None = field(
+        default=None,
+        metadata=_told("two numbers of pixels [u, v]", "where the wheels hold the disk, pixels (u, v down)"),
+    )
+    refine: bool = field(default=True, metadata=_told("true or false"))
+    scale: float | None = field(
+        default=None, metadata=_told("a positive number of pixels per metre", "pixels per metre")
+    )
+    region: Region | None = field(
+        default=None,
+        metadata=_told(
+            "four numbers of pixels [u0, v0, u1, v1]",
+            "u0, v0, u1, v1: nothing outside is looked at, pixels",
+        ),
+    )
+    layout: Layout = field(
+        default=STANDARD,
+        metadata=_told(
+            "a list of marks", "m right of and above the disk's centre when beta is 0; sRGB codes"
+        ),
+    )
+    calibrate: Calibrate = field(
+        default=Calibrate(),
+        metadata=_told("a table", "true: found in the film; false: as given, or not there"),
+    )
+    sigma: Sigma = field(
+        default=Sigma(),
+        metadata=_told(
+            "a table of standard errors",
+            "standard errors of what is given (pixels, pixels per metre, m): the film improves it",
+        ),
+    )
+    apart: MarkSeparation | None = field(
+        default=None,
+        metadata=_told(
+            "two marks' numbers and a distance",
+            "two marks, by their numbers from 1, and how far apart their middles are, m",
+        ),
+    )
+    bob: Any = field(default=None, metadata=_told("the colour of a pendulum's bob"))
+    length: float | None = field(default=None, metadata=_told("a positive number of metres", "m"))
+    tags: tuple[Tag, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
-        if self.distance is not None and not self.layout.standard:
+        """Read each option, and refuse what contradicts itself."""
+        said: Any = self.layout
+        if is_tags(said):
+            self._set("tags", read_tags(said))
+        for name, read in _READERS.items():
+            value = getattr(self, name)
+            if value is not None:
+                self._set(name, read(value))
+        if self.bob is not None:
+            self._as_pendulum()
+        elif self.length is not None:
+            raise TrackError("length is a pendulum's: say its bob's colour too")
+        self._check()
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _as_pendulum(self) -> None:
+        """The bob is the only mark."""
+        more = [f.name for f in fields(self) if f.name in _OF_A_DISK and getattr(self, f.name) != f.default]
+        if more:
+            raise TrackError(f"{', '.join(more)}: not for a pendulum, which has a bob and a length alone")
+        self._set("layout", read_bob(self.bob))
+
+    def _check(self) -> None:
+        if self.mark_distance is not None and not self.layout.standard:
             raise TrackError("mark_distance is of the standard marks: a layout says where its own are")
         for name in ("scale", "pivot"):
             if not getattr(self.calibrate, name) and getattr(self, name) is None:
@@ -134,12 +181,14 @@ def read_calibrate(said: Any) -> Calibrate:
     """
     if isinstance(said, Calibrate):
         return said
-    for name, value in _items(said, "calibrate", _ITEMS):
+    switches = {item.name: item for item in SWITCHES}
+    for name, value in _items(said, "calibrate", switches):
         if isinstance(value, bool):
             continue
-        low, high, unit = _RANGES.get(name, (math.nan, math.nan, ""))
-        if math.isnan(low):
+        numbers = switches[name].numbers
+        if numbers is None:
             raise TrackError(f"calibrate: {name} must be true or false, not {value!r}")
+        (low, high), unit = numbers, switches[name].unit and f" {switches[name].unit}"
         if not (isinstance(value, int | float) and low <= value <= high):
             raise TrackError(
                 f"calibrate: {name} must be true, false or from {low:g} to {high:g}{unit}, not {value!r}"
@@ -195,9 +244,7 @@ def read_region(said: Any) -> Region:
     return u0, v0, u1, v1
 
 
-_ITEMS = tuple(f.name for f in fields(Calibrate))
 _SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
-_RANGES = {"lens": (-0.3, 0.3, ""), "readout": (-0.1, 0.1, " s"), "exposure": (0.0, 0.1, " s")}
 
 
 def _items(said: Any, table: str, known: Collection[str]) -> Iterator[tuple[str, Any]]:
@@ -221,17 +268,31 @@ def length_of(value: float, name: str, unit: str = "metres") -> float:
     return length
 
 
-__all__ = [
-    "Calibrate",
-    "Layout",
-    "MarkSeparation",
-    "Region",
-    "Setup",
-    "Sigma",
-    "length_of",
-    "read_apart",
-    "read_calibrate",
-    "read_layout",
-    "read_region",
-    "read_sigma",
-]
+def _pivot(said: Any) -> tuple[float, float]:
+    try:
+        u, v = (float(x) for x in said)
+    except (TypeError, ValueError):
+        u = v = math.nan
+    if not math.isfinite(u + v):
+        raise TrackError(f"pivot must be two finite numbers, not {said!r}")
+    return u, v
+
+
+def _marks(said: Any) -> Layout:
+    return layout_of(read_tags(said)) if is_tags(said) else read_layout(said)
+
+
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "disk_radius": lambda x: length_of(x, "disk_radius"),
+    "mark_distance": lambda x: length_of(x, "mark_distance"),
+    "pivot": _pivot,
+    "scale": lambda x: length_of(x, "scale", "pixels per metre"),
+    "region": read_region,
+    "layout": _marks,
+    "calibrate": read_calibrate,
+    "sigma": read_sigma,
+    "apart": read_apart,
+    "length": lambda x: length_of(x, "length"),
+}
+FIELDS = {f.name: f for f in fields(TrackOptions) if f.init}
+_OF_A_DISK = ("disk_radius", "mark_distance", "layout", "sigma", "apart")

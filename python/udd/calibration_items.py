@@ -1,0 +1,108 @@
+"""What the tracker can calibrate: one entry for each item, read by options, table, command line and page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
+
+
+class Estimate(NamedTuple):
+    """A value, its standard error (0: given), and how it is known."""
+
+    value: float | list[float]
+    sigma: float
+    how: str
+
+
+@dataclass(frozen=True)
+class Item:
+    """An item of the self-calibration.
+
+    Attributes
+    ----------
+    name : str
+        As `calibrate` calls it.
+    what : str
+        What it is, in a few words.
+    rows : tuple of str
+        Its rows in ``meta["calibration"]``; the name alone where empty.
+    numbers : (float, float), optional
+        The range of a number that may be given for it; without, it is only switched on and off.
+    unit : str
+        Of that number.
+    shown : (float, str)
+        The factor and unit in which a page shows it.
+    """
+
+    name: str
+    what: str
+    rows: tuple[str, ...] = ()
+    numbers: tuple[float, float] | None = None
+    unit: str = ""
+    shown: tuple[float, str] = (1.0, "")
+
+    def has(self, row: str) -> bool:
+        """Whether a row of the table is this item's."""
+        return row in (self.rows or (self.name,)) or (self.name == "layout" and row.startswith("mark "))
+
+
+def _item(what: str, **more: Any) -> Any:
+    return field(default=True, metadata={"what": what, **more})
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """What the film is asked for. True: find it; False: not there, or as given; a number: it is that."""
+
+    layout: bool = _item("where the marks sit on the disk", shown=(1e3, "mm (right, up)"))
+    scale: bool = _item("pixels per metre; off needs `scale`", shown=(1.0, "px/m"))
+    lens: bool | float = _item("relative displacement at the picture's corner", numbers=(-0.3, 0.3))
+    tilt: bool = _item(
+        "how the camera stands to the disk's plane", rows=("tilt across", "tilt upward", "aspect", "shear")
+    )
+    readout: bool | float = _item(
+        "time of a rolling shutter from the first row to the last",
+        numbers=(-0.1, 0.1),
+        unit="s",
+        shown=(1e3, "ms"),
+    )
+    exposure: bool | float = _item(
+        "time for which the shutter is open", numbers=(0.0, 0.1), unit="s", shown=(1e3, "ms")
+    )
+    pivot: bool = _item("where the wheels hold the disk; off needs `pivot`", shown=(1.0, "px (right, down)"))
+
+    def given(self, name: str) -> float | None:
+        """The value to take where an item is not to be found; None where it is."""
+        value = getattr(self, name)
+        return None if value is True else float(value)
+
+    def estimate(self, name: str, value: float, sigma: float, how: str) -> Estimate:
+        """What is known of an item that was found `how`, unless it was given."""
+        return Estimate(value, sigma, how if self.given(name) is None else "given")
+
+
+SWITCHES = tuple(Item(f.name, **f.metadata) for f in fields(Calibrate))
+ITEMS = (
+    *SWITCHES,
+    Item("W", "the drive's velocity as the film shows it", shown=(1.0, "m/s")),
+    Item("wobble", "amplitude of a turning out of the plane", shown=(180 / math.pi, "degrees")),
+)
+
+
+def table(estimates: Mapping[str, Estimate]) -> dict[str, list[Any]]:
+    """Rows [value, standard error, how] in the order of `ITEMS`; None for what is not finite."""
+    rows = {name: e for item in ITEMS for name, e in estimates.items() if item.has(name)}
+    return {name: [_plain(e.value), _plain(e.sigma), e.how] for name, e in rows.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_plain(v) for v in value]
+    return float(value) if math.isfinite(value) else None
+
+
+def unit_of(row: str) -> tuple[float, str]:
+    """Factor and unit in which a page shows a row."""
+    return next((item.shown for item in ITEMS if item.has(row)), (1.0, ""))
