@@ -7,7 +7,11 @@ import re
 import warnings
 from typing import Any
 
-_WORD, _ALL = 200, 700  # characters of one word, and of a message
+_WORD, _ALL = 200, 700  # characters of one word or of what is repeated of the input, and of a message
+# A word, a quoted text, or what stands where something else is wanted.
+_REPEATED = re.compile(
+    "|".join(f"{what}{{{_WORD},}}" for what in (r"\S", "(?<= ')[^']", '(?<= ")[^"]', "(?<=, not )."))
+)
 
 
 class UddError(ValueError):
@@ -20,8 +24,8 @@ class UddError(ValueError):
     """
 
     def __init__(self, message: str = "", *more: object) -> None:
-        words = re.sub(rf"\S{{{_WORD},}}", lambda word: f"{word[0][: _WORD - 3]}...", message)
-        super().__init__(words if len(words) <= _ALL else f"{words[: _ALL - 3]}...", *more)
+        text = _REPEATED.sub(lambda part: f"{part[0][: _WORD - 3]}...", message)
+        super().__init__(text if len(text) <= _ALL else f"{text[: _ALL - 3]}...", *more)
 
 
 class ModelError(UddError):

@@ -184,9 +184,9 @@ def test_the_diagram_tells_coexisting_attractors_apart(monkeypatch: pytest.Monke
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ("no json", "A message must be JSON."),
-        ("[" * 60_000, "A message must be JSON."),
-        ("[1]", "A message must be a JSON object."),
+        ("no json", "A message is not JSON: Expecting value: line 1 column 1 (char 0)."),
+        ("[" * 60_000, "A message is not JSON: maximum recursion depth"),
+        ("[1]", "A message must be a table of names and values, not [1]."),
         ('{"type": "os.system"}', "No message is called 'os.system'."),
         ('{"type": []}', "No message is called '[]'."),
         (json.dumps(asked(CHAOS, count=10**9)), "Count must be a whole number from 1 to 4096"),

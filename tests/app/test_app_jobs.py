@@ -186,8 +186,8 @@ def test_only_so_many_jobs_wait(client: TestClient, monkeypatch: pytest.MonkeyPa
     ("path", "body", "words"),
     [
         ("/api/jobs/shell", None, "There is no such job."),
-        ("/api/jobs/render?seconds=5", b"x", "must be JSON"),
-        ("/api/jobs/render?seconds=5", b"[" * 60_000, "must be JSON"),
+        ("/api/jobs/render?seconds=5", b"x", "is not JSON"),
+        ("/api/jobs/render?seconds=5", b"[" * 60_000, "is not JSON"),
         ("/api/jobs/render?seconds=500", json.dumps(CHAOS).encode(), "A film lasts from 0.5 to 60 s."),
         ("/api/jobs/film?W=fast", b"x", "W must be a number."),
         ("/api/jobs/film?W=nan", b"x", "W must be finite."),

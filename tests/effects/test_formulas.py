@@ -224,7 +224,7 @@ def test_a_fit_finds_a_formulas_numbers_as_the_librarys_effects() -> None:
 
 @pytest.mark.parametrize("kind", ["curve", "surface", "formula"])
 def test_a_key_that_an_effect_does_not_have_is_told_with_those_it_has(kind: str) -> None:
-    with pytest.raises(udd.UddError, match=rf"this {kind} .* no 'slto'; there are slot, .*momentum"):
+    with pytest.raises(udd.UddError, match=rf"a {kind} has no 'slto'; it has slot, .*momentum"):
         serialization.from_dict({kind: {"slto": "torque"}})
     with pytest.raises(udd.UddError) as error:
         serialization.from_dict({kind: {"x" * 5000: 1}})

@@ -28,6 +28,7 @@ ODD: list[Any] = [
     *(None, True, False, 0, -1, 1, 2**31, 2**63, 10**400, -(10**400), 0.5, 1e308, float("nan"), float("inf")),
     *("", "x", "name", "kind", "a" * 5000, "(" * 300, "sin(", "1/0", "\0", "ä", "4x4_50:-1", "nowhere:0"),
     *([], [[]], [1], [1, 2], ["x"], [None], [[[[1]]]], {}, {"x": 1}, {"values": []}, NESTED),
+    *("b " * 2000, ["b"] * 400, [7] * 400),
     *({"from": 0, "to": 1, "n": n} for n in (-1, 2.5, 2**31, 2**63)),
 ]
 
@@ -180,7 +181,50 @@ def test_what_was_made_wrong_is_refused_in_a_sentence(kind: str, count: int, tmp
             assert len(said) <= 700
             assert "\n" not in said
             assert max(map(len, said.split())) <= 200
+            assert not any(given in said for given in ("b " * 101, "'b', " * 41, "7, " * 67))
     assert refused > count // 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [
+        (
+            "sweep",
+            {**SWEEPS[0], "over": {"w": {"from": 0, "to": 1, "n": "3"}}},
+            "over.w.n must be a whole",
+        ),
+        (
+            "sweep",
+            {**SWEEPS[0], "over": {"w": {"from": "0", "to": 1, "n": 3}}},
+            "over.w.from must be",
+        ),
+        (
+            "sweep",
+            {**SWEEPS[0], "over": {"w": {"from": 0, "too": 1, "n": 3}}},
+            "over.w must be a list",
+        ),
+        ("sweep", {**SWEEPS[0], "model": NESTED}, "a sweep is nested more than 16 deep"),
+        ("sweep", {**SWEEPS[0], "model": 3}, "the model must be a table"),
+        ("sweep", {**SWEEPS[0], "model": {"kind": "dle", "W": 1}}, "a dle has no 'W'; it has w"),
+        (
+            "effect",
+            {"curve": {"slot": "torque", "at": 1}},
+            "a curve has no 'at'; it has slot, coordinate",
+        ),
+        ("effect", {"formula": {"slot": "torque"}}, "a formula does not say its expression"),
+        ("model", {**MODELS[0], "states": ["x"]}, "there is an equation of 'v', but the states are x"),
+        (
+            "model",
+            {**MODELS[0], "state": ["x"]},
+            "your own has no 'state'; it has states, equations",
+        ),
+        ("config", {"sigma": {"lens": 1}}, "sigma has no 'lens'; it has pivot, scale, layout"),
+    ],
+)
+def test_a_sentence_says_where_and_what_there_is(kind: str, value: Any, said: str, tmp_path: Path) -> None:
+    with pytest.raises(udd.UddError) as error:
+        READERS[kind][1](value, tmp_path)
+    assert said in str(error.value)
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "{" * 100_000, '{"a":' * 100_000])

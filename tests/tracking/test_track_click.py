@@ -475,9 +475,9 @@ def test_a_config_is_written_as_it_is_read(tmp_path: Path) -> None:
     write_config(path, tags)
     assert settings(path) == settings(tags)
     for wrong, why in (
-        ({"pivto": [1, 2]}, "there is no setting 'pivto'"),
+        ({"pivto": [1, 2]}, "a config has no 'pivto'"),
         ({"sigma": {"pivot": -1}}, "pivot must be a standard error in pixels, not -1"),
-        ({"sigma": {"lens": 1}}, "there is no item 'lens'; there are pivot, scale, layout"),
+        ({"sigma": {"lens": 1}}, "sigma has no 'lens'; it has pivot, scale, layout"),
         ({"sigma": 3}, "sigma must be a table"),
         ({"apart": [1, 1, 0.1]}, "apart must be the numbers of two marks"),
         ({"apart": [1, 2, "x"]}, "apart must be the numbers of two marks"),

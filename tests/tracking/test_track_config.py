@@ -40,7 +40,7 @@ def test_a_config_reaches_the_tracker_and_options_win(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("pivto = [1, 2]", "there is no setting 'pivto'; there are disk_radius"),
+        ("pivto = [1, 2]", "a config has no 'pivto'; it has disk_radius"),
         ("pivot = 3", "pivot must be two numbers of pixels [u, v], not 3"),
         ("pivot = [1, 2, 3]", "pivot must be two numbers"),
         ('pivot = [1, "2"]', "pivot must be two numbers"),
@@ -49,7 +49,7 @@ def test_a_config_reaches_the_tracker_and_options_win(
         ("fps = true", "fps must be a positive number of frames per second, not True"),
         ("fps = nan", "fps must be a positive number of frames per second, not nan"),
         ("refine = 1", "refine must be true or false, not 1"),
-        ("fps = ", "is not a TOML file"),
+        ("fps = ", "is not TOML"),
     ],
 )
 def test_a_wrong_config_is_named_in_one_sentence(
@@ -67,7 +67,7 @@ def test_a_wrong_config_is_named_in_one_sentence(
 def test_a_mapping_is_a_config_too_and_a_missing_file_is_said(tmp_path: Path) -> None:
     known: dict[str, Any] = {"fps": 240, "refine": False}
     assert settings(known, fps=None, refine=True) == {"fps": 240.0, "refine": True}
-    with pytest.raises(TrackError, match="config: there is no setting 'film'"):
+    with pytest.raises(TrackError, match="a config has no 'film'"):
         udd.track(SAMPLE, config={"film": "x"})
     with pytest.raises(TrackError, match="cannot be read"):
         udd.track(SAMPLE, config=tmp_path / "nothing.toml")

@@ -152,7 +152,7 @@ def test_layouts_that_cannot_be(said: Any, why: str) -> None:
 @pytest.mark.parametrize(
     ("said", "why"),
     [
-        ({"calibrate": {"zoom": True}}, "there is no item 'zoom'; there are layout"),
+        ({"calibrate": {"zoom": True}}, "calibrate has no 'zoom'; it has layout"),
         ({"calibrate": {"tilt": 0.1}}, "tilt must be true or false, not 0.1"),
         ({"calibrate": {"exposure": 4}}, "exposure must be true, false or from 0 to 0.1 s, not 4"),
         ({"calibrate": True}, "calibrate must be a table"),

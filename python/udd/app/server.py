@@ -21,6 +21,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
+from udd._util.tables import parsed
 from udd.errors import UddError
 from udd.models import Disk
 
@@ -30,7 +31,7 @@ from .growing_run import as_csv
 from .jobs import Jobs
 from .presets import catalogue
 from .security import REPORT_POLICY, Guard
-from .spec import from_json, start_of
+from .spec import start_of
 from .stream import Page
 
 STATIC = Path(__file__).parent / "static"
@@ -53,7 +54,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         return JSONResponse(catalogue())
 
     async def table(request: Request) -> Response:
-        start = start_of(from_json("the run", request.query_params.get("run", "")))
+        start = start_of(parsed("the run", request.query_params.get("run", "")))
         # A long run takes seconds, in which the pages are answered.
         text = await asyncio.to_thread(as_csv, start, _number(request, "seconds") or math.nan)
         return _download(Response(text, media_type="text/csv"), "udd-run.csv")
@@ -118,7 +119,7 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             shutil.copyfile(sample, folder / "sample.mp4")
         return {"kind": "loop", "file": "sample.mp4", "film": True, "W": pipeline.W, "R": pipeline.R}
     if kind == "render":
-        start = from_json("the run", await uploads.text(request.stream()))
+        start = parsed("the run", await uploads.text(request.stream()))
         seconds = _number(request, "seconds") or 0.0
         if not isinstance(start_of(start).model, Disk):
             raise UddError("Only a run of the disk can be filmed.")

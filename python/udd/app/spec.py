@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
+from udd._util.tables import parsed, table
 from udd.errors import ModelError
 from udd.models import Model
 from udd.models.serialization import model_from_dict
@@ -56,20 +56,6 @@ def drive_of(model: Model) -> str:
     return drive
 
 
-def from_json(what: str, text: str) -> Any:
-    """What a text says.
-
-    Raises
-    ------
-    ModelError
-        It is no JSON, or nested too deeply.
-    """
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        raise ModelError(f"{what} must be JSON") from None
-
-
 def message_of(text: str) -> dict[str, Any]:
     """A message from the page.
 
@@ -78,10 +64,7 @@ def message_of(text: str) -> dict[str, Any]:
     ModelError
         It is no JSON object.
     """
-    data = from_json("a message", text)
-    if not isinstance(data, dict):
-        raise ModelError("a message must be a JSON object")
-    return data
+    return table("a message", parsed("a message", text))
 
 
 def whole(data: dict[str, Any], name: str, least: int, most: int) -> int:

@@ -200,17 +200,9 @@ def start_of(args: argparse.Namespace) -> Any:
 
 def _own(args: argparse.Namespace) -> dict[str, Any]:
     """What the file of the user's own model holds."""
-    import json
+    from udd._util.tables import read, table
 
-    try:
-        data = json.loads(args.model.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UddError(f"{args.model} cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise UddError(f"{args.model} is not JSON: {error}") from None
-    if not isinstance(data, dict):
-        raise UddError(f"{args.model} must hold a table with states, equations and parameters")
-    return data
+    return table(str(args.model), read(args.model), error=UddError)
 
 
 def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:

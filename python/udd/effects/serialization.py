@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from inspect import signature
 from typing import Any
 
 import numpy as np
 
-from udd.errors import ModelError
+from udd._util.tables import arguments, table
+from udd.errors import ModelError, UddError
 
 from .spec import Effect
 from .user_defined import UNLIMITED, CurveSpec, FormulaSpec, SurfaceSpec, curve, surface, written
 
-#: What stands in each kind of effect.
-_KEYS = {
-    "formula": ("slot", "expression", "parameters", "name", "title", "amplitudes", "ranges", "momentum"),
-    "curve": tuple(signature(curve).parameters),
-    "surface": tuple(signature(surface).parameters),
-}
+_FORMULA = ("slot", "expression", "name", "title", "amplitudes", "parameters", "ranges", "momentum")
 
 
 def to_dict(effect: Effect) -> dict[str, Any]:
@@ -47,19 +42,16 @@ def from_dict(data: Mapping[str, Any]) -> Effect:
     ModelError
         Something is missing, unknown or unusable.
     """
-    if not isinstance(data, Mapping) or len(data) != 1 or not data.keys() <= {"formula", "curve", "surface"}:
+    if len(table("an effect", data, ("formula", "curve", "surface"))) != 1:
         raise ModelError(f"an effect of no library must be a formula, a curve or a surface, not {data!r}")
     ((kind, content),) = data.items()
     try:
-        given = dict(content)
-        for key in given:
-            if key not in _KEYS[kind]:
-                raise ModelError(f"it has no {key!r:.80}; there are {', '.join(_KEYS[kind])}")
-        momentum = given.pop("momentum", None)
         if kind == "curve":
-            return curve(**given, momentum=momentum)
+            return curve(**arguments("a curve", content, curve))
         if kind == "surface":
-            return surface(**given, momentum=momentum)
+            return surface(**arguments("a surface", content, surface))
+        given = table("a formula", content, _FORMULA, needed=_FORMULA[:2])
+        momentum = given.pop("momentum", None)
         values = dict(given.pop("parameters", {}))
         limits: dict[str, Any] = {
             name: tuple(own if x is None else x for x, own in zip(pair, UNLIMITED, strict=True))
@@ -69,5 +61,7 @@ def from_dict(data: Mapping[str, Any]) -> Effect:
         spec = written(**(defaults | given), ranges=limits, names=tuple(values))
         # Not `make`: fitted amplitudes may lie outside their physical ranges.
         return Effect(spec.name, tuple(values.values()), momentum, made=spec)
+    except UddError:
+        raise
     except (TypeError, ValueError, OverflowError) as error:
         raise ModelError(f"this {kind} cannot be read: {error}") from None

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
+from udd._util.tables import table
 from udd.effects import Effect, library, serialization
-from udd.errors import ModelError
+from udd.errors import ModelError, UddError
 
 from .base import Model
 from .formula_model import FormulaModel
 from .registry import COMPILED
+
+_OWN = ("states", "equations", "parameters", "angles", "effects", "mass")
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
@@ -51,16 +53,18 @@ def model_from_dict(data: object) -> Model:
     ModelError
         An unknown kind or argument, or one that is missing or unusable.
     """
-    given = _mapping("the model", data)
+    given = table("the model", data)
     kind = given.pop("kind", None)
     if kind == FormulaModel.kind:
         if isinstance(given.get("effects"), list):
             given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
+        given = table("a model of your own", given, _OWN, needed=_OWN[:2])
         try:
             return FormulaModel(**given | {"parameters": dict(given.get("parameters", {}))})
-        except (TypeError, ValueError):
-            has = "states, equations, parameters, angles, effects and mass"
-            raise ModelError(f"a model of your own has {has}, not {', '.join(given)}") from None
+        except UddError:
+            raise
+        except (TypeError, ValueError) as error:
+            raise ModelError(f"the model cannot be read: {error}") from None
     if not isinstance(kind, str) or kind not in COMPILED:
         raise ModelError(
             f"the model's kind must be one of {', '.join((*COMPILED, FormulaModel.kind))}, not {kind!r}"
@@ -71,13 +75,7 @@ def model_from_dict(data: object) -> Model:
         given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
     cls = COMPILED[kind]
     known = (*cls._plain, *cls._options)
-    for name in given:
-        if name not in known:
-            raise ModelError(f"a {kind} has no {name!r}; it has {', '.join(known)}")
-    first = cls._plain[0]
-    if first not in given:
-        raise ModelError(f"the model {kind} needs a value of {first}")
-    return cls(**given)
+    return cls(**table(f"a {kind}", given, known, needed=known[:1]))
 
 
 def effect_to_dict(effect: Effect) -> dict[str, Any]:
@@ -97,23 +95,15 @@ def effect_from_dict(data: object) -> Effect:
     ModelError
         An unknown effect or parameter, or one that is unusable.
     """
-    given = _mapping("an effect", data)
+    given = table("an effect", data)
     if given.keys() & {"formula", "curve", "surface"}:
         return serialization.from_dict(given)
-    name = given.pop("name", None)
-    choices = given.pop("momentum", None), given.pop("treatment", None)
+    name = given.get("name")
     specs = {spec.name: spec for spec in library()}
     if not isinstance(name, str) or name not in specs:
         raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
+    parameters = specs[name].parameters
+    table(name, given, [*(p.name for p in parameters), "name", "momentum", "treatment"])
     # `Effect` rather than its constructor: fitted amplitudes may lie outside their physical ranges.
-    values = tuple(given.pop(p.name, p.default) for p in specs[name].parameters)
-    if given:
-        known = ", ".join(p.name for p in specs[name].parameters)
-        raise ModelError(f"{name} has no parameter {next(iter(given))!r}; it has {known}")
-    return Effect(name, values, *choices)
-
-
-def _mapping(what: str, data: object) -> dict[str, Any]:
-    if not isinstance(data, Mapping):
-        raise ModelError(f"{what} must be a table of names and values, not {data!r}")
-    return dict(data)
+    values = tuple(given.get(p.name, p.default) for p in parameters)
+    return Effect(name, values, given.get("momentum"), given.get("treatment"))

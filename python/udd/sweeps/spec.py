@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.tables import parsed, read, table
 from udd._util.validation import array, number, whole
 from udd.errors import ModelError, UddError
 from udd.models import Model, require_model
@@ -85,9 +85,7 @@ class SweepSpec:
             raise ModelError("over must name one to three axes with their values")
         over = {name: _axis(self.model, name, values) for name, values in self.over.items()}
         state = initial_state(self.model, default_state(self.model) if self.state0 is None else self.state0)
-        if not isinstance(self.options, Mapping):
-            raise ModelError(f"options must be a table of names and values, not {self.options!r}")
-        options = QUANTITIES[self.quantity].options(self.model, self.options)
+        options = QUANTITIES[self.quantity].options(self.model, table("options", self.options))
         checked = {"over": over, "state0": state, "options": options, "chunk": whole("chunk", self.chunk, 1)}
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -126,26 +124,16 @@ class SweepSpec:
         ModelError
             Something is missing, unknown or unusable.
         """
-        if not isinstance(data, Mapping):
-            raise ModelError(f"a sweep must be a table of names and values, not {data!r}")
-        for key in data:
-            if key not in _KEYS:
-                raise ModelError(f"a sweep has no {key!r}; it has {', '.join(_KEYS)}")
-        for key in _KEYS[:3]:
-            if key not in data:
-                raise ModelError(f"the sweep does not say its {key}")
-        over = data["over"]
+        given = table("a sweep", data, _KEYS, needed=_KEYS[:3])
+        over = given.pop("over")
         if isinstance(over, list) and all(
             isinstance(axis, dict) and isinstance(axis.get("name"), str) for axis in over
         ):
             if len({axis["name"] for axis in over}) < len(over):
                 raise ModelError("over names an axis twice")
             over = {axis["name"]: {k: v for k, v in axis.items() if k != "name"} for axis in over}
-        if not isinstance(over, Mapping):
-            raise ModelError(f"over must be a table of names and values, not {over!r}")
-        axes = {name: _values_from(name, values) for name, values in over.items()}
-        more = {key: data[key] for key in _KEYS[3:] if key in data}
-        return cls(data["quantity"], model_from_dict(data["model"]), axes, **more)
+        axes = {name: _values_from(f"over.{name}", values) for name, values in table("over", over).items()}
+        return cls(model=model_from_dict(given.pop("model")), over=axes, **given)
 
     @classmethod
     def from_json(cls, text: str) -> SweepSpec:
@@ -156,11 +144,7 @@ class SweepSpec:
         ModelError
             It is not JSON, or not of a sweep.
         """
-        try:
-            data = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise ModelError(f"the sweep is not in JSON: {error}") from None
-        return cls.from_dict(data)
+        return cls.from_dict(parsed("the sweep", text))
 
     @classmethod
     def read(cls, path: str | Path) -> SweepSpec:
@@ -171,12 +155,10 @@ class SweepSpec:
         UddError
             The file cannot be read or understood; the sentence names it.
         """
+        data = read(Path(path), toml=Path(path).suffix == ".toml")
         try:
-            text = Path(path).read_text(encoding="utf-8")
-            return cls.from_dict(tomllib.loads(text)) if Path(path).suffix == ".toml" else cls.from_json(text)
-        except OSError as error:
-            raise UddError(f"{path} cannot be read: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:  # ours, or what is no UTF-8 or no TOML
+            return cls.from_dict(data)
+        except UddError as error:
             raise UddError(f"{path}: {error}") from None
 
     @cached_property
@@ -225,14 +207,13 @@ def _values_to_dict(values: NDArray[np.float64]) -> dict[str, Any]:
     return {"values": values.tolist()}
 
 
-def _values_from(name: str, data: Any) -> ArrayLike:
+def _values_from(where: str, data: Any) -> ArrayLike:
     if not isinstance(data, Mapping):
-        return np.atleast_1d(array(f"the values of {name}", data))
-    if set(data) == {"values"}:
-        return array(f"the values of {name}", data["values"])
-    if set(data) != {"from", "to", "n"}:
-        raise ModelError(f"the values of {name} must be a list, or from, to and n")
-    if whole(f"over.{name}.n", data["n"], 1) > _LONGEST:
-        raise ModelError(f"over.{name}.n must be at most {_LONGEST}, not {data['n']}")
-    first, last = (number(f"{name} {end}", data[end]) for end in ("from", "to"))
-    return np.linspace(first, last, data["n"])
+        return np.atleast_1d(array(where, data))
+    if "values" in data:
+        return array(f"{where}.values", table(where, data, ["values"])["values"])
+    if data.keys() != {"from", "to", "n"}:
+        raise ModelError(f"{where} must be a list, or from, to and n, not {', '.join(map(str, data))}")
+    if whole(f"{where}.n", data["n"], 1) > _LONGEST:
+        raise ModelError(f"{where}.n must be at most {_LONGEST}, not {data['n']}")
+    return np.linspace(number(f"{where}.from", data["from"]), number(f"{where}.to", data["to"]), data["n"])

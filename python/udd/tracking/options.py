@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.tables import table
 from udd.calibration_items import SWITCHES, Calibrate
 from udd.markers.layout import STANDARD, Layout, read_bob, read_layout
 from udd.markers.tags import Tag, is_tags, layout_of, read_tags
@@ -182,7 +183,7 @@ def read_calibrate(said: Any) -> Calibrate:
     if isinstance(said, Calibrate):
         return said
     switches = {item.name: item for item in SWITCHES}
-    for name, value in _items(said, "calibrate", switches):
+    for name, value in table("calibrate", said, tuple(switches), error=TrackError).items():
         if isinstance(value, bool):
             continue
         numbers = switches[name].numbers
@@ -206,7 +207,7 @@ def read_sigma(said: Any) -> Sigma:
     """
     if isinstance(said, Sigma):
         return said
-    for name, value in _items(said, "sigma", _SIGMAS):
+    for name, value in table("sigma", said, _SIGMAS, error=TrackError).items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and math.isfinite(value) and value >= 0):
             raise TrackError(f"sigma: {name} must be a standard error in {_SIGMAS[name]}, not {value!r}")
@@ -245,16 +246,6 @@ def read_region(said: Any) -> Region:
 
 
 _SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
-
-
-def _items(said: Any, table: str, known: Collection[str]) -> Iterator[tuple[str, Any]]:
-    """The items of a table by name, each one that there is."""
-    if not isinstance(said, Mapping):
-        raise TrackError(f"{table} must be a table of {', '.join(known)}, not {said!r}")
-    for name, value in said.items():
-        if name not in known:
-            raise TrackError(f"{table}: there is no item {name!r}; there are {', '.join(known)}")
-        yield name, value
 
 
 def length_of(value: float, name: str, unit: str = "metres") -> float:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from udd._util.tables import read, table
 from udd.markers.layout import read_bob, read_layout
 from udd.markers.tags import is_tags, read_tags
 from udd.tracking.options import FIELDS, TrackOptions, read_apart, read_calibrate, read_region, read_sigma
@@ -41,9 +41,7 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     """
     where, said = as_said(config)
     found = {}
-    for key, value in said.items():
-        if key not in _READERS:
-            raise TrackError(f"{where}: there is no setting {key!r}; there are {', '.join(_READERS)}")
+    for key, value in table(f"{where}: a config", said, _READERS, error=TrackError).items():
         try:
             found[key] = _READERS[key](value)
         except TrackError as error:
@@ -68,16 +66,7 @@ def as_said(config: Config) -> tuple[str, Mapping[str, Any]]:
         return "config", config
     if not isinstance(config, str | os.PathLike):
         raise TrackError(f"config must be a file or a table of names and values, not {config!r}")
-    return _read(Path(config))
-
-
-def _read(path: Path) -> tuple[str, dict[str, Any]]:
-    try:
-        return str(path), tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TrackError(f"{path} cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # no TOML, or no UTF-8
-        raise TrackError(f"{path} is not a TOML file: {error}") from None
+    return str(config), read(Path(config), toml=True, error=TrackError)
 
 
 def _number(value: Any) -> float:

@@ -1,0 +1,89 @@
+"""Tables of names and values that people write: the one door of sweeps, models, effects and configs."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import tomllib
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from udd.errors import ModelError, UddError
+
+_DEEPEST = 16  # lists and tables within each other
+
+
+def table(
+    where: str,
+    data: object,
+    known: Collection[str] | None = None,
+    needed: Collection[str] = (),
+    *,
+    error: type[UddError] = ModelError,
+) -> dict[str, Any]:
+    """A copy of a table that has each of the keys `needed`, and none but those `known`.
+
+    Raises
+    ------
+    UddError
+        Of the kind `error`, naming what is wrong, where, and which keys there are.
+    """
+    if not isinstance(data, Mapping):
+        raise error(f"{where} must be a table of names and values, not {_shown(data)}")
+    for key in data:
+        if not isinstance(key, str) or (known is not None and key not in known):
+            raise error(f"{where} has no {_shown(key)}; it has {', '.join(known or ['names only'])}")
+    for key in needed:
+        if key not in data:
+            raise error(f"{where} does not say its {key}")
+    if _deeper(data, _DEEPEST):
+        raise error(f"{where} is nested more than {_DEEPEST} deep")
+    return dict(data)
+
+
+def arguments(where: str, data: object, of: Callable[..., Any]) -> dict[str, Any]:
+    """A table of the arguments of a function."""
+    taken = inspect.signature(of).parameters
+    return table(where, data, taken, [name for name, one in taken.items() if one.default is one.empty])
+
+
+def parsed(what: str, text: str, *, toml: bool = False, error: type[UddError] = ModelError) -> Any:
+    """What a text in JSON or TOML says.
+
+    Raises
+    ------
+    UddError
+        Of the kind `error`: it is not that, or brackets are nested beyond all reason.
+    """
+    try:
+        return tomllib.loads(text) if toml else json.loads(text)
+    except (ValueError, RecursionError) as reason:
+        raise error(f"{what} is not {'TOML' if toml else 'JSON'}: {reason}") from None
+
+
+def read(path: Path, *, toml: bool = False, error: type[UddError] = UddError) -> Any:
+    """What a file in JSON or TOML says; errors as by :func:`parsed`, or it cannot be read."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as reason:
+        raise error(f"{path} cannot be read: {reason.strerror}") from None
+    except ValueError as reason:  # no UTF-8
+        raise error(f"{path} is not text: {reason}") from None
+    return parsed(str(path), text, toml=toml, error=error)
+
+
+def _deeper(data: object, limit: int) -> bool:
+    """Whether lists and tables stand within each other more than `limit` deep."""
+    if isinstance(data, Mapping | list | tuple):
+        return not limit or any(
+            _deeper(one, limit - 1) for one in (data.values() if isinstance(data, Mapping) else data)
+        )
+    return False
+
+
+def _shown(value: object) -> str:
+    try:
+        return repr(value)
+    except (ValueError, RecursionError):  # an integer of thousands of digits, lists without end
+        return f"a {type(value).__name__} beyond all size"
