@@ -22,6 +22,7 @@ _PUBLIC = {
     "Discovery": "udd.discovery",
     "Covariant": "udd.chaos.spectrum",
     "Connections": "udd.bifurcations",
+    "Crisis": "udd.bifurcations",
     "CycleConnection": "udd.bifurcations",
     "Diagram": "udd.bifurcations",
     "Disk": "udd.models",
@@ -49,6 +50,7 @@ _PUBLIC = {
     "connection": "udd.bifurcations",
     "connections": "udd.bifurcations",
     "continuation": "udd.bifurcations",
+    "crises": "udd.bifurcations",
     "cycle_connections": "udd.bifurcations",
     "covariant_vectors": "udd.chaos.spectrum",
     "diagram": "udd.bifurcations",
@@ -118,6 +120,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from .bifurcations import Cascade as Cascade
     from .bifurcations import Connection as Connection
     from .bifurcations import Connections as Connections
+    from .bifurcations import Crisis as Crisis
     from .bifurcations import CycleConnection as CycleConnection
     from .bifurcations import Diagram as Diagram
     from .bifurcations import Equilibrium as Equilibrium
@@ -128,6 +131,7 @@ if TYPE_CHECKING:  # the same for type checkers
     from .bifurcations import connection as connection
     from .bifurcations import connections as connections
     from .bifurcations import continuation as continuation
+    from .bifurcations import crises as crises
     from .bifurcations import cycle_connections as cycle_connections
     from .bifurcations import diagram as diagram
     from .bifurcations import equilibria as equilibria
