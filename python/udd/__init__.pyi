@@ -12,6 +12,7 @@ from .bifurcations import Branch as Branch
 from .bifurcations import Cascade as Cascade
 from .bifurcations import Connection as Connection
 from .bifurcations import Connections as Connections
+from .bifurcations import Crisis as Crisis
 from .bifurcations import CycleConnection as CycleConnection
 from .bifurcations import Diagram as Diagram
 from .bifurcations import Equilibrium as Equilibrium
@@ -22,6 +23,7 @@ from .bifurcations import cascade as cascade
 from .bifurcations import connection as connection
 from .bifurcations import connections as connections
 from .bifurcations import continuation as continuation
+from .bifurcations import crises as crises
 from .bifurcations import cycle_connections as cycle_connections
 from .bifurcations import diagram as diagram
 from .bifurcations import equilibria as equilibria

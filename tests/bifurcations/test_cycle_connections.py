@@ -29,6 +29,24 @@ def test_lorenz_has_the_one_where_his_chaos_becomes_an_attractor() -> None:
     assert 0.0 < one.error < 1e-10
 
 
+def test_backward_in_time_a_cycle_leads_to_the_equilibrium() -> None:
+    forward = ["10*(y-x)", "r*x-y-x*z", "x*y-8/3*z"]
+    lorenz, reversed_ = (
+        udd.Model(["x", "y", "z"], rates, {"r": 20.0})
+        for rates in (forward, [f"-({rate})" for rate in forward])
+    )
+    there, back = (
+        udd.cycle_connections(branch_of(model, "r", (18.0, 30.0), 3.0), saddle_of(model))
+        for model in (lorenz, reversed_)
+    )
+    assert [one.kind for one in there + back] == ["equilibrium to cycle", "cycle to equilibrium"]
+    # The same orbit, seen backward; its stable manifold has the multipliers' reciprocals.
+    assert abs(there[0].value - back[0].value) <= there[0].error + back[0].error < 1e-10
+    assert back[0].cycle.period == pytest.approx(there[0].cycle.period, rel=1e-9)
+    product = there[0].cycle.multipliers[0] * back[0].cycle.multipliers[-1]
+    assert product == pytest.approx(1.0, rel=1e-7)
+
+
 def test_the_damped_dle_has_one_and_another_integrator_agrees() -> None:
     model = udd.DLE(2.5, B=0.2)
     (one,) = udd.cycle_connections(branch_of(model, "w", (1.0, 9.0), 16.0), saddle_of(model))

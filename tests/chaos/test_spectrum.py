@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,28 @@ def test_a_motion_of_two_frequencies_is_a_torus():
     assert found.verdict == "torus"
     # Exponents along it are averages that go to zero as 1/t; the dimension is that of the torus.
     assert found.dimension == 2.0
+
+
+@pytest.mark.parametrize(("energy", "y"), [(1 / 12, 0.25), (1 / 8, 0.3), (1 / 12, 0.1)])
+def test_neighbours_that_part_in_proportion_to_time_are_no_chaos(energy, y):
+    model = udd.Model(["x", "y", "u", "v"], ["u", "v", "-x-2*x*y", "-y-x^2+y^2"])
+    start = np.array([0.0, y, np.sqrt(2 * energy - y**2 + 2 * y**3 / 3), 0.0])
+    near = udd.ensemble(
+        model, [0.0, 20_000.0], [start, start + 1e-9 * np.array([0.0, 1.0, 0.0, 1.0])], rtol=1e-13
+    )
+    # Chaos at the exponents' accuracy, 1e-3, would part them by e^20; these part by a few times the time.
+    assert np.linalg.norm(np.diff(near.state[:, -1], axis=0)) < 10.0 * 20_000 * 1e-9
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", udd.ConvergenceWarning)
+        assert udd.lyapunov_spectrum(model, t=20_000, state0=start).verdict in ("torus", "undecided")
+
+
+def test_chaos_where_energy_is_kept():
+    model = udd.Model(["x", "y", "u", "v"], ["u", "v", "-x-2*x*y", "-y-x^2+y^2"])
+    start = [0.0, -0.25, np.sqrt(0.25 - 0.0625 - 2 * 0.25**3 / 3), 0.0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", udd.ConvergenceWarning)
+        assert udd.lyapunov_spectrum(model, t=20_000, state0=start).verdict == "chaos"
 
 
 def test_a_chaotic_transient_is_told_as_one():

@@ -6,6 +6,7 @@ from .branch_continuation import continuation
 from .branch_diagram import Diagram, diagram
 from .connecting_orbits import Connection, connection
 from .connection_search import Connections, connections
+from .crisis_location import Crisis, crises
 from .cycle_to_equilibrium import CycleConnection, cycle_connections
 from .doubling_cascade import Cascade, cascade
 from .equilibrium_search import equilibria
@@ -19,6 +20,7 @@ __all__ = [
     "Cascade",
     "Connection",
     "Connections",
+    "Crisis",
     "CycleConnection",
     "Diagram",
     "Equilibrium",
@@ -29,6 +31,7 @@ __all__ = [
     "connection",
     "connections",
     "continuation",
+    "crises",
     "cycle_connections",
     "diagram",
     "equilibria",

@@ -31,6 +31,7 @@ __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
 _Floats = NDArray[np.float64]
 
 _SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
+_POWER = 2.0  # neighbours that part no faster than this power of the time are no chaos
 _STAYS = 1e-3  # an exponent that is smaller than this, per typical time, is as good as zero
 _FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
 _LATE = 4  # times that a motion that nearly comes back is looked at again
@@ -51,7 +52,8 @@ class Spectrum:
         The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero.
     verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "undecided"}
         What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which
-        comes back or rests; chaos by a largest exponent at least four standard errors above zero; a torus
+        comes back or rests; chaos by a largest exponent at least four standard errors above zero, and by
+        neighbours that part faster than as the square of the time (in typical times); a torus
         (quasiperiodic motion) by two exponents or more that are smaller than 1e-3 per typical time, and none
         above.
     period : float
@@ -184,7 +186,7 @@ def lyapunov_spectrum(
     found = run(start, time, skipped, goal)
     fate = run.fate(found["end"][0])
     spent, finer = float(found["time"][0]), goal
-    while not (fate.ordered or _positive(found)) and spent < time:
+    while not (fate.ordered or _positive(found, slow)) and spent < time:
         # Neither order nor chaos yet: on from here, for longer.
         finer /= 2.0
         found = run(found["end"][0], time - spent, 0.0, finer)
@@ -193,13 +195,13 @@ def lyapunov_spectrum(
     if not fate.ordered:
         # Chaos that has not ended may yet do so; without tangents the way there is short.
         fate = run.fate(found["end"][0], time - spent)
-    other = fate.kind != "aperiodic" and (_positive(found) or fate.t > 0.0)
+    other = fate.kind != "aperiodic" and (_positive(found, slow) or fate.t > 0.0)
     aside = spent + fate.t if other else 0.0
     if fate.kind != "aperiodic" and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
         # The averages are of the way there: once more, of what it leads to.
         found = run(fate.state, time, 0.0, goal)
         fate = run.fate(found["end"][0])
-        if fate.kind == "settling" and _positive(found):
+        if fate.kind == "settling" and _positive(found, slow):
             # Neighbours part all the way: chaos in bands too narrow to be told from points.
             fate = replace(fate, kind="aperiodic")
         aside = aside if fate.kind != "aperiodic" else 0.0
@@ -223,7 +225,7 @@ def lyapunov_spectrum(
         verdict = fate.kind
     else:
         verdict = "undecided"
-        if fate.kind == "aperiodic" and _positive(found):
+        if fate.kind == "aperiodic" and _positive(found, slow):
             verdict = "chaos"
         elif fate.kind == "aperiodic" and _on_torus(model, found):
             verdict = "torus"
@@ -249,9 +251,15 @@ def lyapunov_spectrum(
     )
 
 
-def _positive(found: _core._Orbits) -> bool:
-    """Whether neighbouring orbits part."""
-    return bool(found["value"][0, 0] > _SIGMAS * found["standard_error"][0, 0])
+def _positive(found: _core._Orbits, slow: float) -> bool:
+    """Whether neighbouring orbits part, and faster than by any power of the time up to the second.
+
+    Where energy is kept those of regular motion part in proportion to time. The scatter of an exponent's
+    means does not show that: all of them are above zero.
+    """
+    value, time = found["value"][0, 0], float(found["time"][0])
+    grown = value * time > _POWER * np.log1p(time / slow)
+    return bool(value > _SIGMAS * found["standard_error"][0, 0] and grown)
 
 
 def _on_torus(model: Model, found: _core._Orbits) -> bool:

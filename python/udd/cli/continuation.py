@@ -48,6 +48,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--cascade", type=int, metavar="N", help="follow N period doublings from the first one on"
     )
+    parser.add_argument(
+        "--crises", action="store_true", help="locate the crises of chaotic attractors at the saddle cycles"
+    )
     parser.add_argument("--most", type=int, default=2000, help="points at most (default 2000)")
     parser.add_argument("--component", help="component of the state in the picture")
     parser.add_argument(
@@ -81,6 +84,9 @@ def run(args: argparse.Namespace) -> CommandResult:
     if args.cascade is not None:
         found, said = _cascade(args, branches)
         data["cascade"] = found
+        lines.append(said)
+    if args.crises:
+        data["crises"], said = _crises(branches)
         lines.append(said)
     _save(args, branches, data)
     data["files"] = args.out
@@ -154,6 +160,19 @@ def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str
         lines.append(f"  {value:.12g} (error below {error:.1g}){ratio}")
     lines.append(f"  they accumulate at {found.limit:.11g} (error below {found.limit_error:.1g})")
     return data, "\n".join(lines)
+
+
+def _crises(branches: list[Branch]) -> tuple[list[dict[str, Any]], str]:
+    from udd.bifurcations import crises
+
+    cycles = [branch for branch in branches if branch.kind == "cycle"]
+    if not cycles:
+        raise UddError("there is no branch of cycles at which a crisis could be")
+    with status_line() as tell:
+        tell("looking for crises")
+        found = [crisis for branch in cycles for crisis in crises(branch)]
+    lines = [f"  {str(crisis)[1:-1]}" for crisis in found] or ["  none was found"]
+    return [crisis.as_dict() for crisis in found], "\n".join(["crises:", *lines])
 
 
 def _text(branch: Branch) -> str:
