@@ -26,4 +26,6 @@ def __getattr__(name: str) -> object:
         text = f"udd.{name} is called udd.{_RENAMED[name]} now"
         warnings.warn(text, DeprecationWarning, stacklevel=2)
         name = _RENAMED[name]
+    if name not in __all__:
+        raise AttributeError(f"module 'udd' has no attribute {name!r}")
     return _attribute(name)

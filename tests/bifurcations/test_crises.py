@@ -37,7 +37,7 @@ def test_lifetimes_diverge_at_the_boundary_crisis(boundary: udd.Crisis) -> None:
     def lasting(w: float) -> udd.Lifetimes:
         model = udd.DLE(w)
         large = udd.periodic_orbit(model, settle=2000.0)
-        return udd.lifetimes(model, on_it.state, large, longest=5000.0)
+        return udd.lifetimes(model, on_it.state, large, t_max=5000.0)
 
     # An attractor on one side, a transient whose mean lifetime grows as a root on the other.
     assert not lasting(boundary.value + 3e-5).settled.any()
