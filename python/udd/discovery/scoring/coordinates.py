@@ -15,6 +15,9 @@ from udd.models.formula_model import FormulaModel
 
 Array = NDArray[np.float64]
 
+#: F/g - 1, where F = g + d^2Z/dT^2 is the contact's force along the drive, by the plain model.
+_LOAD = "-(Z*Omega^2 + Y*(g*Y - k*Omega - W*Z*Omega)/inertia)/g"
+
 
 @dataclass(frozen=True)
 class Coordinate:
@@ -80,9 +83,11 @@ def coordinates(model: Model) -> tuple[Coordinate, ...]:
         k = model.state_names.index("Omega")
         own.append(Coordinate("|Omega|", partial(_size, k), partial(_growth, k), False, "abs(Omega)"))
     if isinstance(model, Disk):
+        plain = model.with_effects([])
         own += [
             Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
             Coordinate("theta", _azimuth, _azimuthal, True, "atan2(Y, Z)"),
+            Coordinate("load", partial(_load, plain), partial(_loading, plain), False, _LOAD),
         ]
     own.append(Coordinate("t", _time, _passing, False, "t"))
     return tuple(own)
@@ -146,6 +151,19 @@ def _radial(x: Array, v: Array) -> Array:
 def _azimuthal(x: Array, v: Array) -> Array:
     squared = x[..., 1] ** 2 + x[..., 2] ** 2
     result: Array = (x[..., 2] * v[..., 1] - x[..., 1] * v[..., 2]) / squared
+    return result
+
+
+def _load(plain: Model, _t: Array, x: Array) -> Array:
+    turning = plain.rates(0.0, x.reshape(-1, x.shape[-1]))[:, 0].reshape(x.shape[:-1])
+    result: Array = -(x[..., 2] * x[..., 0] ** 2 + x[..., 1] * turning) / plain.parameters["g"]
+    return result
+
+
+def _loading(plain: Model, x: Array, v: Array) -> Array:
+    step = 1e-6
+    ahead, behind = (_load(plain, np.zeros(x.shape[:-1]), x + sign * step * v) for sign in (1.0, -1.0))
+    result: Array = (ahead - behind) / (2.0 * step)
     return result
 
 
