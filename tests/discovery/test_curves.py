@@ -58,6 +58,50 @@ def test_a_law_of_no_library_is_located_and_described(case):
     assert min(np.sqrt(np.mean(z**2)) for z in off) < 2
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_friction_by_the_load_is_located_over_the_load(seed):
+    def law(t, o, y, z, b):
+        return -0.5 * float(unmodelled.squeeze(unmodelled.load(o, y, z, W))) * o, 0.0, 0.0
+
+    base = udd.fit(unmodelled.record(law, seed), udd.Disk(W))
+    best, second = scan_curves(base).curves[:2]
+    assert best.name == ("friction", "load")
+    assert best.evidence > second.evidence + 20
+    # The record starts anywhere; that friction at rest is a part of k0, only its rise is told.
+    low, high = best.values(np.array([-0.05, 0.25]))
+    rise = 0.5 * np.subtract(*unmodelled.squeeze(np.array([0.25, -0.05])))
+    assert high - low == pytest.approx(rise, rel=0.3)
+    # The effect made of it is the curve over the load, and explains the record.
+    located = fit_curve(base, best, "curve")
+    assert located.effect.spec.slots == ("friction",) and located.fit.converged
+    assert located.fit.evidence > base.evidence + 100
+
+
+def test_the_load_is_the_same_in_formulas_and_for_each_film():
+    x = np.random.default_rng(4).normal(0.0, [4.0, 0.02, 0.02, 3.0], (20, 4))
+    for w in (0.02, 0.06):
+        plain = udd.Disk(w)
+        one = coordinate(plain, "load")
+        known = [unmodelled.load(o, y, z, w) for o, y, z, _ in x]
+        np.testing.assert_allclose(one.of(np.zeros(20), x), known, rtol=1e-12)
+        rates = plain.rates(0.0, x)
+        effect = E.formula("friction", f"a * ({one.text})", a=1e-3)
+        (friction,) = (s for s in slots(plain) if s.title == "friction")
+        made = friction.forcing(plain, x, 1e-3 * one.of(np.zeros(20), x), np.zeros(20))
+        np.testing.assert_allclose(plain.with_effects([effect]).rates(0.0, x) - rates, made, atol=1e-9)
+
+
+def test_films_at_two_drives_have_their_own_loads():
+    films = [unmodelled.record(None, seed, 20.0, w) for seed, w in ((1, 0.045), (2, 0.06))]
+    fit = udd.fit(films, [udd.Disk(0.045), udd.Disk(0.06)])
+    found = responses(fit)
+    values = found.along(coordinate(fit.model, "load"))
+    for model, film in zip(fit.models, found.films, strict=True):
+        own = [unmodelled.load(*state[:3], model.W) for state in found.states[film][:, 0]]
+        # The constants are those fitted, which are the true ones to a few per cent.
+        assert np.corrcoef(values[film][:, 0], own)[0, 1] > 0.99
+
+
 def test_the_form_of_a_wave_is_named():
     case = next(c for c in unmodelled.CASES if c.name == "five waves")
     fit = udd.fit(unmodelled.record(weak(case), 6), udd.Disk(W))

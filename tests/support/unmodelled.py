@@ -55,6 +55,18 @@ def bump(z: np.ndarray) -> np.ndarray:
     return 0.004 * np.exp(-(((z + 0.02) / 0.008) ** 2))
 
 
+def load(o: float, y: float, z: float, w: float) -> float:
+    """By how much of its weight the disk presses on the wheels more than at rest: F/g - 1."""
+    inertia = R * R / 2 + y * y + z * z
+    turning = (G * y - max(K1 - K2 * abs(o), K0) * o - z * w * o) / inertia
+    return -(z * o * o + y * turning) / G
+
+
+def squeeze(excess: np.ndarray) -> np.ndarray:
+    """Friction that sets in where the load is a tenth above the weight, m^2/s."""
+    return 0.008 / (1 + np.exp(-(excess - 0.1) / 0.04))
+
+
 CASES = (
     Case("grip loss", _vertical(lambda o, y, z, b: float(grip(z))), (("vertical (constraint)", "Z"),), grip),
     Case(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -249,6 +250,32 @@ def _azimuthal(x: Floats, v: Floats) -> Floats:
     return result
 
 
+#: F/g - 1, where F = g + d^2Z/dT^2 is the contact's force along the drive, by the plain model.
+_LOAD = "-(Z*Omega^2 + Y*(g*Y - k*Omega - W*Z*Omega)/inertia)/g"
+
+
+def _load(plain: Disk, _t: Floats, x: Floats) -> Floats:
+    turning = plain.rates(0.0, x.reshape(-1, x.shape[-1]))[:, 0].reshape(x.shape[:-1])
+    result: Floats = -(x[..., 2] * x[..., 0] ** 2 + x[..., 1] * turning) / plain.g
+    return result
+
+
+def _loading(plain: Disk, x: Floats, v: Floats) -> Floats:
+    step = 1e-6
+    ahead, behind = (_load(plain, np.zeros(x.shape[:-1]), x + sign * step * v) for sign in (1.0, -1.0))
+    result: Floats = (ahead - behind) / (2.0 * step)
+    return result
+
+
+def _coordinates(model: Disk) -> tuple[Coordinate, ...]:
+    plain = model.with_effects([])
+    return (
+        Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
+        Coordinate("theta", _azimuth, _azimuthal, True, "atan2(Y, Z)"),
+        Coordinate("load", partial(_load, plain), partial(_loading, plain), False, _LOAD),
+    )
+
+
 # --- what to film next
 
 _DRIVES = (0.5, 0.7, 1.4, 2.0)  # times the present drive
@@ -336,10 +363,7 @@ Disk.profile = ModelProfile(
         filter_window=1.0,
         filter_level=1,
         pairs=False,
-        coordinates=(
-            Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
-            Coordinate("theta", _azimuth, _azimuthal, True, "atan2(Y, Z)"),
-        ),
+        coordinates=_coordinates,
         # The contact's velocities with and without the momentum that goes with them.
         slots=(
             CurveSlot("torque", None, "Omega"),

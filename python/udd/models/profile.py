@@ -257,6 +257,11 @@ class FurtherFilm(NamedTuple):
     start: Floats
 
 
+def no_coordinates(_model: Any) -> tuple[Coordinate, ...]:
+    """Nothing beside the states and time."""
+    return ()
+
+
 def no_films(_model: Any, _places: Floats) -> Iterator[FurtherFilm]:
     """No other film can be made than a longer one."""
     return iter(())
@@ -279,8 +284,8 @@ class DiscoveryProfile:
         Whether two effects at once are tried wherever one passes; otherwise only beside formulas.
     brakes : tuple of str
         Parameters that a pair of effects must not turn negative.
-    coordinates : tuple of Coordinate
-        What a curve may depend on beside the states and time.
+    coordinates : callable
+        ``(model) -> tuple of Coordinate``: what a curve may depend on beside the states and time.
     slots : tuple of CurveSlot, or None
         Where a curve may enter; None for the equations themselves.
     films : callable
@@ -293,7 +298,7 @@ class DiscoveryProfile:
     filter_level: int = 2
     pairs: bool = True
     brakes: tuple[str, ...] = ()
-    coordinates: tuple[Coordinate, ...] = ()
+    coordinates: Callable[[Any], tuple[Coordinate, ...]] = no_coordinates
     slots: tuple[CurveSlot, ...] | None = None
     films: Callable[[Any, Floats], Iterator[FurtherFilm]] = no_films
 

@@ -262,7 +262,7 @@ def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:
     yield from ((c,) for c in single)
     if not pairs:
         return
-    made_of = {"|Omega|": {"Omega"}, "R": {"Y", "Z"}, "theta": {"Y", "Z"}}
+    made_of = {"|Omega|": {"Omega"}, "R": {"Y", "Z"}, "theta": {"Y", "Z"}, "load": {"Omega", "Y", "Z"}}
     for a, b in itertools.combinations((c for c in single if c.name != "t"), 2):
         parts = [made_of.get(c.name, {c.name}) for c in (a, b)]
         if not parts[0] & parts[1]:

@@ -55,7 +55,7 @@ def coordinates(model: Model) -> tuple[Coordinate, ...]:
     if "Omega" in model.state_names:
         k = model.state_names.index("Omega")
         own.append(Coordinate("|Omega|", partial(_size, k), partial(_growth, k), False, "abs(Omega)"))
-    own += model.profile.discovery.coordinates
+    own += model.profile.discovery.coordinates(model)
     own.append(Coordinate("t", _time, _passing, False, "t"))
     return tuple(own)
 

@@ -13,6 +13,7 @@ from udd.fitting import Fit
 from udd.models.profile import Coordinate
 
 from .coordinates import Slot
+from .coordinates import coordinate as named
 
 Array = NDArray[np.float64]
 
@@ -60,11 +61,22 @@ class Responses:
 
     def along(self, coordinate: Coordinate) -> Array:
         """A coordinate's values, (n, q)."""
-        return coordinate.of(self.t, self.states)
+        result = np.zeros(self.t.shape)
+        for own, film in self._of_films(coordinate):
+            result[film] = own.of(self.t[film], self.states[film])
+        return result
 
     def speed(self, coordinate: Coordinate) -> Array:
         """How fast a coordinate changes, (n, q)."""
-        return coordinate.rate(self.states, self.rates)
+        result = np.zeros(self.t.shape)
+        for own, film in self._of_films(coordinate):
+            result[film] = own.rate(self.states[film], self.rates[film])
+        return result
+
+    def _of_films(self, coordinate: Coordinate) -> list[tuple[Coordinate, NDArray[np.bool_]]]:
+        """The coordinate as each film's own drive makes it, and which links the film holds."""
+        films = zip(self.fit.models, self.films, strict=True)
+        return [(named(model, coordinate.name), film) for model, film in films]
 
     def columns(self, slot: Slot, value: Array, rate: Array) -> Array:
         """What forcings (n, q, k), changing at these rates, add to the state at a link's end, (n, d, k)."""
