@@ -8,10 +8,11 @@ import warnings
 from typing import Any
 
 _WORD, _ALL = 200, 700  # characters of one word or of what is repeated of the input, and of a message
-# A word, a quoted text, or what stands where something else is wanted.
-_REPEATED = re.compile(
-    "|".join(f"{what}{{{_WORD},}}" for what in (r"\S", "(?<= ')[^']", '(?<= ")[^"]', "(?<=, not )."))
-)
+# What stands where something else is wanted first: it may hold all of the others.
+_REPEATED = [
+    re.compile(rf"{before}{{{_WORD},}}")
+    for before in ("(?<=, not ).", r"(?:^|(?<= ))[\[{].", r"(?<= ')[^']", r'(?<= ")[^"]', r"\S")
+]
 
 
 class UddError(ValueError):
@@ -24,7 +25,9 @@ class UddError(ValueError):
     """
 
     def __init__(self, message: str = "", *more: object) -> None:
-        text = _REPEATED.sub(lambda part: f"{part[0][: _WORD - 3]}...", message)
+        text = message
+        for repeated in _REPEATED:
+            text = repeated.sub(lambda part: f"{part[0][: _WORD - 3]}...", text)
         super().__init__(text if len(text) <= _ALL else f"{text[: _ALL - 3]}...", *more)
 
 

@@ -64,13 +64,14 @@ def parsed(what: str, text: str, *, toml: bool = False, error: type[UddError] = 
 
 def read(path: Path, *, toml: bool = False, error: type[UddError] = UddError) -> Any:
     """What a file in JSON or TOML says; errors as by :func:`parsed`, or it cannot be read."""
+    name = str(path) if len(str(path)) < 200 else f"{str(path)[:100]}..."
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as reason:
-        raise error(f"{path} cannot be read: {reason.strerror}") from None
+        raise error(f"{name} cannot be read: {reason.strerror}") from None
     except ValueError as reason:  # no UTF-8
-        raise error(f"{path} is not text: {reason}") from None
-    return parsed(str(path), text, toml=toml, error=error)
+        raise error(f"{name} is not text: {reason}") from None
+    return parsed(name, text, toml=toml, error=error)
 
 
 def _deeper(data: object, limit: int) -> bool:
