@@ -254,6 +254,7 @@ def written(
     names: tuple[str, ...],
 ) -> FormulaSpec:
     """What is said of a formula."""
+    _word(name)
     linear = names if amplitudes is None else _names(amplitudes)
     limits = dict(ranges or {})
     for other in (*linear, *limits):
@@ -434,8 +435,7 @@ def _described(
 ) -> tuple[str, str, str, str, tuple[str, ...], tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """The checked attributes of a spec before its parameters."""
     _slot(slot)
-    if not (isinstance(name, str) and name.isidentifier()):
-        raise ModelError(f"an effect's name must be a single word, not {name!r}")
+    _word(name)
     if name in _specs():
         raise ModelError(f"the library has an effect called {name!r} already: give the formula another name")
     known = _SLOTS.get(slot)
@@ -462,6 +462,11 @@ def along_of(slot: object) -> str | None:
     """What a slot that is a force acts along: a coordinate, or the difference of two; None for any other."""
     match = re.fullmatch(r"force\((\w+(?: - \w+)?)\)", slot) if isinstance(slot, str) else None
     return match[1] if match else None
+
+
+def _word(name: str) -> None:
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise ModelError(f"an effect's name must be a single word, not {name!r}")
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:
