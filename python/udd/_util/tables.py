@@ -11,6 +11,7 @@ from typing import Any
 
 from udd.errors import ModelError, UddError
 
+_LONGEST = 100  # characters of a name
 _DEEPEST = 16  # lists and tables within each other
 
 
@@ -32,8 +33,10 @@ def table(
     if not isinstance(data, Mapping):
         raise error(f"{where} must be a table of names and values, not {_shown(data)}")
     for key in data:
-        if not isinstance(key, str) or (known is not None and key not in known):
-            raise error(f"{where} has no {_shown(key)}; it has {', '.join(known or ['names only'])}")
+        if not isinstance(key, str) or len(key) > _LONGEST or (known is not None and key not in known):
+            raise error(
+                f"{where} has no {_shown(key)}; it has {', '.join(known or [f'names of up to {_LONGEST} characters'])}"
+            )
     for key in needed:
         if key not in data:
             raise error(f"{where} does not say its {key}")
