@@ -34,9 +34,7 @@ def table(
         raise error(f"{where} must be a table of names and values, not {_shown(data)}")
     for key in data:
         if not isinstance(key, str) or len(key) > _LONGEST or (known is not None and key not in known):
-            raise error(
-                f"{where} has no {_shown(key)}; it has {', '.join(known or [f'names of up to {_LONGEST} characters'])}"
-            )
+            raise error(f"{where} has no {_shown(key)}; it has {', '.join(known or ['short names'])}")
     for key in needed:
         if key not in data:
             raise error(f"{where} does not say its {key}")
