@@ -1,4 +1,4 @@
-//! How likely a record is.
+//! Log marginal likelihood (evidence) of a record, by Laplace's approximation.
 
 use nalgebra::{DMatrix, SVector};
 
@@ -39,7 +39,7 @@ where
         cost
     }
 
-    /// Logarithm of the likelihood, by Laplace's approximation around a minimum with this cost.
+    /// Logarithm of the marginal likelihood, by Laplace's approximation around a minimum with this cost.
     ///
     /// The determinants are those of the states' part of the normal equations, and of what remains for the
     /// parameters.

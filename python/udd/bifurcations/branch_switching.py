@@ -106,7 +106,7 @@ def _nothing_between(
 def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, Floats, Floats]:
     """Twice the time, and the direction in which the two rounds differ."""
     u, m = place.u, curve.pieces
-    values, vectors = np.linalg.eig(curve.closing(u))
+    values, vectors = np.linalg.eig(curve.monodromy(u))
     k = int(np.argmin(np.abs(values + 1.0)))
     along = vectors[:, k].real
     nodes = curve.nodes(u)

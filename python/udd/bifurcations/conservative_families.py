@@ -150,7 +150,7 @@ class FamilyCurve(PeriodicOrbitCurve):
     def _kept(self, u: Floats) -> tuple[Floats, Floats]:
         """What the map keeps, a left eigenvector of the multiplier 1 across the flow; how singular it is."""
         size, start = self.flow.size, self.nodes(u)[0]
-        closing = self.flow.scaled(self.closing(u))
+        closing = self.flow.scaled(self.monodromy(u))
         flow = self.rate_at(self.values_at(u), start) * self.clock / size
         left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(self.flow.dim), flow]))
         return left[:, -1], sizes

@@ -210,7 +210,7 @@ class _Saddle:
 def _saddle_of(curve: PeriodicOrbitCurve, u: Floats) -> _Saddle | None:
     """The cycle, if one multiplier is above 1 and all others are inside the unit circle."""
     flow, values = curve.flow, curve.values_at(u)
-    closing = curve.closing(u)
+    closing = curve.monodromy(u)
     # Of a symmetric cycle over the whole period: in the mirror the sides may change.
     around = flow.scaled(closing @ closing if curve.symmetric else closing)
     numbers, right = np.linalg.eig(around)

@@ -211,7 +211,7 @@ class _Search:
         """The cycle, if one multiplier is alone on its side of the unit circle, and positive."""
         flow, size, values = self.flow, self.flow.size, curve.values_at(u)
         nodes, span = curve.nodes(u), curve.span(u) / curve.pieces
-        numbers, left = np.linalg.eig(flow.scaled(curve.closing(u)).T)
+        numbers, left = np.linalg.eig(flow.scaled(curve.monodromy(u)).T)
         across = np.abs(numbers - 1.0) > 1e-6
         outside = across & ((np.abs(numbers) > 1.0) == (self.time > 0.0))
         if outside.sum() != 1 or abs(numbers[outside][0].imag) > 0.0 or numbers[outside][0].real < 0.0:

@@ -182,7 +182,7 @@ class PeriodicOrbitCurve:
         rates: Floats = model.rates(self.begins(u), self.flow.full(self.nodes(u)))[:, self.flow.kept]
         return rates
 
-    def closing(self, u: Floats) -> Floats:
+    def monodromy(self, u: Floats) -> Floats:
         """The derivative (r, r) of the map from the first node to where the orbit closes."""
         product = np.eye(self.flow.dim)
         for matrix in self.flight(u).by_state:

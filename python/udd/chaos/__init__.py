@@ -1,1 +1,1 @@
-"""Lyapunov exponents, Poincare sections, recurrence and the lifetimes of transients."""
+"""Lyapunov exponents and spectra, Poincare sections and recurrence."""

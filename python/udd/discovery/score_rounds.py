@@ -32,7 +32,8 @@ class ScoreRound:
     curves : list of Curve
         The likeliest first.
     looks : int
-        How many scores could have been the best, around all fits that were tried.
+        How many scores could have been the best, around all fits that were tried: the number of tests, by
+        which Bonferroni's correction multiplies each probability.
     """
 
     fit: Fit

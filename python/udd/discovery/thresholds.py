@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-#: Chance that a record without any effect is said to have one, over all candidates together.
+#: Family-wise error rate: the chance that a record without any effect is said to have one, over all of the
+#: candidates together (Bonferroni: each is tested at this over their number).
 ALPHA = 1e-3
 #: Forms more alike than this move the same data in the same way, like a slip c Z and a relaxation -b W Z at
 #: one drive.

@@ -44,7 +44,7 @@ def confirmed_by(
     names : sequence of str
         The parameters that came in with the effect; none where it is a curve.
     unit : float
-        See :func:`udd.discovery.validation.held_out_errors.pace`.
+        See :func:`udd.fitting.time_scale.motion_time_scale`.
 
     Returns
     -------

@@ -104,7 +104,7 @@ def held_out_errors(
     held : ndarray of bool (n,)
         Which frames are held out: the last ones of each measurement.
     unit : float
-        See :func:`pace`.
+        See :func:`udd.fitting.time_scale.motion_time_scale`.
     """
     profile = fit.model.profile
     wanted = tuple(h * unit for h in profile.discovery.horizons)

@@ -37,7 +37,7 @@ class Foretelling:
     wholes : mapping of int to Trial
         The forms fitted to all data, by the identity of the trial that they belong to.
     unit : float
-        See :func:`udd.discovery.validation.held_out_errors.pace`.
+        See :func:`udd.fitting.time_scale.motion_time_scale`.
     """
 
     def __init__(self, record: Record, wholes: Mapping[int, TrialFit], unit: float) -> None:
