@@ -179,6 +179,8 @@ class _Writer:
 
     def _new(self, value: Any) -> dict[str, int]:
         if isinstance(value, np.ndarray):
+            if value.dtype.hasobject:
+                raise ModelError("an array of Python objects cannot be saved")
             self.arrays.append(value)
             return {"array": len(self.arrays) - 1}
         self.objects.append(self._object(value))

@@ -83,8 +83,9 @@ struct Appearing<'py> {
 
 /// Moves a pose (u, v, angle) onto a picture by one Gauss-Newton step for each of `rounds` (tolerances, pixels).
 ///
-/// `motion` is shift, turn, bend, twist, rate, spin, bending, twisting. Returns the pose, what the last round saw of each mark, which it used, the step that it made of them (None: the disk is not
-/// held; NaN: a mark not seen) and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
+/// `motion` is shift, turn, bend, twist, rate, spin, bending, twisting. Returns the pose, what the last round saw
+/// of each mark, which it used, the step that it made of them (None: the disk is not held; NaN: a mark not seen)
+/// and its size in pixels. With `keep`, weights and residuals of the pixels are returned.
 #[pyfunction]
 #[pyo3(signature = (picture, disk, pose, motion, rounds, without = None, keep = false))]
 fn align_marks<'py>(

@@ -85,3 +85,12 @@ def test_the_list_is_what_command_and_config_know(capsys: pytest.CaptureFixture[
 def test_a_table_is_in_order_and_knows_what_is_not_known() -> None:
     rows = table({"wobble": Estimate(np.nan, np.inf, "no"), "mark 1": Estimate([1.0, np.nan], 0.0, "given")})
     assert list(rows.items()) == [("mark 1", [[1.0, None], 0.0, "given"]), ("wobble", [None, None, "no"])]
+
+
+def test_a_config_of_tags_or_of_a_bob_stays_one() -> None:
+    tags = TrackOptions(layout=[{"at": [0.03, 0.0], "tag": "4x4_50:7"}, {"at": [-0.03, 0.0], "tag": "4x4_50:3"}])
+    assert read_options(tags) is tags
+    again = read_options(tags, scale=1500.0)
+    assert again.scale == 1500.0 and again.tags == tags.tags and again.layout == tags.layout
+    bob = TrackOptions(bob="red", length=1.0)
+    assert read_options(bob, length=1.2).length == 1.2 and read_options(bob, length=1.2).layout == bob.layout

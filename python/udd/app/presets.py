@@ -12,12 +12,12 @@ from typing import Any
 from udd import effects
 from udd.models import DLE, Disk, Model
 from udd.models.serialization import model_to_dict
+from udd.report.document import text_of
 from udd.report.wording import pretty
 
 from . import limits
 from .growing_run import RATE, clock_of, columns_of, per_unit
 from .page_models import PLAIN, page_model
-from .result import text_of
 
 #: Amplitudes with which an effect is seen at once, about a tenth of what else acts on the disk.
 _SHOWN = {

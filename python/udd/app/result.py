@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import html
 import math
-import re
 from typing import Any
 
 from udd.models import Disk
 from udd.models.serialization import model_to_dict
 from udd.report import tables, wording
-
-_RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
-
-
-def text_of(markup: object) -> str:
-    """What the report writes with tags, as text alone."""
-    raised = re.sub(r"<sup>(.*?)</sup>", lambda m: m[1].translate(_RAISED), str(markup))
-    return html.unescape(re.sub(r"<[^>]*>", "", raised))
+from udd.report.document import text_of
 
 
 def of(found: Any) -> dict[str, Any]:

@@ -153,7 +153,8 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     distinct: list[Crisis] = []
     for one in sorted(found, key=lambda one: one.value):
         # The two sides of a symmetric cycle may be mirror images.
-        if not distinct or one.value - distinct[-1].value > max(one.error, 1e-9 * abs(one.value)):
+        near = one.error + distinct[-1].error if distinct else 0.0
+        if not distinct or one.value - distinct[-1].value > max(near, 1e-9 * abs(one.value)):
             distinct.append(one)
     return distinct
 

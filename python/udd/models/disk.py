@@ -269,11 +269,12 @@ def _loading(plain: Disk, x: Floats, v: Floats) -> Floats:
 
 def _coordinates(model: Disk) -> tuple[Coordinate, ...]:
     plain = model.with_effects([])
-    return (
+    places = (
         Coordinate("R", _distance, _radial, False, "sqrt(Y^2 + Z^2)"),
         Coordinate("theta", _azimuth, _azimuthal, True, "atan2(Y, Z)"),
-        Coordinate("load", partial(_load, plain), partial(_loading, plain), False, _LOAD),
     )
+    load = Coordinate("load", partial(_load, plain), partial(_loading, plain), False, _LOAD)
+    return (*places, load) if model.g else places
 
 
 # --- what to film next

@@ -42,7 +42,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             result["effects"] = [effect_to_dict(effect) for effect in model.effects]
         if model_from_dict(result) == model:
             return result
-    raise ModelError(f"a sweep cannot write this model down: {model!r}")
+    raise ModelError(f"this model cannot be written down: {model!r}")
 
 
 def model_from_dict(data: object) -> Model:

@@ -35,6 +35,7 @@ AXES: dict[str, tuple[str, str, float]] = {
     "J": ("J = I Ω − W Y", "cm²/s = 10⁻⁴ m²/s", 1e4),
     "k": ("friction coefficient k", "m²/s", 1.0),
     "R": ("distance R from the contact", "cm", 100.0),
+    "load": ("load F/g − 1", "1", 1.0),
 }
 
 #: Residual of the equation for a state's rate, likewise.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import html
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,9 +14,18 @@ from markupsafe import Markup
 Text = str | Markup  #: Plain text, or text with HTML in it that was made here.
 
 
+_RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
+
+
 def plain(text: Text) -> str:
-    """Without the HTML."""
-    return text.striptags() if isinstance(text, Markup) else text
+    """Without the HTML; exponents are raised all the same."""
+    return text_of(text) if isinstance(text, Markup) else text
+
+
+def text_of(markup: object) -> str:
+    """What is written with tags, as text alone."""
+    raised = re.sub(r"<sup>(.*?)</sup>", lambda m: m[1].translate(_RAISED), str(markup))
+    return html.unescape(re.sub(r"<[^>]*>", "", raised))
 
 
 @dataclass(frozen=True)

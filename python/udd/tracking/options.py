@@ -127,6 +127,18 @@ class TrackOptions:
             raise TrackError("length is a pendulum's: say its bob's colour too")
         self._check()
 
+    def changed(self, more: Mapping[str, Any]) -> TrackOptions:
+        """The same with other values of some options."""
+        said = {name: getattr(self, name) for name in FIELDS}
+        if self.tags or self.bob is not None:  # from which the layout was made
+            del said["layout"]
+        made = TrackOptions(**{**said, **more})
+        if self.tags and "layout" not in more:
+            made._set("tags", self.tags)
+            made._set("layout", self.layout)
+            made._check()
+        return made
+
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.calibration_items import Calibrate
+from udd.errors import outside
 from udd.markers.layout import Layout
 from udd.measurement import DISK, Measurement, check_length
 from udd.tracking.calibration.config import Config, read_options
@@ -271,7 +272,7 @@ def _calibrate(film: Film, look_over: Survey, options: TrackOptions) -> tuple[Tr
         )
     if missing is not None:
         warnings.warn(
-            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=4
+            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=outside()
         )
     return prepare(film, look_over, sights, seen, options)
 

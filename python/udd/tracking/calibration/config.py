@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +55,8 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
 def read_options(config: Config | TrackOptions | None, **given: Any) -> TrackOptions:
     """All options, of a config and of arguments (not None), which win."""
     if isinstance(config, TrackOptions):
-        return replace(config, **{name: value for name, value in given.items() if value is not None})
+        more = {name: value for name, value in given.items() if value is not None}
+        return config.changed(more) if more else config
     return TrackOptions(**settings({} if config is None else config, **given))
 
 

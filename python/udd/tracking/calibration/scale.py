@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.errors import outside
 from udd.tracking.options import TrackOptions
 
 from .rim import Rim
@@ -49,7 +50,7 @@ def scale(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions
     warnings.warn(
         f"the film shows {film.value:.1f} pixels per metre (by its {film.origin}), not the {said.value:.1f} "
         "that are given; the film is believed",
-        stacklevel=5,
+        stacklevel=outside(),
     )
     return film
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.calibration_items import Estimate, table
+from udd.errors import outside
 from udd.tracking.calibration.scale import Scale
 from udd.tracking.geometry.contact_point import pivot as rolling
 from udd.tracking.geometry.contact_point import support
@@ -65,7 +66,7 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOp
         warnings.warn(
             f"the disk turns about a point {abs(found.place - place):.0f} pixels from the pivot that is "
             "given; the motion is believed",
-            stacklevel=5,
+            stacklevel=outside(),
         )
     if found is not None:
         return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / size.value, "rolling constraint")
@@ -78,7 +79,7 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOp
     warnings.warn(
         "the motion does not tell where the contact point is; it is taken from the support, to about "
         f"{CLOSE_ENOUGH:.0f} mm",
-        stacklevel=5,
+        stacklevel=outside(),
     )
     return camera(complex(known.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
 
@@ -98,7 +99,7 @@ def meta_of(
         warnings.warn(
             f"{film.path}: {missing or film.broken} frames are missing or do not decode; "
             "the film may be cut off",
-            stacklevel=5,
+            stacklevel=outside(),
         )
     look = known.look
     middle = (middle_of(known.view.shape) - camera.pivot) / camera.scale
