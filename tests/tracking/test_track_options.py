@@ -88,7 +88,7 @@ def test_a_table_is_in_order_and_knows_what_is_not_known() -> None:
 
 
 def test_a_config_of_tags_or_of_a_bob_stays_one() -> None:
-    tags = TrackOptions(layout=[{"at": [0.03, 0.0], "tag": "4x4_50:7"}, {"at": [-0.03, 0.0], "tag": "4x4_50:3"}])
+    tags = TrackOptions(layout=[{"at": [0.03, 0.0], "tag": "4x4_50:7", "side": 0.02}])
     assert read_options(tags) is tags
     again = read_options(tags, scale=1500.0)
     assert again.scale == 1500.0 and again.tags == tags.tags and again.layout == tags.layout
