@@ -345,7 +345,6 @@ def _upright(
         return camera_of(tracks, known, size_of(known.look.places, rim, options), options)
 
     before = camera()
-    # row "exposure 40 ms, fast": errors over their standard errors 1.05 rather than 1.15
     shared = [interpolation_error(tracks, known.exposure**2 / 12)]
     turned = wobble(tracks, known.look)
     stood = correct_wobble(tracks, known.look, turned) if turned.amplitude else None

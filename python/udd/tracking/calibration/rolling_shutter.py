@@ -18,6 +18,7 @@ MOST = 36  # frames to judge by
 FEWEST = 6
 CERTAIN = 5.0  # standard errors
 LEAST = 0.02  # of the frame interval: what is less does no harm
+FAR = 3.0  # pixels; frames whose marks disagree by more say less
 STEPS = [2.5, 1.2, 0.6]
 
 
@@ -77,6 +78,11 @@ def _compare(
     maps = moved_by_pose(arms)
     left = np.where(fit.used[:, None], fit.step.residuals, 0.0)
     weight = fit.information
+    # pixels that are known too well would drown the others
+    weight = (
+        np.minimum(1.0, 400.0 / np.maximum(np.abs(weight).max(axis=(1, 2)), 1e-9))[:, None, None] * weight
+    )
+    weight /= 1 + (np.abs(left).max() / FAR) ** 2
     seen = weight @ maps
     normal = np.einsum("kai,kaj->ij", maps, seen)
     free = moved - maps @ np.linalg.solve(normal, np.einsum("kai,ka->i", seen, moved))

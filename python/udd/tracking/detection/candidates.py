@@ -56,8 +56,8 @@ def classify(
     return out
 
 
-def candidates(patches: list[Blobs], look: DiskAppearance) -> list[Pose]:
-    """Poses that two blobs or more agree on, the best supported first.
+def candidates(patches: list[Blobs], look: DiskAppearance, guess: Pose | None) -> list[Pose]:
+    """Poses that two blobs or more agree on, the best supported first; `guess` breaks ties.
 
     Every pair of blobs of different colours at about the right distance proposes a pose; the other
     blobs near their places support it. The pose is then the rigid fit to all that support it.
@@ -81,7 +81,13 @@ def candidates(patches: list[Blobs], look: DiskAppearance) -> list[Pose]:
                     reach,
                 )
                 if pose is not None:
-                    found.append(pose)
+                    score, p = pose
+                    if guess is not None:
+                        away = abs(p.centre - guess.centre) + reach * abs(
+                            np.angle(np.exp(1j * (p.angle - guess.angle)))
+                        )
+                        score -= 0.8 * min(away / reach, 1.0)
+                    found.append((score, p))
     found.sort(key=lambda item: -item[0])
     return [pose for _, pose in found]
 

@@ -20,7 +20,7 @@ def mixed(light: Array, white: float, mark: float, colour: Array, full_range: bo
     curve makes of the three. So half red and half white is brighter than the mean of the light of both codes
     (by some 5 % of their difference): a streak whose one end is hidden would be taken for longer than it is.
     The codes of disk and mark keep their light, and a mark as bright as the disk, whose mixes no brightness
-    tells apart, all codes theirs. Rows "standard" and "exposure 40 ms, fast": a third of the error.
+    tells apart, all codes theirs.
 
     Parameters
     ----------

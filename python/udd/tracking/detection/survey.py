@@ -135,6 +135,7 @@ def moving(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[Movi
             if rates:
                 time = sum(r[3] for r in rates)
                 rate, turn = sum(r[1] - r[0] for r in rates) / time, sum(r[2] for r in rates)
+                rate /= np.sinc(turn / (2 * np.pi))  # a turning disk goes along an arc, longer than its chord
                 turning = turn / time
                 found.append(Moving(picture, sight, rate, turning, time / len(rates), rates[-1]))
     return found

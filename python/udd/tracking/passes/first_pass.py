@@ -166,7 +166,7 @@ def _reacquire(
             return None
     patches = classify(picture, known.colours, known.view, box)
     best: tuple[float, Fit, Pose, Motion] | None = None
-    for start in candidates(patches, known.look)[:MOST_TRIED]:
+    for start in candidates(patches, known.look, guess if fresh else None)[:MOST_TRIED]:
         if guess is not None:
             start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
         for motion in _motions(past, start, picture.t, known, fresh):
@@ -201,6 +201,8 @@ def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose |
     last = past[-1]
     dt = t - last.t
     recent = [h for h in past if t - h.t < 0.5] or [last]
+    if len(recent) == 3 and dt > 1.6 * (last.t - recent[-2].t):
+        recent = recent[-2:]  # a parabola does not reach across a gap
     times = np.array([h.t - t for h in recent])
     weights = np.array([np.prod([-b / (a - b) for b in times if b != a]) for a in times])  # Lagrange at 0
     if len(recent) == 1:

@@ -17,7 +17,7 @@ from udd.tracking.detection.colour_blobs import Sight
 from udd.tracking.detection.colour_mixing import mixed
 from udd.tracking.detection.illumination import evenness
 from udd.tracking.detection.occluder import visible
-from udd.tracking.detection.survey import Moving, Survey, moving
+from udd.tracking.detection.survey import Moving, Survey, moving, repeats_last
 from udd.tracking.geometry.contact_point import Contact, rough_contact
 from udd.tracking.geometry.lens import Bent, Lens, calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
@@ -32,9 +32,10 @@ from .second_pass import LocalMotion
 from .tracks import Tracks
 
 AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known
+FEWEST = 3  # frames in motion from which marks are learned a second time
 SHARP = 60  # slow frames from which the rim is measured
 FOR_LENS = 90  # frames from which tilt and lens are measured
-LENS_ROUNDS = 3  # marks are measured again without the distortion found (row "lens": once is twice as bad)
+LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
 SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 SURE = 4.0  # standard errors of the layout by which it may be further off, up to as much again
@@ -79,6 +80,7 @@ def prepare(
     given = wanted.given("exposure")
     open_for = exposure(in_motion, look, view) if given is None else Exposure(given, 0.0)
     in_motion.sort(key=lambda m: abs(m.rate) + abs(m.turning) * m.sight.reach)
+    in_motion = repeats_last(in_motion, [m.sight for m in in_motion])
     frames = [
         (
             m.picture.y,
@@ -103,6 +105,10 @@ def prepare(
         for (_, pose, _), m in zip(frames, in_motion, strict=True):
             pose.centre, pose.angle = _in_plane(bent.lens, m.sight, body)
         look = refine(look, frames, view, fixed=fixed)
+    else:
+        frames = frames[:0]
+    if len(frames) >= FEWEST:
+        look = refine(look, frames, view, 2, fixed)
     sharp: list[tuple[Picture, Pose, Motion]] = []
     for picture, sight in seen[:SHARP]:
         pose, motion = Pose(*_in_plane(look.lens, sight, body)), paths.get(picture.index, Motion())
@@ -163,7 +169,6 @@ def recalibrate(
         if rolling.value:
             estimates = {**known.estimates, **readout_estimate(rolling, wanted)}
             known = replace(known, look=replace(known.look, readout=rolling.value), estimates=estimates)
-    # row "exposure 40 ms, fast": 0.03 mm, 0.15 without
     if known.exposure and wanted.given("exposure") is None:
         paths = [(y, here.pose, here.motion) for y, here in frames]
         value = retimed(paths, known.exposure, known.look, known.view)

@@ -21,14 +21,15 @@ EACH_SIDE = 2  # neighbours on each side
 NEAR = 3.5  # intervals within which a neighbour tells anything
 KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
 FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
-# pixels; longer streaks are gone over once more, with what their neighbours turned out to be (rows "exposure
-# 40 ms, fast" and "shared: hard": a tenth to a fifth of the error)
-LONG = 25.0
+APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
+APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
+LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
 WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
 WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
 # where the second derivative jumps, as friction makes it where a disk turns back: its error times interval^2
 # against the miss, rms over the times at which it may jump, for the mean over a whole interval
 JUMP = 1.10
+FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def refine(
 ) -> Tracks:
     """Fit every frame again from what the first pass says about it and its neighbours.
 
-    A frame that the second pass does not hold keeps the first pass's pose. One that
+    A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
     the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
     streaks stay as they are. `look_at` gives each frame's look where it is not always the same.
     """
@@ -84,9 +85,15 @@ def _refine_frame(
     motion = here.motion(known.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
     fit = fit_and_check(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
+    reach = known.look.reach
     streak = known.look.streak(motion)
     if fit is None:
         return None
+    away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
+    if away > (APART if here.held else FORESEEN_APART) + APART_BY_STREAK * streak:
+        return None
+    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.held:
+        return None  # two pale streaks agree with much
     return found_in(float(tracks.t[k]), fit, pose, streak, "refined")
 
 
@@ -99,10 +106,7 @@ def weak(tracks: Tracks) -> NDArray[np.bool_]:
 
 
 def drop_weak(tracks: Tracks) -> Tracks:
-    """Give up the frames in which a long streak of two marks is all there is: it fits in many places.
-
-    Row "shared: hard": a tenth of the error.
-    """
+    """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
     why, marks = lost("too few marks in a long streak"), tracks.chi2.shape[1]
     return tracks.with_frames(
         {
