@@ -433,12 +433,12 @@ class _Search:
         for _ in range(_FOLDS):
             at = u + width * _STENCIL
             heights = self._heights(saddle, at, t, rounds)
-            bend, slope, level = np.polyfit(_STENCIL, heights, 2)
-            k = int(np.argmin(heights))
-            curved = bend > 0.0 and abs(slope) < 2.0 * bend * _STENCIL[-1]
             if not np.isfinite(heights).all():
                 width *= 0.1
                 continue
+            bend, slope, level = np.polyfit(_STENCIL, heights, 2)
+            k = int(np.argmin(heights))
+            curved = bend > 0.0 and abs(slope) < 2.0 * bend * _STENCIL[-1]
             if not curved:
                 # Downhill; the step grows only where the heights lie on a line.
                 u, width = float(at[k]), width * (1.6 if k in (0, len(at) - 1) else 0.4)

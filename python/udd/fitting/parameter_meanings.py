@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from udd.models import profile_of
-from udd.models.registry import MODELS
 
 _CAMERA = {
     "y0": "contact, to the right of where it was taken to be",
@@ -22,12 +21,6 @@ _CAMERA = {
     "theta0": "zero of the angle",
     "aside": "pivot to the right of where it was taken to be, in lengths of the pendulum",
     "above": "pivot above where it was taken to be, in lengths of the pendulum",
-}
-#: Parameters in words; of a name that several models have, as the disk has it.
-MEANINGS = {
-    name: text
-    for words in (*(cls.profile.shown.meanings for cls in reversed(MODELS.values())), _CAMERA)
-    for name, text in words.items()
 }
 
 

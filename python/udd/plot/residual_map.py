@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _BINS = 16
 _CHANCE = 1e-3  # over all cells together
-_SHORT = {"t": "time T", "R": "distance R", "beta": "β mod 2π", "Omega": "Ω", "theta": "θ"}
+_SHORT = {"t": "time T", "R": "R", "beta": "β mod 2π", "Omega": "Ω", "theta": "θ"}
 
 
 def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axes:
@@ -80,9 +80,10 @@ def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axe
                 Rectangle((c + 0.01, place + 0.02), 0.98, 0.96, fill=False, zorder=3 if clear else 0, **edge)
             )
             if r == len(rows) - 1:
-                words, unit, scale = AXES[columns[c]]
-                ax.text(c + 0.5, -0.06, _SHORT.get(columns[c], columns[c]), ha="center", va="top")
-                span = f"{scale * low:.3g} to {scale * high:.3g} {unit}".replace("-", "−")
+                _, unit, scale = AXES[columns[c]]
+                name = _SHORT.get(columns[c], columns[c]) + ("" if unit == "1" else f" [{unit}]")
+                ax.text(c + 0.5, -0.06, name, ha="center", va="top")
+                span = f"{scale * low:.3g} to {scale * high:.3g}".replace("-", "−")
                 ax.text(c + 0.5, -0.24, span, ha="center", va="top", fontsize="small")
     middles = [[(0.01, k + 0.5), (len(columns) - 0.01, k + 0.5)] for k in range(len(rows))]
     ax.add_collection(LineCollection(middles, color="black", linewidth=0.7, zorder=1))

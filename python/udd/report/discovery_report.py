@@ -155,10 +155,10 @@ def errors_table(discovery: Discovery) -> Table:
         "after": Column("with what was added", number=True),
         "floor": Column("noise floor", number=True),
     }
-    return table(errors_heading(discovery), _found(columns, discovery), tables.errors(discovery))
+    return table(errors_heading(discovery), columns_with(columns, discovery), tables.errors(discovery))
 
 
-def _found(columns: dict[str, Column], discovery: Discovery) -> dict[str, Column]:
+def columns_with(columns: dict[str, Column], discovery: Discovery) -> dict[str, Column]:
     """The columns without what there is only after something was added."""
     return {name: c for name, c in columns.items() if name != "after" or discovery.effects}
 
@@ -354,7 +354,7 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
         "after": Column(AFTER, number=True),
         "unit": Column("unit"),
     }
-    columns = _found(columns, discovery)
+    columns = columns_with(columns, discovery)
     fixed = [
         {**row, "before": row["value"], "after": row["value"], "unit": row["unit"] + " (taken as known)"}
         for row in tables.fixed(discovery)

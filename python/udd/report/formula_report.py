@@ -16,6 +16,7 @@ from udd.plot.style import MEASURED, tidy
 from . import figures, wording
 from .discovery_report import (
     BEFORE,
+    columns_with,
     errors_heading,
     errors_table,
     head,
@@ -138,12 +139,14 @@ def _others(discovery: Discovery) -> Section:
 
 
 def _numbers(discovery: Discovery) -> Section:
-    columns = {"name": Column("", names=True), "before": Column(BEFORE, number=True)}
-    if discovery.effects:
-        columns["after"] = Column("with what was added", number=True)
+    columns = {
+        "name": Column("", names=True),
+        "before": Column(BEFORE, number=True),
+        "after": Column("with what was added", number=True),
+    }
     caption = "Parameters, with standard errors"
     shown = (
-        table("The numbers", columns, parameters(discovery), caption),
+        table("The numbers", columns_with(columns, discovery), parameters(discovery), caption),
         Figure(_misfits(discovery.fit), "Measured less fitted. The band holds 95 % of honest noise."),
     )
     return Section("The numbers", shown)

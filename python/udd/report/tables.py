@@ -203,7 +203,7 @@ def _interval(e: tuple[float, float, float, float], unit: str) -> str:
 
 def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, str]]:
     """The best of the curves that were tried."""
-    scans = getattr(discovery, "curves", [])
+    scans = discovery.curves
     return [
         {"title": c.title, "evidence": f"{c.evidence:.1f}".replace("-", "−"), "p": wording.probability(c.p)}
         for c in (scans[stage][:most] if stage < len(scans) else [])

@@ -14,7 +14,6 @@ from markupsafe import Markup, escape
 from udd.discovery.thresholds import SAME as IDENTICAL
 from udd.discovery.validation.held_out_errors import at_the_floor as floor_reached
 from udd.effects.user_defined import is_spline as is_spline
-from udd.fitting.parameter_meanings import MEANINGS as MEANINGS
 
 if TYPE_CHECKING:
     from udd.discovery.results import AddedEffect, Alternative, Discovery
@@ -349,7 +348,7 @@ def limits(discovery: Discovery) -> list[str]:
             "An effect smaller than this record can show may still be there: nothing missing means nothing "
             "that these data demand."
         )
-    if getattr(discovery, "curves", []):
+    if discovery.curves:
         result.append(
             "Beside the effects of the library, every equation was searched for a smooth curve along each "
             "coordinate and pair of coordinates. What depends on more at once, or on what came before, is in "
