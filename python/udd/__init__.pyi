@@ -50,6 +50,7 @@ from .fitting import Fit as Fit
 from .fitting import fit as fit
 from .fitting.forecast import Forecast as Forecast
 from .fitting.forecast import forecast as forecast
+from .measurement import InputSignal as InputSignal
 from .measurement import Measurement as Measurement
 from .measurement import read_measurement as read_measurement
 from .measurement.smoother import smooth as smooth

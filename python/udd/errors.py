@@ -39,6 +39,10 @@ class IntegrationError(UddError):
     """A run could not go on: the solution blows up, or leaves the model's domain where it must not."""
 
 
+class MeasurementError(UddError):
+    """A measurement, or the file it comes from, cannot be used."""
+
+
 class FitError(UddError):
     """A measurement cannot be fitted by a model."""
 

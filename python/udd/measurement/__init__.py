@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from udd.errors import MeasurementError
+
+from .input_signal import InputSignal, input_signals
 from .read import read_measurement
-from .table import DISK, PENDULUM, Measurement, MeasurementError, check_length
+from .table import DISK, PENDULUM, Measurement, check_length
 
 __all__ = [
     "DISK",
     "PENDULUM",
+    "InputSignal",
     "Measurement",
     "MeasurementError",
     "check_length",
+    "input_signals",
     "read_measurement",
 ]

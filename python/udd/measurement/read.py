@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, MeasurementError, check_length
+from udd.errors import MeasurementError
+
+from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, check_length
 
 ALIASES = {
     "time": "t",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._util.labelled import dataset
-from udd.errors import UddError
+from udd.errors import MeasurementError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,10 +23,6 @@ ANGLES = ("beta", "theta")
 QUALITY = ("marks", "complete", "residual_px", "blur_px", "method")  # what a tracked film says of each frame
 USABLE = ("gap", "degraded")  # flags of frames that hold what they show all the same
 SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
-
-
-class MeasurementError(UddError):
-    """A measurement, or the file it comes from, cannot be used."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.atomic_files import write_whole
+from udd.errors import MeasurementError
 
-from .table import Measurement, MeasurementError
+from .table import Measurement
 
 
 def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:

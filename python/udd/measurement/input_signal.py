@@ -1,0 +1,135 @@
+"""A measured input as a function of time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd.errors import MeasurementError
+
+__all__ = ["Hold", "InputSignal", "input_signals"]
+
+Hold = Literal["zero", "linear", "cubic"]
+
+
+@dataclass(frozen=True, eq=False)
+class InputSignal:
+    """A measured input (exogenous signal): samples, and how it runs between them.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Times of the samples [s], strictly increasing; two at least.
+    values : array_like, shape (n,)
+        The samples, in units of the user's.
+    hold : {"linear", "zero", "cubic"}, default "linear"
+        Between samples: straight lines; the last sample held (zero-order hold, as a controller that was
+        sampled puts it out); or the natural cubic spline.
+
+    Raises
+    ------
+    MeasurementError
+        Times that do not increase, samples that are not finite, lengths that differ, an unknown hold.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.InputSignal([0.0, 0.5, 1.0], [0.0, 1.0, 0.0])([0.25, 0.5])
+    array([0.5, 1. ])
+    """
+
+    t: NDArray[np.float64]
+    values: NDArray[np.float64]
+    hold: Hold = "linear"
+
+    def __init__(self, t: ArrayLike, values: ArrayLike, hold: Hold = "linear") -> None:
+        if hold not in get_args(Hold):
+            raise MeasurementError(f"hold must be one of {', '.join(get_args(Hold))}, not {hold!r}")
+        columns = []
+        for name, given in (("times", t), ("samples", values)):
+            try:
+                column = np.array(given, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise MeasurementError(f"an input's {name} must be numbers") from None
+            if column.ndim != 1 or not np.isfinite(column).all():
+                raise MeasurementError(f"an input's {name} must be a list of finite numbers")
+            column.setflags(write=False)
+            columns.append(column)
+        times, samples = columns
+        if len(times) != len(samples) or len(times) < 2:
+            raise MeasurementError(
+                f"an input needs as many samples as times, two at least, not {len(samples)} and {len(times)}"
+            )
+        if (np.diff(times) <= 0).any():
+            row = int(np.argmax(np.diff(times) <= 0)) + 1
+            raise MeasurementError(
+                f"an input's times must increase; sample {row} does not come after the last"
+            )
+        for name, value in (("t", times), ("values", samples), ("hold", hold)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The times between which it is known [s]."""
+        return float(self.t[0]), float(self.t[-1])
+
+    def coefficients(self) -> NDArray[np.float64]:
+        """The polynomial between each two samples, over the time since the first of them.
+
+        Returns
+        -------
+        ndarray, shape (n - 1, 4)
+            Coefficients, lowest power first.
+        """
+        pieces = np.zeros((len(self.t) - 1, 4))
+        pieces[:, 0] = self.values[:-1]
+        if self.hold == "linear":
+            pieces[:, 1] = np.diff(self.values) / np.diff(self.t)
+        elif self.hold == "cubic":
+            from scipy.interpolate import CubicSpline
+
+            pieces = CubicSpline(self.t, self.values, bc_type="natural").c[::-1].T.copy()
+        return pieces
+
+    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Its values at times, of any shape; beyond its ends the value at the end."""
+        at = np.clip(np.asarray(t, dtype=np.float64), *self.span)
+        piece = np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, len(self.t) - 2)
+        since = at - self.t[piece]
+        powers = since[..., None] ** np.arange(4)
+        held = (self.coefficients()[piece] * powers).sum(axis=-1)
+        # A held sample lasts until the next one; the last one is met at the end.
+        return np.asarray(np.where(at >= self.t[-1], self.values[-1], held))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        first, last = self.span
+        return f"<InputSignal: {len(self)} samples, t = {first:.6g} to {last:.6g} s, {self.hold} hold>"
+
+
+def input_signals(
+    given: Mapping[str, InputSignal | ArrayLike] | None, t: NDArray[np.float64]
+) -> dict[str, InputSignal]:
+    """Inputs by name, each a signal, or samples at the times `t`.
+
+    Raises
+    ------
+    MeasurementError
+        What is none of these, naming the input.
+    """
+    signals = {}
+    for name, value in (given or {}).items():
+        if isinstance(value, InputSignal):
+            signals[str(name)] = value
+            continue
+        try:
+            signals[str(name)] = InputSignal(t, value)
+        except MeasurementError as error:
+            raise MeasurementError(f"the input {name}: {error}") from None
+    return signals
