@@ -42,7 +42,7 @@ from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
 from udd.fitting.record import Record
 from udd.fitting.thinning import Thinned
-from udd.measurement import Measurement
+from udd.measurement import InputSignal, Measurement
 from udd.models import Model
 from udd.models.profile import Coordinate
 from udd.models.serialization import effect_from_dict, effect_to_dict, model_from_dict, model_to_dict
@@ -53,7 +53,7 @@ FORMAT = "udd result 1"
 _TYPES: dict[str, type] = {
     cls.__name__: cls
     for cls in (
-        *(Fit, Problem, Point, Record, Noise, Free, Measurement, Thinned),
+        *(Fit, Problem, Point, Record, Noise, Free, InputSignal, Measurement, Thinned),
         *(diagnostics.Diagnostics, diagnostics.ModelError, diagnostics.Reading, diagnostics.RunawayParameter),
         *(Discovery, AddedEffect, Alternative, RejectedEffect, Candidate, Scored, Errors),
         *(Curve, Spline, Score, Absorbed),

@@ -173,6 +173,7 @@ def _averaged(
         None,
         meta,
         measurement.names,
+        inputs=measurement.inputs,
     )
 
 

@@ -121,5 +121,6 @@ def _scaled(measurement: Measurement, factors: Mapping[str, float]) -> tuple[Mea
         measurement.flag,
         measurement.meta,
         measurement.names,
+        inputs=measurement.inputs,
     )
     return scaled, int(measurement.seen.sum()) * float(np.log(sizes).sum())

@@ -9,7 +9,7 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from itertools import combinations
 from pathlib import Path
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from udd.errors import MeasurementError
 
+from .input_signal import InputSignal
 from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, check_length
 
 ALIASES = {
@@ -319,6 +320,8 @@ def _measurement(
     names: tuple[str, ...] = DISK if have & {"Y", "Z", "beta"} else PENDULUM
     if states is not None:
         names = tuple(states)
+    driven = _inputs(table)
+    table = _framed(table)
     t = need("t")
     if not len(t):
         raise MeasurementError("the file holds no rows")
@@ -344,11 +347,37 @@ def _measurement(
     if converted:
         told = ", ".join(f"{name} from {unit} to {COUNTED[name]}" for name, unit in converted.items())
         warnings.warn(f"{path}: converted {told}, as the names of its columns say", stacklevel=3)
-    meta = {"source": path.name} | extra | table.meta | meta
+    meta = {"source": path.name} | extra | {k: v for k, v in table.meta.items() if k != "input_hold"} | meta
     quality = _quality(table, names) if "px_per_m" in meta else {}
-    m = _located(table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality))
+    m = _located(table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality, driven))
     check_length(m)
     return m
+
+
+def _inputs(table: Table) -> dict[str, InputSignal]:
+    """The inputs that a file of the package holds: ``input:NAME``, over ``t:NAME`` where that is there."""
+    holds = table.meta.get("input_hold")
+    found = {}
+    for name in (n.removeprefix("input:") for n in table.names if n.startswith("input:")):
+        own = f"t:{name}" in table.names
+        t, values = _column(table, f"t:{name}" if own else "t"), _column(table, f"input:{name}")
+        there = ~np.isnan(t if own else values)
+        hold: Any = holds.get(name, "linear") if isinstance(holds, dict) else "linear"
+        try:
+            found[name] = InputSignal(t[there], values[there], hold)
+        except MeasurementError as error:
+            raise MeasurementError(f"the input {name}: {error}") from None
+    return found
+
+
+def _framed(table: Table) -> Table:
+    """The table without the rows at its end that hold only an input with a clock of its own."""
+    if not any(name.startswith("t:") for name in table.names):
+        return table
+    end, at = len(table.rows), table.names.index("t")
+    while end and not (len(table.rows[end - 1]) > at and table.rows[end - 1][at].strip()):
+        end -= 1
+    return replace(table, rows=table.rows[:end], lines=table.lines[:end])
 
 
 def _quality(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:

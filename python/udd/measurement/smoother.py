@@ -110,6 +110,7 @@ def smooth(measurement: Measurement, *, gap: float = 0.1, slip: float | None = N
         {**measurement.meta, **said},
         measurement.names,
         measurement.quality,
+        measurement.inputs,
     )
 
 

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from udd._util.labelled import dataset
 from udd.errors import MeasurementError
 
+from .input_signal import InputSignal, input_signals
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -53,11 +55,17 @@ class Measurement:
         What is known of how each row came about, by name (n,): of a tracked film ``marks`` (number seen),
         ``complete`` (share of the marks' edges in view), ``residual_px`` (r.m.s. misfit of the marks),
         ``blur_px`` (length of the streaks) and ``method`` ("refined", "fast" or "none").
+    inputs : mapping, optional
+        Measured inputs (what drives it) by name: an :class:`udd.InputSignal` with a clock of its own, or an
+        array (n,) of samples at `t`, joined by straight lines. Their units may stand in
+        ``meta["input_units"]``, as text by name. Picking rows keeps the signals whole: a model needs its
+        input between the rows.
 
     Raises
     ------
     MeasurementError
-        Times not increasing or duplicate, infinite values, sigma not positive, shapes that differ.
+        Times not increasing or duplicate, infinite values, sigma not positive, shapes that differ; an input
+        that is no signal, or has the name of a column.
 
     Examples
     --------
@@ -66,6 +74,11 @@ class Measurement:
     >>> m = Measurement(t, {"theta": 0.1 * np.cos(4 * t)}, meta={"source": "clock"})
     >>> m.kind, m.names, len(m), round(m.duration, 2)
     ('pendulum', ('theta',), 20, 0.76)
+    >>> driven = Measurement(t, {"theta": 0.1 * np.cos(4 * t)}, inputs={"u": np.sin(t)})
+    >>> driven
+    <Measurement of theta, driven by u: 20 rows, t = 0 to 0.76 s>
+    >>> driven["u"][:2], driven.inputs["u"](0.02)
+    (array([0. , 0.03998933]), array(0.01999467))
     """
 
     t: NDArray[np.float64]
@@ -76,6 +89,7 @@ class Measurement:
     meta: Mapping[str, Any] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     quality: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    inputs: Mapping[str, InputSignal] = field(default_factory=dict)
 
     def __init__(
         self,
@@ -87,6 +101,7 @@ class Measurement:
         meta: Mapping[str, Any] | None = None,
         names: tuple[str, ...] = (),
         quality: Mapping[str, ArrayLike] | None = None,
+        inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
     ) -> None:
         times = np.array(t, dtype=np.float64)
         if isinstance(values, Mapping):
@@ -120,6 +135,8 @@ class Measurement:
         if self.rho is not None and self.rho.shape != (n, len(self.pairs)):
             raise MeasurementError(f"rho has shape {self.rho.shape}, expected {(n, len(self.pairs))}")
         check(self, lambda i: f"row {i}")
+        put(self, "inputs", input_signals(inputs, times))
+        _check_inputs(self)
         for array in (times, table, self.sigma, self.rho, flags, *known.values()):
             if array is not None:
                 array.setflags(write=False)
@@ -148,7 +165,9 @@ class Measurement:
         return len(self.t)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A column by name (of `quality` too), or a standard error as ``sigma_<name>``."""
+        """A column by name (of `quality` too), a standard error as ``sigma_<name>``, or an input at `t`."""
+        if name in self.inputs:
+            return self.inputs[name](self.t)
         if name in self.quality and name not in self.names:
             return self.quality[name]
         table, column = self.values, name
@@ -176,11 +195,11 @@ class Measurement:
         return np.asarray(self.sigma[:, :, None] * correlation * self.sigma[:, None, :])
 
     def slice(self, t0: float, t1: float) -> Measurement:
-        """Rows with ``t0 <= t < t1`` [s]; the times keep their origin."""
+        """Rows with ``t0 <= t < t1`` [s]; the times keep their origin, and inputs are whole."""
         return self.rows((self.t >= t0) & (self.t < t1))
 
     def rows(self, mask: ArrayLike) -> Measurement:
-        """Rows that a boolean mask or an index array picks."""
+        """Rows that a boolean mask or an index array picks; inputs are whole."""
         pick = np.asarray(mask)
         return Measurement(
             self.t[pick],
@@ -191,10 +210,13 @@ class Measurement:
             self.meta,
             self.names,
             {name: column[pick] for name, column in self.quality.items()},
+            self.inputs,
         )
 
     def to_xarray(self) -> xr.Dataset:
-        """The measurement as labelled arrays: each column and its ``sigma_...`` over ``t``, and ``flag``.
+        """The measurement as labelled arrays: columns, their ``sigma_...``, ``flag`` and inputs over ``t``.
+
+        An input that was sampled at other times than `t` lies over times of its own, ``t_<name>``.
 
         Returns
         -------
@@ -218,11 +240,23 @@ class Measurement:
             units |= {f"sigma_{name}": units[name] for name in self.names if name in units}
         if len(self.flag):
             columns["flag"] = self.flag
-        return dataset(columns, ["t"], units, {"t": self.t})
+        found = dataset(columns, ["t"], units, {"t": self.t})
+        for name, signal in self.inputs.items():
+            at = "t" if self.on_rows(name) else f"t_{name}"
+            if at != "t":
+                found = found.assign_coords({at: (at, signal.t, {"units": "s"})})
+            unit = _unit_of(self.meta, name)
+            found[name] = (at, signal.values, {"hold": signal.hold} | ({"units": unit} if unit else {}))
+        return found
+
+    def on_rows(self, name: str) -> bool:
+        """Whether an input was sampled at the times of the rows."""
+        return np.array_equal(self.inputs[name].t, self.t)
 
     def __repr__(self) -> str:
         span = f", t = {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""
-        return f"<Measurement of {', '.join(self.names)}: {len(self)} rows{span}>"
+        driven = f", driven by {', '.join(self.inputs)}" if self.inputs else ""
+        return f"<Measurement of {', '.join(self.names)}{driven}: {len(self)} rows{span}>"
 
     def with_meta(self, **changes: Any) -> Measurement:
         """The same rows with entries of `meta` replaced or added."""
@@ -257,6 +291,22 @@ def _columns(values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]
         return np.column_stack([np.asarray(values[name], dtype=np.float64) for name in names])
     table = np.array(values, dtype=np.float64)
     return table[:, None] if table.ndim == 1 else table
+
+
+def _check_inputs(m: Measurement) -> None:
+    """Refuse an input whose name no formula can hold, or that means a column already."""
+    taken = {"t", "flag", *m.names, *m.quality, *(f"sigma_{name}" for name in m.names)}
+    taken |= {f"rho_{a}{b}" for a, b in m.pairs}
+    for name in m.inputs:
+        if not name.isidentifier():
+            raise MeasurementError(f"an input's name must be fit for a formula, like u_1, not {name!r}")
+        if name in taken:
+            raise MeasurementError(f"an input and a column are both called {name}")
+
+
+def _unit_of(meta: Mapping[str, Any], name: str) -> str:
+    units = meta.get("input_units")
+    return str(units.get(name, "")) if isinstance(units, Mapping) else ""
 
 
 def check(m: Measurement, where: Any) -> None:

@@ -7,6 +7,7 @@ import json
 import math
 import os
 from importlib import import_module
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -19,21 +20,24 @@ from .table import Measurement
 
 
 def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:
-    """Write `m` as CSV: ``# key = value`` lines, a header, one row per frame."""
+    """Write `m` as CSV: ``# key = value`` lines, a header, one row per frame.
+
+    An input is a column ``input:NAME``; one with its own clock has it in ``t:NAME`` beside it, and may go on
+    below the last frame.
+    """
     table = numbers(m)
-    flagged = bool((m.flag != "").any())
-
     words = {name: column.tolist() for name, column in m.quality.items() if column.dtype.kind not in "iuf"}
+    if (m.flag != "").any():
+        words["flag"] = m.flag.tolist()
+    driven = inputs(m)
 
-    lines = [f"# {key} = {_text(key, value)}" for key, value in m.meta.items()]
-    lines.append(",".join([*table, *words, *(["flag"] if flagged else [])]))
-    for i, row in enumerate(zip(*(column.tolist() for column in table.values()), strict=True)):
-        # repr: the shortest text that reads back exactly
-        cells = ["" if math.isnan(x) else repr(x) for x in row]
-        cells += [_cell(str(column[i])) for column in words.values()]
-        if flagged:
-            cells.append(_cell(str(m.flag[i])))
-        lines.append(",".join(cells))
+    lines = [f"# {key} = {_text(key, value)}" for key, value in header(m).items()]
+    lines.append(",".join([*table, *words, *driven]))
+    # repr: the shortest text that reads back exactly
+    columns = [["" if math.isnan(x) else repr(x) for x in column.tolist()] for column in table.values()]
+    columns += [[_cell(str(said)) for said in column] for column in words.values()]
+    columns += [[repr(x) for x in column.tolist()] for column in driven.values()]
+    lines += [",".join(cells) for cells in zip_longest(*columns, fillvalue="")]
     write_whole(path, ("\n".join(lines) + "\n").encode())
 
 
@@ -46,7 +50,13 @@ def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
     columns: dict[str, Any] = dict(numbers(m))
     columns |= {name: column.tolist() for name, column in m.quality.items() if column.dtype.kind not in "iuf"}
     columns["flag"] = [str(x) for x in m.flag]
-    schema = {key: _text(key, value) for key, value in m.meta.items()}
+    columns |= inputs(m)
+    longest = max(map(len, columns.values()))
+    columns = {
+        name: column if len(column) == longest else [*column, *[None] * (longest - len(column))]
+        for name, column in columns.items()
+    }
+    schema = {key: _text(key, value) for key, value in header(m).items()}
     buffer = io.BytesIO()
     pq.write_table(pa.table(columns, metadata=schema), buffer)
     write_whole(path, buffer.getvalue())
@@ -61,6 +71,22 @@ def numbers(m: Measurement) -> dict[str, NDArray[Any]]:
         table |= {f"rho_{a}{b}": m.rho[:, k] for k, (a, b) in enumerate(m.pairs)}
     table |= {name: column for name, column in m.quality.items() if column.dtype.kind in "iuf"}
     return table
+
+
+def inputs(m: Measurement) -> dict[str, NDArray[np.float64]]:
+    """The inputs' columns, each before it the times of its own where it has them."""
+    columns = {}
+    for name, signal in m.inputs.items():
+        if not m.on_rows(name):
+            columns[f"t:{name}"] = signal.t
+        columns[f"input:{name}"] = signal.values
+    return columns
+
+
+def header(m: Measurement) -> dict[str, Any]:
+    """What stands above the table: `meta`, and how each input runs between its samples."""
+    holds = {"input_hold": {name: signal.hold for name, signal in m.inputs.items()}} if m.inputs else {}
+    return {**m.meta, **holds}
 
 
 def _text(key: str, value: Any) -> str:

@@ -216,5 +216,9 @@ def _fitted(fit: Fit) -> Measurement:
     measurement = fit.measurement
     rest = np.where(np.isfinite(fit.residuals), fit.residuals, 0.0)
     return Measurement(
-        measurement.t, measurement.values - rest, meta=measurement.meta, names=measurement.names
+        measurement.t,
+        measurement.values - rest,
+        meta=measurement.meta,
+        names=measurement.names,
+        inputs=measurement.inputs,
     )
