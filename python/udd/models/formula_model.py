@@ -539,9 +539,8 @@ def _delays(
                 f"there is a delay of {name!r}, but the inputs are {', '.join(inputs) or 'none'}"
             )
         if parameter not in parameters:
-            raise ModelError(
-                f"the delay of {name} must be one of the parameters {', '.join(parameters)}, not {parameter!r}"
-            )
+            known = ", ".join(parameters) or "none"
+            raise ModelError(f"the delay of {name} must be one of the parameters {known}, not {parameter!r}")
     return tuple((delays or {}).items())
 
 
