@@ -120,7 +120,7 @@ class Run:
 
 
 def run(world: World, start: Sequence[float], duration: float) -> Run | None:
-    """The motion from a start [Omega, Y, Z, beta]; None where the disk leaves the wheels or spins up without end."""
+    """The motion from a start [Omega, Y, Z, beta]; None where the disk leaves the wheels or spins up."""
 
     def edge(_t: float, s: np.ndarray) -> float:
         return (EDGE * world.device.R) ** 2 - float(s[1] ** 2 + s[2] ** 2)
