@@ -1,140 +1,186 @@
-"""Reading a measurement: the package's own files, and the rough ones that laboratories keep."""
+"""Reading a measurement: from a file of any known kind, with a word on what each column was taken for."""
 
 from __future__ import annotations
 
-import csv
-import json
-import math
 import os
 import re
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from importlib import import_module
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import MeasurementError
 
-from .input_signal import InputSignal
+from .formats import HEAD, Table, format_of
+from .input_signal import Hold
+from .recorded import Frames, Recorded, own_inputs
 from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, check_length
 
-ALIASES = {
-    "time": "t",
-    "T": "t",
-    "Time": "t",
-    "angle": "theta",
-    "Angle": "theta",
-    "Theta": "theta",
-    "θ": "theta",
-}
-ALIASES |= {"β": "beta", "Beta": "beta", "X": "x"}
-#: Units that a column's name may state, and what they are in s, m and rad.
-UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0},
-    "m": {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
-    "rad": {
-        "rad": 1.0,
-        "mrad": 1e-3,
-        **dict.fromkeys(("deg", "degree", "degrees", "°"), math.pi / 180),
-        **dict.fromkeys(("rev", "turn", "turns"), 2 * math.pi),
-    },
-}
-#: In what a disk's and a pendulum's columns are counted.
-COUNTED: dict[str, str] = {"t": "s", "Y": "m", "Z": "m", "x": "m", "y": "m", "beta": "rad", "theta": "rad"}
-#: Names that a unit may follow without brackets; others may be states of a user's own model.
-_ENDING = ("t", "Y", "Z", "beta", "theta")
-NOTHING = {
-    "",
-    "nan",
-    "na",
-    "n/a",
-    "null",
-    "none",
-}  # what people and programs put into an empty cell
-
-
-@dataclass
-class Table:
-    """Cells as text, with the line each row came from."""
-
-    names: list[str]
-    rows: list[list[str]]
-    lines: list[int]
-    meta: dict[str, Any]
-    comma: bool = False  # decimal comma
-    units: dict[str, str] = field(default_factory=dict)  # as the columns' names state them
+Columns = str | Sequence[str] | Mapping[str, str | tuple[str, str]]
 
 
 def read_measurement(
     path: str | os.PathLike[str],
-    columns: str | Sequence[str] | None = None,
+    columns: Columns | None = None,
     states: Sequence[str] | None = None,
+    *,
+    inputs: str | Sequence[str] | Mapping[str, str] | None = None,
+    hold: Hold = "linear",
+    rate: float | None = None,
+    repeated: Literal["first"] | None = None,
+    part: int | None = None,
     **meta: Any,
 ) -> Measurement:
-    r"""Read a measured motion of a disk or of a pendulum.
+    r"""Read a measured motion of a disk, of a pendulum or of a machine of your own.
 
     Parameters
     ----------
     path : path
-        A text table (commas, semicolons, tabs or blanks; found by looking), or Parquet. Columns
-        ``t, Y, Z, beta`` for a disk or ``t, theta`` for a pendulum [s, m, rad]; a pendulum bob's
+        A text table (commas, semicolons, tabs or blanks; decimal commas; found by looking), Parquet, NumPy's
+        ``.npz`` and ``.npy``, MATLAB's ``.mat``, HDF5 (with MATLAB 7.3, needs h5py), a ``.zip`` of tables as
+        phyphox exports it, a Tracker project (``.trk``, ``.trz``) or Tracker's table of several points.
+        Columns ``t, Y, Z, beta`` for a disk or ``t, theta`` for a pendulum [s, m, rad]; a pendulum bob's
         ``t, x, y`` [m, pivot at the origin, y up] becomes theta = atan2(x, -y). Optional:
         ``sigma_*``, ``rho_*``, ``flag``. Lines ``# key = value`` become `meta`. Other columns, and
         lines above the header, are passed over. A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or
-        ``Y [mm]``, is converted to s, m or rad, and a warning tells so; columns of a user's own model stay in
-        the unit that the model counts in. An empty cell or NaN is a frame where it was not seen.
-    columns : str or sequence of str, optional
-        The columns' names in order, for a file without a (usable) header: ``"t,theta,_"``. An
-        underscore is a column to pass over.
+        ``Y [mm]``, is converted to s, m or rad, and a warning tells so. An empty cell or NaN is a frame where
+        it was not seen.
+    columns : mapping, str or sequence of str, optional
+        Which column is what: ``{"theta": "position"}``, or ``"theta=position"``; units that the columns'
+        names state are converted to s, m, rad and what these make, as rpm to rad/s. Two columns,
+        ``{"theta": ("mass A x", "mass A y")}``, are a bob's position. The time needs no word where it is
+        called so. Or, for a file without a (usable) header, the columns' names in order: ``"t,theta,_"``.
+        An underscore is a column to pass over.
     states : sequence of str, optional
-        The columns that are wanted, where they are states of a user's own :class:`udd.Model`.
+        The columns that are wanted, where they are states of a user's own :class:`udd.Model`; they stay in
+        the unit that the model counts in.
+    inputs : sequence of str or mapping, optional
+        Columns with what drove the machine: ``["torque"]``, or ``{"u": "Motor torque (N m)"}``. They keep
+        their unit, which stands in ``meta["input_units"]``. One from another table of the file, or of another
+        length, comes with its own clock; samples that are empty are left out.
+    hold : {"linear", "zero", "cubic"}, default "linear"
+        How these inputs run between their samples.
+    rate : float, optional
+        Samples per second [Hz] of a file that has no column of times.
+    repeated : {"first"}, optional
+        Of rows with the same time keep the first; otherwise they are refused.
+    part : int, optional
+        Where the clock jumps back: which of the stretches between its jumps, from 0.
     **meta
         Entries that win over those of the file, such as ``W=0.039``; None is ignored.
 
     Returns
     -------
     Measurement
-        Angles are unwrapped when the file holds them wrapped to one turn.
+        Angles are unwrapped when the file holds them wrapped to one turn. ``meta["columns"]`` says what each
+        column was taken for, where they are called otherwise in the file.
 
     Raises
     ------
     MeasurementError
-        The file is missing, empty or not a table; a column is missing; a cell is not a number;
+        The file is missing, empty, broken or of an unknown kind; a column is missing; a cell is not a number;
         times do not increase; a value is infinite; a sigma is not positive; too few usable rows.
 
     Examples
     --------
     >>> import pathlib, tempfile
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "swing.txt"
-    >>> rows = "".join(f"{i / 25} {0.3 * (-1)**i}\n" for i in range(12))
-    >>> _ = file.write_text("my swing\ntime angle\n" + rows)
+    >>> rows = "".join(f"{i / 25} {0.3 * (-1)**i} {i}\n" for i in range(12))
+    >>> _ = file.write_text("my swing\ntime angle torque\n" + rows)
     >>> read_measurement(file).kind
     'pendulum'
+    >>> m = read_measurement(file, columns={"q": "angle"}, inputs={"tau": "torque"})
+    >>> m
+    <Measurement of q, driven by tau: 12 rows, t = 0 to 0.44 s>
+    >>> m.meta["columns"]
+    {'t': 'time', 'q': 'angle', 'tau': 'torque, input'}
     """
     source = Path(path)
-    table = _load(source, columns)
+    mapping, given = _mapping(columns)
+    if isinstance(states, str):
+        raise MeasurementError(f"states is a list of columns, not {states!r}")
+    drivers = _drivers(inputs)
+    tables = _load(source, given)
+    about = {key: value for key, value in meta.items() if value is not None}
     try:
-        return _measurement(
-            table,
-            source,
-            {key: value for key, value in meta.items() if value is not None},
-            states,
-        )
+        record = Recorded(tables, mapping, rate=rate, repeated=repeated, part=part)
+        m, converted = _measurement(record, source, about, states, drivers, hold)
     except MeasurementError as error:
         raise MeasurementError(f"{source}: {error}") from None
+    if converted:
+        told = ", ".join(f"{name} from {units}" for name, units in converted.items())
+        warnings.warn(f"{source}: converted {told}, as the names of its columns say", stacklevel=2)
+    return m
 
 
-def columns_of(path: str | os.PathLike[str], columns: str | Sequence[str] | None = None) -> list[str]:
-    """The names of a table's columns, read as by :func:`read_measurement`."""
-    return _load(Path(path), columns).names
+def columns_of(path: str | os.PathLike[str], columns: Columns | None = None) -> list[str]:
+    """The names of a file's columns, read as by :func:`read_measurement`."""
+    mapping, given = _mapping(columns)
+    names = [heading.name for table in _load(Path(path), given) for heading in table.headings if heading.name]
+    return [*(mapping or {}), *(name for name in names if name not in (mapping or {}))]
 
 
-def _load(path: Path, columns: str | Sequence[str] | None) -> Table:
+def told(columns: Mapping[str, str]) -> str:
+    """What the columns were taken for (``meta["columns"]``), in a sentence."""
+    taken = [f"{name} from {text}" for name, text in columns.items() if name != "passed over"]
+    rest = f"; passed over: {columns['passed over']}" if "passed over" in columns else ""
+    return f"read {', '.join(taken)}{rest}"
+
+
+def _mapping(columns: Columns | None) -> tuple[dict[str, str | tuple[str, str]] | None, list[str] | None]:
+    """The columns by what they are, or else all their names in order."""
+    if columns is None:
+        return None, None
+    if isinstance(columns, Mapping):
+        for name, asked in columns.items():
+            pair = (
+                isinstance(asked, tuple | list) and len(asked) == 2 and all(isinstance(a, str) for a in asked)
+            )
+            if not isinstance(name, str) or not (isinstance(asked, str) or pair):
+                raise MeasurementError(f"columns needs the name of a column for {name}, not {asked!r}")
+        return {name: a if isinstance(a, str) else (a[0], a[1]) for name, a in columns.items()}, None
+    names = columns.split(",") if isinstance(columns, str) else columns
+    if not all(isinstance(name, str) for name in names):
+        raise MeasurementError(f"columns must be names of columns, not {columns!r}")
+    if isinstance(columns, str) and "=" in columns:
+        return dict(pairs(columns, "columns")), None
+    return None, [name.strip() for name in names]
+
+
+def pairs(text: str, what: str) -> dict[str, str]:
+    """``theta=position,x=Bob (m)`` as a mapping; of a name alone the column is called so.
+
+    Raises
+    ------
+    MeasurementError
+        A name or a column is missing.
+    """
+    found = {}
+    for one in text.split(","):
+        name, equals, column = (part.strip() for part in one.partition("="))
+        if not name or (equals and not column):
+            raise MeasurementError(f"{what} must look like theta=position, not {one.strip()!r}")
+        found[name] = column or name
+    return found
+
+
+def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str, str]:
+    """The inputs' columns by their names."""
+    if inputs is None:
+        return {}
+    if isinstance(inputs, str):
+        return pairs(inputs, "inputs")
+    found = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
+    if not all(isinstance(part, str) for pair in found.items() for part in pair):
+        raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
+    return found
+
+
+def _load(path: Path, given: list[str] | None) -> list[Table]:
     try:
         raw = path.read_bytes()
     except FileNotFoundError:
@@ -143,287 +189,106 @@ def _load(path: Path, columns: str | Sequence[str] | None) -> Table:
         raise MeasurementError(f"{path}: cannot be read ({error.strerror})") from None
     if not raw.strip():
         raise MeasurementError(f"{path}: the file is empty")
-    given = None
-    if columns is not None:
-        given = [c.strip() for c in (columns.split(",") if isinstance(columns, str) else columns)]
     try:
-        if raw[:4] == b"PAR1":
-            return _parquet(path)
-        return _text(raw, given)
+        return format_of(raw[:HEAD], path.suffix).read(raw, given)
     except MeasurementError as error:
         raise MeasurementError(f"{path}: {error}") from None
 
 
-def _text(raw: bytes, given: list[str] | None) -> Table:
-    if b"\0" in raw[:4096]:
-        raise MeasurementError("this is not a text table")
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    meta: dict[str, Any] = {}
-    body: list[tuple[int, str]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.lstrip().startswith("#"):
-            key, equals, value = line.lstrip().lstrip("#").partition("=")
-            if equals:
-                meta[key.strip()] = _value(value.strip())
-        elif line.strip():
-            body.append((number, line))
-    if not body:
-        raise MeasurementError("the file holds no rows")
-    mark = _delimiter([line for _, line in body])
-    comma = mark == ";" and sum("," in line for _, line in body) > len(body) / 2
-    cells = [_split(line, mark) for _, line in body]
-
-    head = next((i for i, row in enumerate(cells[:50]) if "t" in _named(row)), None)
-    if given is not None:
-        names, units = _named(given), _stated(given)
-        start = (
-            head + 1
-            if head is not None
-            else next(
-                (i for i, row in enumerate(cells) if len(row) > 1 and all(_numeric(c, comma) for c in row)),
-                len(cells),
-            )
-        )
-    elif head is not None:
-        names, units, start = _named(cells[head]), _stated(cells[head]), head + 1
-    else:
-        first = next(
-            (i for i, row in enumerate(cells) if all(_numeric(c, comma) for c in row)),
-            len(cells),
-        )
-        if first > 0 and len(cells[first - 1]) > 1:
-            raise MeasurementError(f"no column t: found {', '.join(cells[first - 1])}")
-        raise MeasurementError(
-            'no header names the columns: say what they are, for example columns="t,theta,_"'
-        )
-    return Table(names, cells[start:], [number for number, _ in body[start:]], meta, comma, units)
-
-
-def _delimiter(lines: list[str]) -> str:
-    for mark in "\t;,":
-        if sum(mark in line for line in lines) > len(lines) / 2:
-            return mark
-    return " "
-
-
-def _split(line: str, mark: str) -> list[str]:
-    if mark == " ":
-        return line.split()
-    return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")], delimiter=mark))]
-
-
-def _named(cells: list[str]) -> list[str]:
-    """Names without units and TeX: ``t_{1}``, ``T [s]`` and ``t_ms`` are all t."""
-    return [name for name, _unit in _columns_in(cells)]
-
-
-def _stated(cells: list[str]) -> dict[str, str]:
-    """The units that names state, by the names without them."""
-    return {name: unit for name, unit in _columns_in(cells) if unit}
-
-
-def _columns_in(cells: list[str]) -> list[tuple[str, str]]:
-    """Names and the units that they state; empty where they state none that is known."""
-    bare = [re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells]
-    names = [ALIASES.get(name, name) for name in bare]
-    result = []
-    for cell, plain, name in zip(cells, bare, names, strict=True):
-        stated = re.search(r"[\[(]\s*([^])]+?)\s*[])]", cell)
-        unit = stated.group(1) if stated else ""
-        # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
-        base, mark, ending = (
-            re.split(r"(_|/)(?=[^_/]*$)", plain, maxsplit=1) if re.search("[_/]", plain) else (plain, "", "")
-        )
-        known = ALIASES.get(base, base)
-        if mark and known in _ENDING and known not in names and _size(known, ending):
-            name, unit = known, ending
-        result.append((name, unit if _size(name.removeprefix("sigma_"), unit) else ""))
-    return result
-
-
-def _size(name: str, unit: str) -> float | None:
-    """What one of a unit is in the unit that a column is counted in; None where it is no unit of that."""
-    known = UNITS.get(COUNTED.get(name, ""), {})
-    return known.get(unit, known.get(unit.lower()))
-
-
-def _value(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
-
-
-def _numeric(cell: str, comma: bool) -> bool:
-    try:
-        _number(cell, comma)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(cell: str, comma: bool) -> float:
-    if cell.strip().lower() in NOTHING:
-        return float("nan")
-    if "_" in cell:  # Python would read 1_000
-        raise ValueError(cell)
-    return float(cell.replace(",", ".") if comma else cell)
-
-
-def _parquet(path: Path) -> Table:
-    try:
-        pq = import_module("pyarrow.parquet")
-    except ImportError:
-        raise MeasurementError("Parquet files need the package pyarrow (pip install pyarrow)") from None
-    try:
-        table = pq.read_table(path)
-    except (OSError, ValueError) as error:  # ArrowInvalid is a ValueError
-        raise MeasurementError(f"the Parquet file cannot be read ({error})") from None
-    stored = table.schema.metadata or {}
-    meta = {
-        k.decode(): _value(v.decode()) for k, v in stored.items() if k not in (b"pandas", b"ARROW:schema")
-    }
-    columns = [
-        ["" if x is None else str(x) for x in table.column(name).to_pylist()] for name in table.column_names
-    ]
-    rows = [list(row) for row in zip(*columns, strict=True)]
-    names = list(table.column_names)
-    return Table(_named(names), rows, list(range(1, len(rows) + 1)), meta, units=_stated(names))
-
-
 def _measurement(
-    table: Table, path: Path, meta: dict[str, Any], states: Sequence[str] | None = None
-) -> Measurement:
-    have = set(table.names)
-    if isinstance(states, str):
-        raise MeasurementError(f"states is a list of columns, not {states!r}")
-    wanted = _WANTED | set(states or ())
-    twice = next((n for n in table.names if n != "_" and table.names.count(n) > 1 and n in wanted), None)
-    if twice is not None:
-        raise MeasurementError(f"two columns are called {twice}")
-
-    def need(name: str) -> NDArray[np.float64]:
-        if name not in have:
-            raise MeasurementError(f"no column {name}: found {', '.join(n for n in table.names if n != '_')}")
-        unit = "" if states is not None else table.units.get(name, "")
-        size = _size(name.removeprefix("sigma_"), unit) if unit else 1.0
-        if size in (None, 1.0):
-            return _column(table, name)
-        if not name.startswith("sigma_"):
-            converted[name] = unit
-        return _column(table, name) * size
-
-    converted: dict[str, str] = {}
-    names: tuple[str, ...] = DISK if have & {"Y", "Z", "beta"} else PENDULUM
-    if states is not None:
-        names = tuple(states)
-    driven = _inputs(table)
-    table = _framed(table)
-    t = need("t")
-    if not len(t):
-        raise MeasurementError("the file holds no rows")
+    record: Recorded,
+    path: Path,
+    meta: dict[str, Any],
+    states: Sequence[str] | None,
+    drivers: dict[str, str],
+    hold: Hold,
+) -> tuple[Measurement, dict[str, str]]:
+    """What the columns make, and which units were converted."""
+    names, bob = _names(record, states)
+    convert = record.mapping is not None or states is None
+    frames = record.frames(("x", "y") if bob else names, convert=convert)
+    t = frames.times()
     extra: dict[str, Any] = {}
-    if names == PENDULUM and "theta" not in have and {"x", "y"} & have:
-        x, y = need("x"), need("y")
+    if bob:
+        x, y = frames.column("x"), frames.column("y")
         values = np.arctan2(x, -y)[:, None]
+        frames.taken["theta"] = f"atan2(x, -y) of {frames.taken.pop('x')} and {frames.taken.pop('y')}"
         extra["length"] = float(np.nanmedian(np.hypot(x, y))) if np.isfinite(x + y).any() else float("nan")
     else:
-        values = np.column_stack([need(name) for name in names])
-    flag = None
-    if "flag" in have:
-        k = table.names.index("flag")
-        flag = np.array([row[k] if k < len(row) else "" for row in table.rows], dtype=np.str_)
+        values = np.column_stack([frames.column(name) for name in names])
     for k in (k for k, name in enumerate(names) if name in ANGLES):
         values[:, k] = unwrap(values[:, k])
     sigma = rho = None
-    if any(f"sigma_{name}" in have for name in names):
-        sigma = np.column_stack([need(f"sigma_{name}") for name in names])
-    pairs = [f"rho_{a}{b}" for a, b in combinations(names, 2)]
-    if have & set(pairs):
-        rho = np.column_stack([need(name) for name in pairs])
-    if converted:
-        told = ", ".join(f"{name} from {unit} to {COUNTED[name]}" for name, unit in converted.items())
-        warnings.warn(f"{path}: converted {told}, as the names of its columns say", stacklevel=3)
-    meta = {"source": path.name} | extra | {k: v for k, v in table.meta.items() if k != "input_hold"} | meta
-    quality = _quality(table, names) if "px_per_m" in meta else {}
-    m = _located(table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality, driven))
+    if any(frames.has(f"sigma_{name}") for name in names):
+        sigma = np.column_stack([frames.column(f"sigma_{name}") for name in names])
+    between = [f"rho_{a}{b}" for a, b in combinations(names, 2)]
+    if any(frames.has(name) for name in between):
+        rho = np.column_stack([frames.column(name) for name in between])
+    flag = frames.words("flag") if frames.has("flag") else None
+    head = {k: v for k, v in frames.table.meta.items() if k != "input_hold"}
+    meta = {"source": path.name} | extra | head | meta
+    quality = _quality(frames, names) if "px_per_m" in meta else {}
+    signals = own_inputs(frames.whole)
+    units = {}
+    for name, asked in drivers.items():
+        if name not in signals:
+            signals[name], units[name] = frames.input(name, asked, hold)
+    if any(units.values()):
+        meta["input_units"] = {name: unit for name, unit in units.items() if unit} | meta.get(
+            "input_units", {}
+        )
+    if drivers or frames.renamed:
+        meta.setdefault("columns", frames.told())
+    m = _located(
+        frames.table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality, signals)
+    )
     check_length(m)
-    return m
+    return m, frames.converted
 
 
-def _inputs(table: Table) -> dict[str, InputSignal]:
-    """The inputs that a file of the package holds: ``input:NAME``, over ``t:NAME`` where that is there."""
-    holds = table.meta.get("input_hold")
-    found = {}
-    for name in (n.removeprefix("input:") for n in table.names if n.startswith("input:")):
-        own = f"t:{name}" in table.names
-        t, values = _column(table, f"t:{name}" if own else "t"), _column(table, f"input:{name}")
-        there = ~np.isnan(t if own else values)
-        hold: Any = holds.get(name, "linear") if isinstance(holds, dict) else "linear"
-        try:
-            found[name] = InputSignal(t[there], values[there], hold)
-        except MeasurementError as error:
-            raise MeasurementError(f"the input {name}: {error}") from None
-    return found
+def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, ...], bool]:
+    """The measurement's columns, and whether they are to be made of a bob's position."""
+    if states is not None:
+        return tuple(states), False
+    if record.mapping is not None:
+        return record.asked, False
+    have = record.names
+    if have & set(DISK):
+        return DISK, False
+    return PENDULUM, "theta" not in have and bool({"x", "y"} & have)
 
 
-def _framed(table: Table) -> Table:
-    """The table without the rows at its end that hold only an input with a clock of its own."""
-    if not any(name.startswith("t:") for name in table.names):
-        return table
-    end, at = len(table.rows), table.names.index("t")
-    while end and not (len(table.rows[end - 1]) > at and table.rows[end - 1][at].strip()):
-        end -= 1
-    return replace(table, rows=table.rows[:end], lines=table.lines[:end])
-
-
-def _quality(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+def _quality(frames: Frames, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """What a tracked film's file says of each frame; in anybody else's the names may mean anything."""
     found: dict[str, NDArray[Any]] = {}
-    for name in (n for n in QUALITY if n in table.names and n not in names):
+    for name in (n for n in QUALITY if frames.has(n) and n not in names):
         if name == "method":
-            k = table.names.index(name)
-            found[name] = np.array([row[k] if k < len(row) else "" for row in table.rows], dtype=np.str_)
+            found[name] = frames.words(name)
         else:
-            found[name] = _column(table, name)
+            found[name] = frames.column(name)
             if name == "marks" and np.isfinite(found[name]).all():
                 found[name] = found[name].astype(np.int64)
     return found
 
 
-_WANTED = {"t", "x", "y", "flag", *DISK, *PENDULUM}
-
-
-def _column(table: Table, name: str) -> NDArray[np.float64]:
-    k = table.names.index(name)
-    out = np.empty(len(table.rows))
-    for i, (row, line) in enumerate(zip(table.rows, table.lines, strict=True)):
-        if k >= len(row):
-            raise MeasurementError(
-                f"line {line} ends before column {name}: {len(row)} of {len(table.names)} cells"
-            )
-        try:
-            out[i] = _number(row[k], table.comma)
-        except ValueError:
-            raise MeasurementError(
-                f"line {line}: {row[k]!r} stands where a number for {name} should be"
-            ) from None
-    return out
-
-
 def _located(table: Table, make: Callable[[], Measurement]) -> Measurement:
-    """Say "line 7" where the table says "row 3"."""
+    """Say "line 7" where the table says "row 3", and what helps where times do not increase."""
     try:
         return make()
     except MeasurementError as error:
         said = re.match(r"row (\d+)", str(error))
         if said is None:
             raise
-        line = table.lines[int(said.group(1))]
-        raise MeasurementError(f"line {line}{str(error)[said.end() :]}") from None
+        rest = str(error)[said.end() :]
+        for beginning, help_ in _HELP.items():
+            rest += help_ if rest.startswith(beginning) else ""
+        raise MeasurementError(f"{table.place(int(said.group(1)))}{rest}") from None
+
+
+_HELP = {
+    " repeats the time": ' (repeated="first" keeps the first of such rows)',
+    " goes back in time": " (part=0, part=1 ... reads the rows between such jumps)",
+}
 
 
 def unwrap(angle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,85 @@
+"""What the heading of a column says: a name, and a unit."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+_ALIASES = {"T": "t", "angle": "theta", "Angle": "theta", "Theta": "theta", "θ": "theta", "β": "beta"}
+_ALIASES |= {"Beta": "beta", "X": "x"}
+_TIMES = {"time", "zeit", "temps", "tiempo", "tempo"}
+_TURN = 2 * math.pi
+_ANGLES = {
+    "rad": 1.0,
+    "mrad": 1e-3,
+    **dict.fromkeys(("deg", "degree", "degrees", "°"), math.pi / 180),
+    **dict.fromkeys(("rev", "turn", "turns"), _TURN),
+}
+_LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
+#: Units that a column's heading may state, and what they are in s, m, rad and what these make.
+UNITS: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
+    "m": _LENGTHS,
+    "rad": _ANGLES,
+    "m/s": {f"{unit}/s": size for unit, size in _LENGTHS.items()} | {"km/h": 1 / 3.6},
+    "rad/s": {
+        **{f"{unit}/s": size for unit, size in _ANGLES.items()},
+        **dict.fromkeys(("rpm", "rev/min", "1/min"), _TURN / 60),
+        **{"rps": _TURN, "dps": math.pi / 180},
+    },
+    "m/s^2": {f"{unit}/s{two}": size for unit, size in _LENGTHS.items() for two in ("^2", "²", "2")},
+    "rad/s^2": {f"{unit}/s{two}": size for unit, size in _ANGLES.items() for two in ("^2", "²", "2")},
+}
+#: In what a disk's and a pendulum's columns are counted.
+COUNTED: dict[str, str] = {"t": "s", "Y": "m", "Z": "m", "x": "m", "y": "m", "beta": "rad", "theta": "rad"}
+#: Names that a unit may follow without brackets; others may be states of a user's own model.
+_ENDING = ("t", "Y", "Z", "beta", "theta")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column's heading: as it stands, the name without unit and TeX, and the unit that it states."""
+
+    raw: str
+    name: str
+    unit: str = ""
+
+
+def headings(cells: Sequence[str]) -> list[Heading]:
+    """``t_{1}``, ``T [s]``, ``Time (ms)`` and ``t_ms`` are all t, the last two in ms."""
+    bare = [re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells]
+    names = [_symbol(name) for name in bare]
+    result = []
+    for cell, plain, name in zip(cells, bare, names, strict=True):
+        stated = re.search(r"[\[(]\s*([^])]+?)\s*[])]", cell)
+        unit = stated.group(1) if stated else ""
+        # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
+        base, mark, ending = (
+            re.split(r"(_|/)(?=[^_/]*$)", plain, maxsplit=1) if re.search("[_/]", plain) else (plain, "", "")
+        )
+        known = _symbol(base)
+        if mark and known in _ENDING and known not in names and size(known, ending):
+            name, unit = known, ending
+        result.append(Heading(cell.strip(), name, unit))
+    return result
+
+
+def _symbol(name: str) -> str:
+    return "t" if name.casefold() in _TIMES else _ALIASES.get(name, name)
+
+
+def size(name: str, unit: str) -> float | None:
+    """What one of a unit is in the unit that a column is counted in; None where it is no unit of that."""
+    return _size(COUNTED.get(name.removeprefix("sigma_"), ""), unit)
+
+
+def in_base_units(unit: str) -> tuple[float, str] | None:
+    """What one of any known unit is, and in what; None of an unknown one."""
+    return next(((one, base) for base in UNITS if (one := _size(base, unit)) is not None), None)
+
+
+def _size(base: str, unit: str) -> float | None:
+    known = UNITS.get(base, {})
+    return known.get(unit, known.get(unit.lower()))

@@ -1,0 +1,115 @@
+"""A table as a file holds it: columns under their headings, not yet a measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import MeasurementError
+
+from .headings import Heading
+
+#: What people and programs put into an empty cell.
+NOTHING = {"", "nan", "na", "n/a", "null", "none"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length.
+
+    `columns` are numbers, or cells as text (None where a row ends before them); `lines` the lines of the file
+    that the rows stand in, where it has lines; `name` that of the table, where a file holds several.
+    """
+
+    headings: list[Heading]
+    columns: list[NDArray[np.float64] | list[str | None]]
+    meta: dict[str, Any] = field(default_factory=dict)
+    lines: list[int] | None = None
+    comma: bool = False  # decimal comma
+    name: str = ""
+
+    def __len__(self) -> int:
+        return len(self.columns[0]) if self.columns else 0
+
+    @property
+    def found(self) -> list[str]:
+        """The headings of its columns, as they stand in the file."""
+        return [heading.raw for heading in self.headings if heading.name not in ("", "_")]
+
+    def find(self, asked: str) -> int | None:
+        """The column that is asked for: by its heading as it stands, else without unit, else in any case.
+
+        Raises
+        ------
+        MeasurementError
+            Several columns are called so.
+        """
+        ways = (
+            lambda heading: asked in (heading.raw, f"{self.name}/{heading.raw}"),
+            lambda heading: asked == heading.name,
+            lambda heading: asked.casefold() in (heading.raw.casefold(), heading.name.casefold()),
+        )
+        for way in ways:
+            there = [k for k, heading in enumerate(self.headings) if way(heading)]
+            if len(there) > 1:
+                raise MeasurementError(f"two columns are called {asked}")
+            if there:
+                return there[0]
+        return None
+
+    def numbers(self, k: int) -> NDArray[np.float64]:
+        """A column as numbers, NaN where a cell is empty.
+
+        Raises
+        ------
+        MeasurementError
+            A cell is not a number, or is not there.
+        """
+        column = self.columns[k]
+        if isinstance(column, np.ndarray):
+            return column
+        out = np.empty(len(column))
+        name = self.headings[k].name
+        for i, cell in enumerate(column):
+            if cell is None:
+                there = sum(other[i] is not None for other in self.columns)
+                raise MeasurementError(
+                    f"{self.place(i)} ends before column {name}: {there} of {len(self.columns)} cells"
+                )
+            try:
+                out[i] = number(cell, self.comma)
+            except ValueError:
+                raise MeasurementError(
+                    f"{self.place(i)}: {cell[:80]!r} stands where a number for {name} should be"
+                ) from None
+        return out
+
+    def words(self, k: int) -> NDArray[np.str_]:
+        """A column as text, empty where a cell is."""
+        return np.array([cell or "" for cell in self.columns[k]], dtype=np.str_)
+
+    def place(self, row: int) -> str:
+        """Where a row stands, in the user's terms."""
+        return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
+
+    def rows(self, pick: Sequence[int] | NDArray[np.int64]) -> Table:
+        """The table of some of its rows."""
+
+        def some(column: Any) -> Any:
+            return column[pick] if isinstance(column, np.ndarray) else [column[i] for i in pick]
+
+        lines = None if self.lines is None else some(self.lines)
+        return replace(self, columns=[some(column) for column in self.columns], lines=lines)
+
+
+def number(cell: str, comma: bool) -> float:
+    """The number in a cell, NaN where it is empty; ValueError where it is none."""
+    if cell.strip().lower() in NOTHING:
+        return float("nan")
+    if "_" in cell:  # Python would read 1_000
+        raise ValueError(cell)
+    return float(cell.replace(",", ".") if comma else cell)

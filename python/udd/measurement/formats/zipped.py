@@ -1,0 +1,57 @@
+"""Archives of tables, as phyphox exports them: one CSV file for each sensor."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import replace
+from pathlib import PurePosixPath
+
+from udd.errors import MeasurementError
+
+from . import text, tracker_project
+from .arrays import LARGEST
+from .numpy_arrays import told
+from .table import Table
+
+_TEXT = {".csv", ".txt", ".tsv", ".dat"}
+
+
+def read(raw: bytes, given: list[str] | None) -> list[Table]:
+    """Read each table of an archive but those about the phone (``meta/``); a Tracker project (.trz), too."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            inside = [info for info in archive.infolist() if not info.is_dir()]
+            names = [info.filename for info in inside]
+            if "xl/workbook.xml" in names:
+                raise MeasurementError("this is an Excel workbook: save its sheet as CSV")
+            wanted = [info for info in inside if _wanted(PurePosixPath(info.filename))]
+            if sum(info.file_size for info in wanted) > LARGEST:
+                raise MeasurementError("the archive unfolds to more than 1 GB")
+            contents = {info.filename: archive.read(info) for info in wanted}
+    except MeasurementError:
+        raise
+    except Exception as error:  # BadZipFile, zlib.error, a password, an unknown method ...
+        raise MeasurementError(f"the archive cannot be read: {told(error)}") from None
+    if not contents:
+        raise MeasurementError(
+            f"the archive holds no table (.csv): found {', '.join(names[:8]) or 'nothing'}"
+        )
+    tables: list[Table] = []
+    refused = ""
+    for name, content in contents.items():
+        path = PurePosixPath(name)
+        one = tracker_project if path.suffix.lower() == ".trk" else text
+        try:
+            tables += [replace(table, name=path.stem) for table in one.read(content, given)]
+        except MeasurementError as error:
+            refused = refused or f"{name} in the archive: {error}"
+    if not tables:
+        raise MeasurementError(refused)
+    return tables
+
+
+def _wanted(path: PurePosixPath) -> bool:
+    if path.parts[0] in ("meta", "__MACOSX") or path.name.startswith("."):
+        return False
+    return path.suffix.lower() in _TEXT | {".trk"}
