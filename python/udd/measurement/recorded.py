@@ -1,9 +1,9 @@
-"""Which columns of a file a measurement is made of: found by name, cut to one run of the clock, in base units."""
+"""Which columns of a file a measurement is made of: found by name, of one run of the clock, in base units."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -78,9 +78,9 @@ class Recorded:
                     break  # what is said of the time is said first
                 raise self.missing(_text((self.mapping or {}).get(name, name)))
         else:
+            tables = ", ".join(table.name or "of another length" for table in self.tables)
             raise MeasurementError(
-                f"{', '.join(names)} lie in tables with clocks of their own "
-                f"({', '.join(table.name or 'of another length' for table in self.tables)}): read them one by one"
+                f"{', '.join(names)} lie in tables with clocks of their own ({tables}): read them one by one"
             )
         raise self.missing("t")
 
