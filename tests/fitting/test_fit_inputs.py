@@ -71,3 +71,12 @@ def test_what_is_lacking_is_named() -> None:
     )
     with pytest.raises(FitError, match="the input u is known from t = 0 to 1, but the measurement goes"):
         udd.fit(short, ARM)
+
+
+def test_a_forecast_follows_the_input_of_its_own_measurement() -> None:
+    found = udd.fit(record(1, start=100.0), ARM)
+    other = record(2, start=-5.0)
+    ahead = udd.forecast(other, found, 5.0, start=3.0, members=20)
+    truth = np.interp(ahead.t, other.t, other["q"])
+    # Straight lines through an encoder's 1 mrad, and what the state is known to at the start.
+    assert np.sqrt(np.mean((ahead.median[:, 0] - truth) ** 2)) < 3e-3
