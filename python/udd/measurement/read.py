@@ -128,7 +128,13 @@ def told(columns: Any) -> str:
     """What the columns were taken for (``meta["columns"]``), in a sentence; empty if unknown."""
     if not isinstance(columns, Mapping):
         return ""
-    taken = [f"{name} from {text}" for name, text in columns.items() if name != "passed over"]
+    taken = [
+        f"input {name} from {text.removesuffix(', input')}"
+        if text.endswith(", input")
+        else f"{name} from {text}"
+        for name, text in columns.items()
+        if name != "passed over" and isinstance(text, str)
+    ]
     rest = f"; passed over: {columns['passed over']}" if "passed over" in columns else ""
     return f"read {', '.join(taken)}{rest}"
 
