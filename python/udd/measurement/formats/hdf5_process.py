@@ -3,7 +3,7 @@
     python -P hdf5_process.py LARGEST < FILE > ARRAYS
 
 It answers with an ``.npz`` of the data sets and, as JSON in the array ``about``, their paths and units, what
-else the file says, or an error. The HDF5 library may crash where a file is broken: then no other process ends.
+else the file says, or an error. The HDF5 library may crash where a file is broken: no other process ends.
 """
 
 from __future__ import annotations
