@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from udd.errors import UddError
+from udd.measurement.formats import is_table
 
 from . import limits
 
@@ -81,4 +82,4 @@ def _named(file: Path) -> Path:
     with file.open("rb") as opened:
         start = opened.read(4096)
     table = ".parquet" if start.startswith(b"PAR1") else ".csv"
-    return file.rename(file.with_suffix(".film" if table == ".csv" and b"\0" in start else table))
+    return file.rename(file.with_suffix(table if is_table(start) else ".film"))

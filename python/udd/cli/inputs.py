@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,7 +30,8 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         metavar="FILE",
         nargs="+" if several else 1,
         type=Path,
-        help="a film, or a measurement (CSV or Parquet: t,Y,Z,beta or t,theta, or t and your model's states)",
+        help="a film, or a measurement (a table as text, of Excel, phyphox, Tracker, MATLAB, NumPy, HDF5 or "
+        "Parquet: t,Y,Z,beta or t,theta, or t and your model's states)",
     )
     parser.add_argument(
         "--model",
@@ -43,7 +45,22 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
     add_pendulum(parser)
     parser.add_argument(
         "--columns",
-        help='names of the columns of a file without a header, such as "t,theta,_" (_: passed over)',
+        help='which column is what, such as "theta=position,t=Time (ms)", or the names of the columns of a '
+        'file without a header, such as "t,theta,_" (_: passed over)',
+    )
+    parser.add_argument(
+        "--inputs",
+        metavar="NAMES",
+        help='columns with what drove it, such as "torque" or "u=Motor torque (N m)"',
+    )
+    parser.add_argument(
+        "--sampling", type=float, metavar="HZ", help="samples a second, of a file without times"
+    )
+    parser.add_argument(
+        "--repeated", choices=["first"], help="of rows with the same time keep the first (else: refused)"
+    )
+    parser.add_argument(
+        "--part", type=int, metavar="N", help="where the clock jumps back: which of its runs, from 0"
     )
     add_partial(parser)
     if several:
@@ -67,7 +84,9 @@ def is_film(path: Path) -> bool:
             start = file.read(4096)
     except OSError:
         return False  # the reader of tables says what is wrong
-    return b"\0" in start and not start.startswith(b"PAR1")
+    from udd.measurement.formats import is_table
+
+    return not is_table(start, path.suffix)
 
 
 @dataclass(frozen=True)
@@ -113,7 +132,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     known = {"W": args.W, "R": args.R}
     if not is_film(args.file):
         from udd.measurement import read_measurement
-        from udd.measurement.read import columns_of
+        from udd.measurement.read import columns_of, told
 
         states = None
         if args.model is not None:
@@ -125,7 +144,19 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                     f"{args.file} has columns {', '.join(there)}, none of which is a state of {args.model}: "
                     f"{', '.join(model.state_names)}"
                 )
-        return read_measurement(args.file, args.columns, states, **known), None
+        measurement = read_measurement(
+            args.file,
+            args.columns,
+            states,
+            inputs=args.inputs,
+            rate=args.sampling,
+            repeated=args.repeated,
+            part=args.part,
+            **known,
+        )
+        if said := told(measurement.meta.get("columns")):
+            print(f"udd: {args.file}: {said}", file=sys.stderr)
+        return measurement, None
     if args.pendulum is not None:
         raise UddError(
             "a pendulum's film is tracked first (udd track --bob): --pendulum takes a table with t,theta"

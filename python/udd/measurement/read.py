@@ -124,9 +124,17 @@ def columns_of(path: str | os.PathLike[str], columns: Columns | None = None) -> 
     return [*(mapping or {}), *(name for name in names if name not in (mapping or {}))]
 
 
-def told(columns: Mapping[str, str]) -> str:
-    """What the columns were taken for (``meta["columns"]``), in a sentence."""
-    taken = [f"{name} from {text}" for name, text in columns.items() if name != "passed over"]
+def told(columns: Any) -> str:
+    """What the columns were taken for (``meta["columns"]``), in a sentence; empty if unknown."""
+    if not isinstance(columns, Mapping):
+        return ""
+    taken = [
+        f"input {name} from {text.removesuffix(', input')}"
+        if text.endswith(", input")
+        else f"{name} from {text}"
+        for name, text in columns.items()
+        if name != "passed over" and isinstance(text, str)
+    ]
     rest = f"; passed over: {columns['passed over']}" if "passed over" in columns else ""
     return f"read {', '.join(taken)}{rest}"
 
@@ -234,9 +242,9 @@ def _measurement(
         if name not in signals:
             signals[name], units[name] = frames.input(name, asked, hold)
     if any(units.values()):
-        meta["input_units"] = {name: unit for name, unit in units.items() if unit} | meta.get(
-            "input_units", {}
-        )
+        said = meta.get("input_units")
+        stated = {name: unit for name, unit in units.items() if unit}
+        meta["input_units"] = stated | (said if isinstance(said, dict) else {})
     if drivers or frames.renamed:
         meta.setdefault("columns", frames.told())
     m = _located(

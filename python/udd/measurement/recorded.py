@@ -1,4 +1,4 @@
-"""Which columns of a file a measurement is made of: found by name, of one run of the clock, in base units."""
+"""Which columns of a file make a measurement: found by name, cut to one run of the clock, in base units."""
 
 from __future__ import annotations
 
@@ -29,9 +29,8 @@ class Recorded:
     part: int | None = None
 
     def __post_init__(self) -> None:
-        if self.rate is not None and not (
-            np.isscalar(self.rate) and np.isfinite(self.rate) and self.rate > 0
-        ):
+        number = isinstance(self.rate, int | float) and not isinstance(self.rate, bool)
+        if self.rate is not None and not (number and 0 < self.rate < np.inf):
             raise MeasurementError(f"rate must be a positive number of samples per second, not {self.rate!r}")
         if self.repeated not in (None, "first"):
             raise MeasurementError(f'repeated must be "first" or None, not {self.repeated!r}')
@@ -76,11 +75,15 @@ class Recorded:
             if all(self.find(table, name) is None for table in self.tables):
                 if all(self.find(table, "t") is None for table in self.tables) and self.rate is None:
                     break  # what is said of the time is said first
-                raise self.missing(_text((self.mapping or {}).get(name, name)))
+                if self.mapping is None:
+                    raise MeasurementError(
+                        f"{self.missing(name)}; which of them is it, columns={{{name!r}: ...}}?"
+                    )
+                raise self.missing(_text(self.mapping.get(name, name)))
         else:
-            tables = ", ".join(table.name or "of another length" for table in self.tables)
+            clocks = ", ".join(table.name or f"{len(table)} rows" for table in self.tables)
             raise MeasurementError(
-                f"{', '.join(names)} lie in tables with clocks of their own ({tables}): read them one by one"
+                f"{', '.join(names)} lie in tables with clocks of their own ({clocks}): read them one by one"
             )
         raise self.missing("t")
 

@@ -35,7 +35,7 @@ def read_one(raw: bytes, given: list[str] | None) -> list[Table]:
     return tables_of({"column": array}, given)
 
 
-def told(error: Exception) -> str:
+def told(error: Exception | str) -> str:
     """What a library says, on one line and no longer than that."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else text[:157] + "..."
