@@ -253,12 +253,10 @@ class FormulaModel(Model):
             if name not in known:
                 raise ModelError(f"the model has no parameter {name!r}; it has {', '.join(known) or 'none'}")
         new = [(n, number(f"the parameter {n}", values.get(n, v))) for n, v in self.values]
-        effects = []
-        for effect in self.effects:
-            own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
-            effects.append(effect.replace(**own) if own else effect)
         changed = object.__new__(type(self))
-        changed._set(self.state_names, self.texts, tuple(new), self.angles, tuple(effects), self.mass)
+        changed._set(
+            self.state_names, self.texts, tuple(new), self.angles, self._effects_with(values), self.mass
+        )
         return changed
 
     def with_term(self, equation: str, term: Expression, **amplitude: float) -> FormulaModel:
