@@ -279,7 +279,7 @@ def test_a_film_too_short(shots: list[NDArray[np.uint8]], tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("radius", [-0.08, 0.0, float("nan"), float("inf")])
 def test_radius_must_be_a_length(film: Path, radius: float) -> None:
-    says(film, "disk_radius must be positive and finite", disk_radius=radius)
+    says(film, "disk_radius must be a positive number of metres", disk_radius=radius)
 
 
 # ---- the parts ---------------------------------------------------------------------------------------------

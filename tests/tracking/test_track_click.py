@@ -439,7 +439,7 @@ def test_clicks_that_cannot_be(
         ([film, "--click", str(old)], "is there already"),
         ([film, "--click", str(tmp_path / "no" / "new.toml")], "there is no folder"),
         ([film, "--click", str(tmp_path)], "is a folder"),
-        ([film, "--click", new, "--distance", "-1"], "distance must be positive"),
+        ([film, "--click", new, "--distance", "-1"], "distance must be a positive number"),
         ([film, "--click", new, "--distance", "0.1", "--scale", "900"], "distance and scale both say"),
         ([film, "--click", new, "--config", new], "cannot be read"),
         ([str(tmp_path / "none.mp4"), "--click", new], "there is no such file"),

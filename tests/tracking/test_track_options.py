@@ -53,7 +53,7 @@ def test_options_are_read_once_and_do_not_change() -> None:
     )
     with pytest.raises(FrozenInstanceError):
         options.fps = 25.0  # type: ignore[misc]
-    with pytest.raises(TrackError, match="pivot must be two finite numbers"):
+    with pytest.raises(TrackError, match="pivot must be two numbers of pixels"):
         TrackOptions(pivot=(1.0, float("nan")))
 
 

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.errors import ModelError
 from udd.models import Model
 
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
 from .pseudo_arclength import CurvePoint
-from .shooting_curve import PeriodicOrbitCurve
+from .shooting_curve import HELD, PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["AnyCurve", "BifurcationPoint", "Branch"]
+__all__ = ["AnyCurve", "BifurcationPoint", "Branch", "cycles_of"]
 
 Complex = NDArray[np.complex128]
 AnyCurve = EquilibriumCurve | PeriodicOrbitCurve
@@ -217,3 +218,19 @@ class Branch:
         return (
             f"<Branch of {what}, {self.parameter} = {ends}, {len(self)} points: {found or 'no bifurcation'}>"
         )
+
+
+def cycles_of(branch: Branch) -> PeriodicOrbitCurve:
+    """The curve of a branch of cycles that is followed over a parameter of a model that is not forced.
+
+    Raises
+    ------
+    ModelError
+        It is something else.
+    """
+    if not isinstance(branch, Branch) or branch.kind != "cycle":
+        raise ModelError("a branch of cycles is needed, of udd.continuation")
+    curve = branch._places[0][0]
+    if not isinstance(curve, PeriodicOrbitCurve) or curve.parameter == HELD or curve.flow.forcing is not None:
+        raise ModelError("the branch must be followed over a parameter of a model that is not forced")
+    return curve

@@ -20,6 +20,7 @@ from .equilibrium_search import equilibria, refined
 from .flow_map import Floats, FlowMap, flow_of
 from .invariant_manifolds import Eigendirection, direction_alone
 from .periodic_orbits import pieces_for
+from .solutions import FoundList
 
 __all__ = ["Connections", "connections"]
 
@@ -76,21 +77,8 @@ class _Part:
 _Found = tuple[int, Connection]  # when it came near the equilibrium at its end
 
 
-class Connections(list[Connection]):
-    """Connections in the order of their values.
-
-    Attributes
-    ----------
-    search : str
-        What was searched, and how.
-    """
-
-    def __init__(self, found: list[Connection], search: str) -> None:
-        super().__init__(found)
-        self.search = search
-
-    def __repr__(self) -> str:
-        return f"<{super().__repr__()}; {self.search}>"
+class Connections(FoundList[Connection]):
+    """Connections in the order of their values."""
 
 
 @renamed(longest="t_max")

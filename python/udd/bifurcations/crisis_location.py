@@ -14,11 +14,11 @@ from scipy.spatial import cKDTree
 from udd._util.validation import whole
 from udd.errors import IncompleteWarning, IntegrationError, ModelError
 
-from .branch import Branch
+from .branch import Branch, cycles_of
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats, FlowMap
 from .periodic_orbits import cycle_at
-from .shooting_curve import HELD, PeriodicOrbitCurve
+from .shooting_curve import PeriodicOrbitCurve
 from .solutions import PeriodicOrbit
 
 __all__ = ["Crisis", "crises"]
@@ -143,11 +143,7 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     >>> print(one.kind, one.side)
     boundary crisis above
     """
-    if not isinstance(branch, Branch) or branch.kind != "cycle":
-        raise ModelError("a branch of cycles is needed, of udd.continuation")
-    curve = branch._places[0][0]
-    if not isinstance(curve, PeriodicOrbitCurve) or curve.parameter == HELD or curve.flow.forcing is not None:
-        raise ModelError("the branch must be followed over a parameter of a model that is not forced")
+    cycles_of(branch)
     count, rounds = whole("n", n, 10), whole("depth", depth, 5)
     found = [one for side in (1.0, -1.0) for one in _Search(branch, side, count, rounds).crises()]
     distinct: list[Crisis] = []

@@ -10,12 +10,12 @@ from scipy.optimize import brentq
 
 from udd.errors import IntegrationError, ModelError
 
-from .branch import Branch
+from .branch import Branch, cycles_of
 from .equilibrium_search import equilibrium_at, refined
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats
 from .invariant_manifolds import direction_alone
-from .shooting_curve import HELD, PeriodicOrbitCurve
+from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["CycleConnection", "cycle_connections"]
@@ -106,11 +106,7 @@ def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleCon
     >>> print(one.kind, round(one.value, 9))
     equilibrium to cycle 3.691730046
     """
-    if not isinstance(branch, Branch) or branch.kind != "cycle":
-        raise ModelError("a branch of cycles is needed, of udd.continuation")
-    curve = branch._places[0][0]
-    if not isinstance(curve, PeriodicOrbitCurve) or curve.parameter == HELD or curve.flow.forcing is not None:
-        raise ModelError("the branch must be followed over a parameter of a model that is not forced")
+    curve = cycles_of(branch)
     if not isinstance(equilibrium, Equilibrium):
         raise ModelError(f"an equilibrium is needed, not {equilibrium!r}")
     growing = equilibrium.eigenvalues.real > 0.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize
@@ -17,7 +15,7 @@ from udd.models import Model, require_model
 from .equilibrium_curve import expansion
 from .flow_map import Floats, FlowMap, flow_of
 from .normal_forms import first_lyapunov_coefficient
-from .solutions import Equilibrium, kind_of_rest
+from .solutions import Equilibrium, FoundList, kind_of_rest
 
 __all__ = ["Equilibria", "equilibria", "equilibrium_at", "refined"]
 
@@ -26,21 +24,8 @@ _REST = 1e-9  # rates, in typical sizes per typical time, that are as good as no
 _REACHES = (0.3, 1.0, 3.0, 10.0)  # boxes in which the search starts, in typical sizes
 
 
-class Equilibria(list[Equilibrium]):
-    """The equilibria that a search found.
-
-    Attributes
-    ----------
-    search : str
-        Where it searched and how, in a sentence: what it did not find may still exist.
-    """
-
-    def __init__(self, found: Iterable[Equilibrium], search: str) -> None:
-        super().__init__(found)
-        self.search = search
-
-    def __repr__(self) -> str:
-        return f"<{super().__repr__()}; {self.search}>"
+class Equilibria(FoundList[Equilibrium]):
+    """The equilibria that a search found."""
 
 
 @renamed(starts="initial_states")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,27 @@ if TYPE_CHECKING:
 __all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
 
 Complex = NDArray[np.complex128]
+Found = TypeVar("Found")
 
 _ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
 _FAMILY = 1e-6  # of its period: by more no inaccuracy moves a neutral cycle
+
+
+class FoundList(list[Found]):
+    """What a search found.
+
+    Attributes
+    ----------
+    search : str
+        Where it searched and how, in a sentence: what it did not find may still exist.
+    """
+
+    def __init__(self, found: Iterable[Found], search: str) -> None:
+        super().__init__(found)
+        self.search = search
+
+    def __repr__(self) -> str:
+        return f"<{super().__repr__()}; {self.search}>"
 
 
 def kind_of_rest(eigenvalues: Complex) -> str:

@@ -413,12 +413,16 @@ class Search:
         # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
         alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
         pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
-        self._trying([" with ".join(c.title for c in pair) for pair in pairs])
+        return self._together(current, pairs)
 
-        def tried(pair: list[Candidate]) -> TrialFit | None:
-            return of_library(current.part, pair, [0.0] * sum(len(c.amplitude_names) for c in pair))
+    def _together(self, current: SearchState, groups: list[list[Candidate]]) -> list[TrialFit]:
+        """Several effects at once fitted in full, from none."""
 
-        return fitted_ones(self._each(tried, pairs))
+        def tried(group: list[Candidate]) -> TrialFit | None:
+            return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
+
+        self._trying([" with ".join(c.title for c in group) for group in groups])
+        return fitted_ones(self._each(tried, groups))
 
     def _group(self, current: SearchState, look: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
         """Several effects at once that pass only together."""
@@ -430,12 +434,7 @@ class Search:
             and fall > look.fit.faults
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
-        self._trying([" with ".join(c.title for c in group) for group in likely])
-
-        def tried(group: list[Candidate]) -> TrialFit | None:
-            return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
-
-        return self._accept(current, fitted_ones(self._each(tried, likely)), replace(look, looks=len(best)))
+        return self._accept(current, self._together(current, likely), replace(look, looks=len(best)))
 
     def _curves(self, current: SearchState, likely: list[Curve]) -> list[TrialFit]:
         """The likeliest curves, as splines and by short formulas."""

@@ -9,6 +9,15 @@ from .problem import Fit
 _UNITS = 24  # that the part which is fitted should at least be long
 
 
+def correlation_time(fit: Fit) -> float:
+    """The least over the states of standard deviation over root mean square rate; 0 where nothing moves."""
+    linked, dt = fit.record.linked, np.diff(fit.record.t)
+    rates = np.diff(fit.states, axis=0)[linked] / dt[linked, None]
+    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
+    moving = (rate > 0) & (spread > 0)
+    return float((spread[moving] / rate[moving]).min()) if moving.any() else 0.0
+
+
 def motion_time_scale(fit: Fit) -> float:
     """The unit of the times of this module: a second, or four times what a user's own motion takes to change.
 
@@ -18,10 +27,6 @@ def motion_time_scale(fit: Fit) -> float:
     """
     if not fit.model.profile.written:
         return 1.0
-    linked, dt = fit.record.linked, np.diff(fit.record.t)
-    rates = (np.diff(fit.states, axis=0)[linked]) / dt[linked, None]
-    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
-    moving = (rate > 0) & (spread > 0)
-    change = float((spread[moving] / rate[moving]).min()) if moving.any() else float(np.median(dt))
+    change = correlation_time(fit) or float(np.median(np.diff(fit.record.t)))
     longest = max(float(np.ptp(fit.record.t[fit.record.film == k])) for k in range(len(fit.models)))
     return max(change, min(4.0 * change, longest / _UNITS))

@@ -182,13 +182,15 @@ class Model:
                 raise ModelError(
                     f"{type(self).__name__} has no parameter {name!r}; it has {', '.join(known)}"
                 )
+        return self._changed({n: values[n] for n in self._plain if n in values}, self._effects_with(values))
+
+    def _effects_with(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
+        """The effects with other values of some parameters, named as the model's."""
         effects = []
         for effect in self.effects:
-            own = {
-                name: values[key] for name in effect.parameters if (key := f"{effect.name}.{name}") in values
-            }
+            own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
             effects.append(effect.replace(**own) if own else effect)
-        return self._changed({n: values[n] for n in self._plain if n in values}, tuple(effects))
+        return tuple(effects)
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
         """The model with these effects instead of its own.

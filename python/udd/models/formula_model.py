@@ -314,11 +314,7 @@ class FormulaModel(Model):
             if name not in known:
                 raise ModelError(f"the model has no parameter {name!r}; it has {', '.join(known) or 'none'}")
         new = [(n, number(f"the parameter {n}", values.get(n, v))) for n, v in self.values]
-        effects = []
-        for effect in self.effects:
-            own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
-            effects.append(effect.replace(**own) if own else effect)
-        return self._with(values=tuple(new), effects=tuple(effects))
+        return self._with(values=tuple(new), effects=self._effects_with(values))
 
     def with_inputs(self, *records: Mapping[str, InputSignal], record: int = 0) -> Self:
         """The model with what was measured of its inputs.

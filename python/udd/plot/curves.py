@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.errors import UddError
-
+from .inputs import require
 from .style import AFTER, ALIKE, AXES, BEFORE, FLOOR, MEASURED, new_axes, tidy
 
 if TYPE_CHECKING:
@@ -51,8 +50,7 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     -------
     Axes
     """
-    if not hasattr(curve, "coefficients") or not hasattr(curve, "slot"):
-        raise UddError(f"a curve of a scan can be drawn, not {type(curve).__name__}")
+    require(curve, "a curve of a scan can be drawn", "coefficients", "slot")
     ax = new_axes(ax)
     if len(curve.coordinates) == 2:
         return _surface(curve, ax)

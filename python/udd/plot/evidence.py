@@ -8,6 +8,7 @@ import numpy as np
 
 from udd.errors import UddError
 
+from .inputs import require
 from .style import AFTER, ALIKE, BEFORE, FAINT, FLOOR, new_axes, tidy
 
 if TYPE_CHECKING:
@@ -30,8 +31,7 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
     -------
     Axes
     """
-    if not hasattr(discovery, "scans"):
-        raise UddError(f"a discovery holds evidence, not {type(discovery).__name__}")
+    require(discovery, "a discovery holds evidence", "scans")
     if not 0 <= stage < len(discovery.scans):
         raise UddError(f"the discovery searched {len(discovery.scans)} times; there is no stage {stage}")
     scan = [s for s in discovery.scans[stage] if not s.absorbed][:most]
@@ -96,8 +96,7 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
-    if not hasattr(discovery, "error_before"):
-        raise UddError(f"a discovery holds errors, not {type(discovery).__name__}")
+    require(discovery, "a discovery holds errors", "error_before")
     from matplotlib.ticker import LogLocator
 
     before, after = discovery.error_before, discovery.error_after

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
-from .inputs import first_film, is_fit
+from .inputs import first_film, require_fit
 from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, label, new_axes, scale, tidy
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def residuals(
     UddError
         No such equation or coordinate, or not a fit.
     """
-    _check(fit)
+    require_fit(fit)
     names = fit.model.state_names
     if equation is not None and equation not in names:
         raise UddError(f"the model has equations for {', '.join(names)}, not for {equation}")
@@ -104,7 +104,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     -----
     Of several measurements that were fitted together the first is drawn.
     """
-    _check(fit)
+    require_fit(fit)
     fit = first_film(fit)
     names = fit.measurement.names
     channel = names[0] if channel is None else channel
@@ -216,8 +216,3 @@ def _remembered(y: Array) -> int:
         if float(x[lag:] @ x[:-lag]) < 0.1 * power:
             return 3 * lag
     return max(len(x) // 4, 1)
-
-
-def _check(fit: Any) -> None:
-    if not is_fit(fit):
-        raise UddError(f"a fit leaves residuals, not {type(fit).__name__}")

@@ -8,6 +8,7 @@ import numpy as np
 
 from udd.errors import UddError
 
+from .inputs import require
 from .style import AFTER, FAINT, MEASURED, label, new_axes, scale, tidy
 
 if TYPE_CHECKING:
@@ -36,8 +37,7 @@ def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
     UddError
         No such channel, or not a forecast.
     """
-    if not hasattr(result, "members") or not hasattr(result, "valid_time"):
-        raise UddError(f"a forecast has a fan, not {type(result).__name__}")
+    require(result, "a forecast has a fan", "members", "valid_time")
     names = result.names
     coordinate = coordinate or ("Z" if "Z" in names else names[0])
     if coordinate not in names:

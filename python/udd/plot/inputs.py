@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 #: The models whose motions are drawn, by the number of their states; of as many the first is meant.
 _BY_NUMBER = {len(cls.state_names): cls for cls in reversed(COMPILED.values())}
+_OF_A_FIT = ("misfit", "record")
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,20 @@ class Motion:
             ) from None
 
 
+def require(result: Any, said: str, *attributes: str) -> None:
+    """Refuse a result that has not all of these attributes, in a sentence that says what would."""
+    if not all(hasattr(result, name) for name in attributes):
+        raise UddError(f"{said}, not {type(result).__name__}")
+
+
+def require_fit(result: Any) -> None:
+    """Refuse what is no fit."""
+    require(result, "a fit leaves residuals", *_OF_A_FIT)
+
+
 def is_fit(result: Any) -> bool:
     """Whether a result is a fit of a model to a measurement."""
-    return hasattr(result, "misfit") and hasattr(result, "record")
+    return all(hasattr(result, name) for name in _OF_A_FIT)
 
 
 def first_film(fit: Any) -> Any:

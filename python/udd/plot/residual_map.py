@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.errors import UddError
-
 from .fits import binned, coordinates
-from .inputs import is_fit
+from .inputs import require_fit
 from .style import AFTER, AXES, BEFORE, EQUATIONS, new_axes
 
 if TYPE_CHECKING:
@@ -50,8 +48,7 @@ def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axe
 
     shown = [(fit, AFTER)] if before is None else [(before, BEFORE), (fit, AFTER)]
     for one, _ in shown:
-        if not is_fit(one):
-            raise UddError(f"a fit leaves residuals, not {type(one).__name__}")
+        require_fit(one)
     rows, columns = fit.model.state_names, list(coordinates(fit))
     cells = [_cells(one) for one, _ in shown]
     ax = new_axes(ax)

@@ -8,6 +8,7 @@ import numpy as np
 
 from udd.errors import UddError
 
+from .inputs import require
 from .style import AFTER, CHANNELS, FAINT, new_axes, tidy
 
 if TYPE_CHECKING:
@@ -45,10 +46,7 @@ def whiteness(
     UddError
         No such channel, or no innovations.
     """
-    if not hasattr(innovations, "autocorrelation"):
-        raise UddError(
-            f"innovations (udd.discovery) have an autocorrelation, not {type(innovations).__name__}"
-        )
+    require(innovations, "innovations (udd.discovery) have an autocorrelation", "autocorrelation")
     names = innovations.names
     channel = names[0] if channel is None else channel
     if channel not in names:

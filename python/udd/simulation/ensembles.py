@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
-from udd._util.validation import array, number
 from udd.errors import ModelError, interrupted
 from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
@@ -20,7 +19,7 @@ from udd.models.parameter_batch import orbits_of
 from .batch import Batch
 from .model_inputs import driven
 from .outcomes import OUTCOMES
-from .trajectory import method_for, tolerances
+from .trajectory import checked_times, method_for, tolerances
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -153,19 +152,9 @@ def ensemble(
     True
     """
     rtol, atol = tolerances(rtol, atol)
-    times = array("t", t)
-    if times.ndim == 0:
-        times = np.array([0.0, number("t", float(times), least=0.0)])
-        wanted = slice(1, 2)
-        if times[1] == 0.0:
-            times = times[:1]
-            wanted = slice(0, 1)
-    elif times.ndim == 1 and times.size:
-        wanted = slice(None)
-    else:
-        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
-    if not (np.diff(times) > 0).all():
-        raise ModelError("the times must increase, without duplicates")
+    times, wanted = checked_times(t), slice(None)
+    if isinstance(times, float):  # of the way there only the end is kept
+        times, wanted = np.array([0.0, times] if times else [0.0]), slice(-1, None)
     require_model(model)
     model = driven(model, times, inputs)
     shape, rows, starts = orbits_of(model, parameters or {}, state0)

@@ -221,6 +221,18 @@ def tolerances(rtol: float, atol: float) -> tuple[float, float]:
     return rtol, atol
 
 
+def checked_times(t: ArrayLike) -> NDArray[np.float64] | float:
+    """Checked times at which states are wanted, or the end of a run from 0."""
+    times = array("t", t)
+    if times.ndim > 1 or times.size == 0:
+        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
+    if times.ndim == 0:
+        return number("t", float(times), least=0.0)
+    if not (np.diff(times) > 0).all():
+        raise ModelError("the times must increase, without duplicates")
+    return times
+
+
 def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
     """A checked initial state."""
     require_model(model)
@@ -337,16 +349,11 @@ def integrated(
     state = initial_state(model, state0)
     rtol, atol = tolerances(rtol, atol)
     stepper = method_for(model, method, rtol)
-    times = array("t", t)
-    if times.ndim > 1 or times.size == 0:
-        raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
-    model = driven(model, times if times.ndim else np.array([0.0, float(times)]), inputs)
-    if times.ndim == 0:
-        end = number("t", float(times), least=0.0)
-        found = _core.simulate(model, None, end, state.tolist(), rtol, atol, stepper, dense)
+    times = checked_times(t)
+    model = driven(model, np.array([0.0, times]) if isinstance(times, float) else times, inputs)
+    if isinstance(times, float):
+        found = _core.simulate(model, None, times, state.tolist(), rtol, atol, stepper, dense)
     else:
-        if not (np.diff(times) > 0).all():
-            raise ModelError("the times must increase, without duplicates")
         found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, stepper, dense)
     events = Events(tuple(found["event_kind"]), found["event_t"], found["event_state"])
     stats = Stats(*found["counts"])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, TypedDict
 
 import numpy as np
@@ -114,13 +115,13 @@ class TrackOptions:
 
     def __post_init__(self) -> None:
         """Read each option, and refuse what contradicts itself."""
-        said: Any = self.layout
-        if is_tags(said):
-            self._set("tags", read_tags(said))
-        for name, read in _READERS.items():
+        for name in FIELDS:
             value = getattr(self, name)
             if value is not None:
-                self._set(name, read(value))
+                self._set(name, read_option(name, value))
+        if is_tags(self.layout):
+            self._set("tags", self.layout)
+            self._set("layout", layout_of(self.tags))
         if self.bob is not None:
             self._as_pendulum()
         elif self.length is not None:
@@ -192,8 +193,7 @@ def read_calibrate(said: Any) -> Calibrate:
     TrackError
         An item that there is not, or a value that it cannot have.
     """
-    if isinstance(said, Calibrate):
-        return said
+    said = asdict(said) if isinstance(said, Calibrate) else said
     switches = {item.name: item for item in SWITCHES}
     for name, value in table("calibrate", said, tuple(switches), error=TrackError).items():
         if isinstance(value, bool):
@@ -217,8 +217,7 @@ def read_sigma(said: Any) -> Sigma:
     TrackError
         A name that there is not, or a value that is no standard error.
     """
-    if isinstance(said, Sigma):
-        return said
+    said = asdict(said) if isinstance(said, Sigma) else said
     for name, value in table("sigma", said, _SIGMAS, error=TrackError).items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and math.isfinite(value) and value >= 0):
@@ -260,42 +259,69 @@ def read_region(said: Any) -> Region:
 _SIGMAS = {"pivot": "pixels", "scale": "pixels per metre", "layout": "m"}
 
 
-def length_of(value: float, name: str, unit: str = "metres") -> float:
-    """A positive, finite number."""
+def read_option(name: str, value: Any) -> Any:
+    """One option, as an argument or a config file says it.
+
+    Raises
+    ------
+    TrackError
+        A value of the wrong kind.
+    """
     try:
-        length = float(value)
-    except (TypeError, ValueError):
-        raise TrackError(f"{name} must be a number of {unit}, not {value!r}") from None
-    if not (math.isfinite(length) and length > 0):
-        raise TrackError(f"{name} must be positive and finite, not {value!r}")
-    return length
+        return _READERS[name](value)
+    except TrackError:
+        raise
+    except (TypeError, ValueError, OverflowError):
+        raise TrackError(f"{name} must be {FIELDS[name].metadata['kind']}, not {value!r}") from None
 
 
-def _pivot(said: Any) -> tuple[float, float]:
-    try:
-        u, v = (float(x) for x in said)
-    except (TypeError, ValueError):
-        u = v = math.nan
-    if not math.isfinite(u + v):
-        raise TrackError(f"pivot must be two finite numbers, not {said!r}")
-    return u, v
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+        raise TypeError
+    return float(value)
 
 
-def _marks(said: Any) -> Layout:
-    return layout_of(read_tags(said)) if is_tags(said) else read_layout(said)
+def positive(value: Any) -> float:
+    """A positive, finite number; TypeError or ValueError where it is none."""
+    if not _number(value) > 0:
+        raise ValueError
+    return float(value)
+
+
+def _place(value: Any) -> tuple[float, float]:
+    u, v = value
+    return _number(u), _number(v)
+
+
+def _switch(value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError
+    return bool(value)
+
+
+def _bob(value: Any) -> Any:
+    read_bob(value)
+    return value
+
+
+def _layout(value: Any) -> Any:
+    return read_tags(value) if is_tags(value) else read_layout(value)
 
 
 _READERS: dict[str, Callable[[Any], Any]] = {
-    "disk_radius": lambda x: length_of(x, "disk_radius"),
-    "mark_distance": lambda x: length_of(x, "mark_distance"),
-    "pivot": _pivot,
-    "scale": lambda x: length_of(x, "scale", "pixels per metre"),
+    "disk_radius": positive,
+    "mark_distance": positive,
+    "fps": positive,
+    "pivot": _place,
+    "refine": _switch,
+    "scale": positive,
     "region": read_region,
-    "layout": _marks,
+    "layout": _layout,
     "calibrate": read_calibrate,
     "sigma": read_sigma,
     "apart": read_apart,
-    "length": lambda x: length_of(x, "length"),
+    "bob": _bob,
+    "length": positive,
 }
 FIELDS = {f.name: f for f in fields(TrackOptions) if f.init}
 _OF_A_DISK = ("disk_radius", "mark_distance", "layout", "sigma", "apart")

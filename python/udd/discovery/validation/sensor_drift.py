@@ -9,6 +9,7 @@ from scipy.interpolate import BSpline
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.trial_fits import price_of
 from udd.fitting import Fit, eased
+from udd.fitting.time_scale import correlation_time
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def drift_gain(fit: Fit) -> float:
     is too short to tell a drift from its motion.
     """
     sd = fit.noise.sd(fit.record, fit.blurring) / np.sqrt(np.maximum(fit.noise.weight, 1e-12))[:, None]
-    change, total = _change(fit), 0.0
+    change, total = correlation_time(fit), 0.0
     for film in range(len(fit.models)):
         own = fit.record.film == film
         t = fit.record.t[own]
@@ -77,12 +78,3 @@ def as_random(known: Fit, found: Fit) -> Fit | None:
     if tight or likeliest.evidence - eased(known).evidence > EVIDENCE_MARGIN:
         return None
     return likeliest
-
-
-def _change(fit: Fit) -> float:
-    """How long the motion takes to change, s: the least over the states of spread over rate."""
-    linked, dt = fit.record.linked, np.diff(fit.record.t)
-    rates = np.diff(fit.states, axis=0)[linked] / dt[linked, None]
-    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
-    moving = (rate > 0) & (spread > 0)
-    return float((spread[moving] / rate[moving]).min()) if moving.any() else 0.0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd.tracking.calibration.config import Config, as_said, settings
 from udd.tracking.detection.survey import survey
-from udd.tracking.options import length_of
+from udd.tracking.options import positive
 from udd.video.reader import Film, TrackError
 
 from .questions import ClickSession, check
@@ -72,7 +72,10 @@ def click(
     said = dict(as_said({} if config is None else config)[1])
     known = settings({} if config is None else config)
     if distance is not None:
-        distance = length_of(distance, "distance")
+        try:
+            distance = positive(distance)
+        except (TypeError, ValueError):
+            raise TrackError(f"distance must be a positive number of metres, not {distance!r}") from None
     check(known, distance)
     film = Film(video, fps=known.get("fps"))
     figure = _figure()

@@ -51,10 +51,7 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOp
         return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive, drive_sigma)
 
     if options.pivot is not None:
-        place = complex(float(options.pivot[0]), float(options.pivot[1]))
-        if not np.isfinite(place):
-            raise TrackError(f"pivot must be two finite numbers, not {options.pivot!r}")
-        place, said = complex(known.look.lens.plane(place)), options.sigma.pivot
+        place, said = complex(known.look.lens.plane(complex(*options.pivot))), options.sigma.pivot
         if found is None or not said or not options.calibrate.pivot:
             return camera(place, said / size.value, "given")
         of_film = float(found.covariance[0, 0])
