@@ -104,7 +104,7 @@ fn lorenz() -> (FormulaFamily<3>, Vec<f64>) {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let equations = ["sigma*(y-x)", "x*(rho-z)-y", "x*y-beta*z"];
     let family =
-        FormulaFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]));
+        FormulaFamily::parse(&names(&["x", "y", "z"]), &equations, &names(&["sigma", "rho", "beta"]), &[]);
     (family.unwrap(), vec![10.0, 28.0, 8.0 / 3.0])
 }
 
@@ -139,7 +139,8 @@ fn crossed(isa: Isa, values: &[Vec<f64>], count: usize) -> Vec<f64> {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "B"]));
     let function =
-        Expression::parse("z", Names { states: &states, parameters: &parameters, rates: true }).unwrap();
+        Expression::parse("z", Names { states: &states, parameters: &parameters, inputs: &[], rates: true })
+            .unwrap();
     let wanted = SectionRun {
         family: &DleFamily,
         values,

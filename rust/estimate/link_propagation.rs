@@ -96,7 +96,8 @@ where
     let (sides, mut switched) = (*driver.sides(), false);
     while driver.t() != end {
         driver.advance(end)?;
-        switched |= *driver.sides() != sides;
+        // What only time switches needs no more care.
+        switched |= (0..driver.system().surfaces()).any(|j| driver.sides()[j] != sides[j]);
         steps += 1;
         if steps > MOST_STEPS {
             return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
@@ -127,7 +128,7 @@ where
         let mut laws = Vec::with_capacity(point.sets.len());
         for (film, set) in point.sets.iter().enumerate() {
             let values = lifted(film, &set.model);
-            laws.push(Law { system: self.family.build(&values), values });
+            laws.push(Law { system: self.family.build_for(film, &values), values });
         }
         laws
     }

@@ -215,7 +215,8 @@ where
         }
         let actors: Vec<Vec<DifferentiatedSystem<F::Built<Wide>>>> =
             values.iter().enumerate().map(|(film, values)| actors(family, film, values, free)).collect();
-        let systems: Vec<F::Built<f64>> = values.iter().map(|values| family.build(values)).collect();
+        let systems: Vec<F::Built<f64>> =
+            (0..).zip(values).map(|(film, values)| family.build_for(film, values)).collect();
 
         in_blocks(&mut columns.seen, M, &|i, rows| {
             let film = self.record.film[i];
@@ -345,7 +346,7 @@ fn actors<F: Family<D>, const D: usize>(
     acting(free, film, model)
         .chunks(WIDTH)
         .map(|chunk| DifferentiatedSystem {
-            system: family.build(&tagged(values, chunk, 0)),
+            system: family.build_for(film, &tagged(values, chunk, 0)),
             columns: columns_of(chunk),
         })
         .collect()

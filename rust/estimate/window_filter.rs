@@ -59,7 +59,8 @@ where
         starts: &[(usize, f64, [f64; D])],
         times: &[Vec<f64>],
     ) -> Result<Vec<Vec<[f64; M]>>, EstimateError> {
-        let systems: Vec<F::Built<f64>> = sets.iter().map(|set| self.family.build(&set.model)).collect();
+        let systems: Vec<F::Built<f64>> =
+            (0..).zip(sets).map(|(film, set)| self.family.build_for(film, &set.model)).collect();
         try_map(starts.len().min(times.len()), &|i| {
             let ((film, t, x), times) = (starts[i], &times[i]);
             let (system, set) = (&systems[film], &sets[film]);

@@ -62,6 +62,8 @@ pub struct Kinks {
     pub surfaces: Vec<Expression>,
     /// Whether a formula jumps there.
     pub jumps: Vec<bool>,
+    /// One surface fewer, which is kept for the [clock](crate::model::System::clock).
+    pub clocked: bool,
 }
 
 impl Kinks {
@@ -97,7 +99,7 @@ impl Kinks {
         if let Some(j) = self.surfaces.iter().position(|known| known.ops == ops) {
             return Some(j);
         }
-        if self.surfaces.len() == MAX_SURFACES {
+        if self.surfaces.len() + usize::from(self.clocked) == MAX_SURFACES {
             return None;
         }
         self.surfaces.push(Expression::of(ops));

@@ -35,6 +35,8 @@ pub struct Names<'a> {
     /// The state's components.
     pub states: &'a [String],
     pub parameters: &'a [String],
+    /// Measured inputs.
+    pub inputs: &'a [String],
     /// Whether `name'` is the rate of a component of the state.
     pub rates: bool,
 }
@@ -53,6 +55,8 @@ pub enum Leaf {
     /// The time derivative of a component of the state.
     Rate(usize),
     Parameter(usize),
+    /// A measured input.
+    Input(usize),
 }
 
 /// A function of one number.
@@ -128,6 +132,7 @@ pub struct Place<'a, S> {
     /// May be empty where the formula [has no rates](Expression::has_rates).
     pub rates: &'a [S],
     pub parameters: &'a [S],
+    pub inputs: &'a [S],
 }
 
 /// A formula, ready to be evaluated.
@@ -135,9 +140,9 @@ pub struct Place<'a, S> {
 /// ```
 /// use udd::formula::{Expression, Names, Place};
 /// let states = ["omega", "y", "z"].map(String::from);
-/// let names = Names { states: &states, parameters: &["w".to_owned()], rates: false };
+/// let names = Names { states: &states, parameters: &["w".to_owned()], inputs: &[], rates: false };
 /// let energy = Expression::parse("(y^2 + z^2)/2 = w", names).unwrap();
-/// let place = Place { t: 0.0, x: &[1.0, 2.0, 4.0], rates: &[], parameters: &[7.0] };
+/// let place = Place { t: 0.0, x: &[1.0, 2.0, 4.0], rates: &[], parameters: &[7.0], inputs: &[] };
 /// assert_eq!(energy.value(&place, &mut energy.stack()), 3.0);
 /// assert!(Expression::parse("q - 1", names).is_err());
 /// ```
@@ -203,7 +208,9 @@ impl Expression {
 
     /// Whether it changes in time, by the state or by itself.
     pub fn varies(&self) -> bool {
-        self.ops.iter().any(|op| matches!(op, Op::Push(Leaf::Rate(_) | Leaf::State(_) | Leaf::Time)))
+        self.ops
+            .iter()
+            .any(|op| matches!(op, Op::Push(Leaf::Rate(_) | Leaf::State(_) | Leaf::Time | Leaf::Input(_))))
     }
 
     /// Its value.
@@ -225,6 +232,7 @@ impl Expression {
             Leaf::State(n) => place.x[n],
             Leaf::Rate(n) => place.rates[n],
             Leaf::Parameter(i) => place.parameters[i],
+            Leaf::Input(k) => place.inputs[k],
         };
         self.evaluate(leaf, sides, stack)
     }

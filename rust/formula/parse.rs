@@ -314,6 +314,8 @@ impl Parser<'_> {
             if self.names.rates && self.takes("'") { Leaf::Rate(n) } else { Leaf::State(n) }
         } else if let Some(i) = find(self.names.parameters) {
             Leaf::Parameter(i)
+        } else if let Some(k) = find(self.names.inputs) {
+            Leaf::Input(k)
         } else if name == "t" {
             Leaf::Time
         } else if name == "pi" {
@@ -368,11 +370,14 @@ fn allowed(names: Names<'_>) -> String {
     };
     let (unary, binary) = (FUNCTIONS.map(|(name, _)| name), BINARY.map(|(name, _)| name));
     let functions = [&unary[..], &binary, &[WHERE], &SPLINES].concat().join(", ");
-    let parameters = match names.parameters {
+    let listed = |what: &str, list: &[String]| match list {
         [] => String::new(),
-        list => format!(", the parameters {}", list.join(", ")),
+        list => format!(", the {what} {}", list.join(", ")),
     };
-    format!("allowed are the state {states}{rates}, the time t{parameters}, numbers, pi and {functions}")
+    let (inputs, parameters) = (listed("inputs", names.inputs), listed("parameters", names.parameters));
+    format!(
+        "allowed are the state {states}{rates}, the time t{inputs}{parameters}, numbers, pi and {functions}"
+    )
 }
 
 fn number(ops: &[Op]) -> Option<f64> {

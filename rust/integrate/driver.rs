@@ -278,6 +278,32 @@ where
     /// reaches it exactly.
     #[inline(always)]
     pub fn trial(&mut self, end: S::Real) -> Progress<S::Mask> {
+        // Laws with measured inputs do not go in packets.
+        if const { !M::SMOOTH && S::Real::LANES == 1 }
+            && let Some(clock) = self.system.clock()
+        {
+            return self.trial_to_knot(clock, end);
+        }
+        self.trial_within(end)
+    }
+
+    /// The same at most up to the next knot of the law's inputs, behind which the next step feels the next pieces.
+    #[inline(never)]
+    fn trial_to_knot(&mut self, clock: usize, end: S::Real) -> Progress<S::Mask> {
+        let at = &self.run.at;
+        let Some(knot) = self.system.next_knot(at.t, &at.sides, end) else { return self.trial_within(end) };
+        let progress = self.trial_within(S::Real::constant(knot));
+        if self.run.at.t.lane(0) == knot {
+            let (everywhere, size) = (S::mask(true), self.run.size);
+            let StepStart { t, x, sides } = &mut self.run.at;
+            pass(&self.system, clock, *t, size, x, sides, everywhere);
+            self.begin(everywhere);
+        }
+        progress
+    }
+
+    #[inline(always)]
+    fn trial_within(&mut self, end: S::Real) -> Progress<S::Mask> {
         let run = &mut self.run;
         let remaining = end - run.at.t;
         // An end that is not a number leaves its lane active, to fail.
@@ -745,6 +771,9 @@ fn tick<R: Real>(lanes: R::Mask, count: R, by: f64) -> R {
 /// At a start exactly on a surface the side is the one the flow goes to.
 #[inline(always)]
 fn start_sides<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &mut StepStart<S, D>, h: S::Real) {
+    if let Some(clock) = system.clock() {
+        at.sides[clock] = S::mask(system.clock_side(at.t, h.lane(0) >= 0.0));
+    }
     for j in 0..system.surfaces() {
         let value = system.surface(j, S::lift(at.t), &at.x, &at.sides).real();
         let on = S::Mask::from_lanes(|i| value.lane(i) == 0.0);

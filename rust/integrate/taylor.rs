@@ -135,7 +135,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
 
     fn attempt(
         &mut self,
-        _system: &impl System<S, D>,
+        system: &impl System<S, D>,
         at: &StepStart<S, D>,
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
@@ -143,6 +143,9 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
         if !self.held || self.tape.switches_held() {
             self.jets.hold(self.tape, &self.parameters, &at.sides);
             self.held = true;
+        }
+        if self.tape.is_driven() {
+            self.jets.set_inputs(self.tape, &|k| system.input(k, at.t, &at.sides));
         }
         let mut trial = S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm });
         // What is written out is known to have no gaps.

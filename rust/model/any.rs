@@ -1,6 +1,6 @@
 //! A system whose type is forgotten.
 
-use super::{Sides, System};
+use super::{Piece, Sides, System};
 use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
@@ -17,6 +17,10 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask);
     fn jumps(&self, j: usize) -> bool;
     fn wall(&self, x: &[S; D]) -> Option<S>;
+    fn clock(&self) -> Option<usize>;
+    fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64>;
+    fn clock_side(&self, t: S::Real, forwards: bool) -> bool;
+    fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S>;
     fn beyond(
         &self,
         at: &StepStart<S, D>,
@@ -53,6 +57,18 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     }
     fn wall(&self, x: &[S; D]) -> Option<S> {
         System::wall(self, x)
+    }
+    fn clock(&self) -> Option<usize> {
+        System::clock(self)
+    }
+    fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64> {
+        System::next_knot(self, t, sides, end)
+    }
+    fn clock_side(&self, t: S::Real, forwards: bool) -> bool {
+        System::clock_side(self, t, forwards)
+    }
+    fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
+        System::input(self, k, t, sides)
     }
     fn beyond(
         &self,
@@ -92,6 +108,18 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     }
     fn wall(&self, x: &[S; D]) -> Option<S> {
         AnySystem::wall(&**self, x)
+    }
+    fn clock(&self) -> Option<usize> {
+        AnySystem::clock(&**self)
+    }
+    fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64> {
+        AnySystem::next_knot(&**self, t, sides, end)
+    }
+    fn clock_side(&self, t: S::Real, forwards: bool) -> bool {
+        AnySystem::clock_side(&**self, t, forwards)
+    }
+    fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
+        AnySystem::input(&**self, k, t, sides)
     }
     fn beyond(
         &self,

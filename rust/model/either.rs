@@ -1,6 +1,6 @@
 //! One of two models of the same dimension.
 
-use super::{Family, Parameter, Sides, System};
+use super::{Family, Parameter, Piece, Sides, System};
 use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
@@ -67,6 +67,19 @@ where
         ask!(self, model => model.wall(x))
     }
     #[inline(always)]
+    fn clock(&self) -> Option<usize> {
+        ask!(self, model => model.clock())
+    }
+    fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64> {
+        ask!(self, model => model.next_knot(t, sides, end))
+    }
+    fn clock_side(&self, t: S::Real, forwards: bool) -> bool {
+        ask!(self, model => model.clock_side(t, forwards))
+    }
+    fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
+        ask!(self, model => model.input(k, t, sides))
+    }
+    #[inline(always)]
     fn beyond(
         &self,
         at: &StepStart<S, D>,
@@ -102,6 +115,28 @@ impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
         match self {
             Either::First(family) => Either::First(family.build(values)),
             Either::Second(family) => Either::Second(family.build(values)),
+        }
+    }
+
+    fn build_for<S: Scalar>(&self, record: usize, values: &[S]) -> Either<A::Built<S>, B::Built<S>> {
+        match self {
+            Either::First(family) => Either::First(family.build_for(record, values)),
+            Either::Second(family) => Either::Second(family.build_for(record, values)),
+        }
+    }
+
+    fn inputs(&self) -> usize {
+        ask!(self, family => family.inputs())
+    }
+
+    fn is_open(&self) -> bool {
+        ask!(self, family => family.is_open())
+    }
+
+    fn build_at<S: Scalar>(&self, values: &[S], inputs: Vec<S>) -> Either<A::Built<S>, B::Built<S>> {
+        match self {
+            Either::First(family) => Either::First(family.build_at(values, inputs)),
+            Either::Second(family) => Either::Second(family.build_at(values, inputs)),
         }
     }
 }

@@ -2,22 +2,35 @@
 
 use std::sync::Arc;
 
-use super::{Family, Parameter, Sides, System, parameter};
+use super::{Family, Inputs, Parameter, Piece, Sides, Signals, System, parameter};
 use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::vector;
 
 /// The most intermediate values of an equation; most need few.
 const DEEP: usize = 64;
 const SHALLOW: usize = 8;
+/// The most measured inputs.
+pub const MAX_INPUTS: usize = 8;
 
-/// The equations `x' = f(t, x)` with their numbers. Their kinks are switching surfaces.
+/// Where the values of a model's inputs come from.
+#[derive(Clone, Debug)]
+enum InputValues<S> {
+    None,
+    /// From what was measured.
+    Measured(Inputs<S>),
+    /// They do not change in time.
+    Constant(Vec<S>),
+}
+
+/// The equations `x' = f(t, x, u(t))` with their numbers. Their kinks are switching surfaces.
 #[derive(Clone, Debug)]
 pub struct Own<S, const D: usize> {
     equations: Arc<[Expression; D]>,
     kinks: Arc<Kinks>,
     deep: bool,
     parameters: Vec<S>,
+    inputs: InputValues<S>,
 }
 
 impl<S: Scalar, const D: usize> Own<S, D> {
@@ -31,6 +44,8 @@ impl<S: Scalar, const D: usize> Own<S, D> {
                 Leaf::Time => t.real().lane(lane),
                 Leaf::State(n) | Leaf::Rate(n) => x[n].real().lane(lane),
                 Leaf::Parameter(i) => self.parameters[i].real().lane(lane),
+                // Models with inputs do not go in packets.
+                Leaf::Input(_) => f64::NAN,
             };
             for n in 0..D {
                 rates[n].set_lane(lane, self.equations[n].value_of(leaf, &mut [0.0; DEEP]));
@@ -48,7 +63,18 @@ impl<S: Scalar, const D: usize> Own<S, D> {
         sides: &Sides<S>,
         (values, stack): (&mut [S], &mut [S]),
     ) {
-        let place = Place { t, x, rates: &[], parameters: &self.parameters };
+        let mut room = [S::zero(); MAX_INPUTS];
+        let inputs = match &self.inputs {
+            InputValues::None => &[],
+            InputValues::Constant(values) => &values[..],
+            InputValues::Measured(inputs) => {
+                for (k, value) in room[..inputs.len()].iter_mut().enumerate() {
+                    *value = inputs.piece(k, t.real(), sides[self.kinks.surfaces.len()]).at(t);
+                }
+                &room
+            }
+        };
+        let place = Place { t, x, rates: &[], parameters: &self.parameters, inputs };
         for (formula, value) in formulas.iter().zip(values) {
             *value = formula.value_on(&place, sides, stack);
         }
@@ -91,6 +117,9 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         if const { S::Real::LANES > 1 } {
             return S::one();
         }
+        if let (InputValues::Measured(inputs), true) = (&self.inputs, j == self.kinks.surfaces.len()) {
+            return inputs.surface(t, sides[j]);
+        }
         let [value] = self.values(&self.kinks.surfaces[j..=j], t, x, sides);
         value
     }
@@ -100,7 +129,31 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     }
 
     fn jumps(&self, j: usize) -> bool {
-        self.kinks.jumps[j]
+        match (self.kinks.jumps.get(j), &self.inputs) {
+            (Some(&jumps), _) => jumps,
+            (None, InputValues::Measured(inputs)) => inputs.jumps(),
+            (None, _) => false,
+        }
+    }
+
+    #[inline]
+    fn clock(&self) -> Option<usize> {
+        matches!(self.inputs, InputValues::Measured(_)).then_some(self.kinks.surfaces.len())
+    }
+
+    fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64> {
+        let InputValues::Measured(inputs) = &self.inputs else { return None };
+        inputs.next_knot(t.lane(0), sides[self.kinks.surfaces.len()].lane(0), end.lane(0))
+    }
+
+    fn clock_side(&self, t: S::Real, forwards: bool) -> bool {
+        let InputValues::Measured(inputs) = &self.inputs else { return true };
+        inputs.side(t.lane(0), forwards)
+    }
+
+    fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
+        let InputValues::Measured(inputs) = &self.inputs else { unreachable!("only asked of these") };
+        inputs.piece(k, t, sides[self.kinks.surfaces.len()])
     }
 }
 
@@ -109,7 +162,7 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 /// ```
 /// use udd::model::{Family, FormulaFamily, System};
 /// let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
-/// let family = FormulaFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"])).unwrap();
+/// let family = FormulaFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"]), &[]).unwrap();
 /// let system = family.build(&[4.0]);
 /// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; 4]), [1.0, -12.0]);
 /// ```
@@ -120,6 +173,10 @@ pub struct FormulaFamily<const D: usize> {
     deep: bool,
     parameters: Vec<String>,
     states: Vec<(String, bool)>,
+    inputs: usize,
+    /// The inputs of each record, and the number of that which counts where none is named.
+    records: Arc<[Signals]>,
+    record: usize,
 }
 
 impl<const D: usize> FormulaFamily<D> {
@@ -134,6 +191,7 @@ impl<const D: usize> FormulaFamily<D> {
         states: &[String],
         equations: &[&str],
         parameters: &[String],
+        inputs: &[String],
     ) -> Result<Self, (usize, Mistake)> {
         assert!(states.len() == D && equations.len() == D, "{D} states and equations are needed");
         let mut parsed = Vec::with_capacity(D);
@@ -142,20 +200,31 @@ impl<const D: usize> FormulaFamily<D> {
             if text.replace("<=", "").replace(">=", "").contains('=') {
                 return wrong("has =, but only the right-hand side is wanted".to_owned());
             }
-            let one = Expression::parse(text, Names { states, parameters, rates: false });
+            let one = Expression::parse(text, Names { states, parameters, inputs, rates: false });
             let one = one.map_err(|mistake| (n, mistake))?;
             if one.depth() > DEEP {
                 return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
             }
             parsed.push(one);
         }
-        let mut kinks = Kinks::default();
+        let mut kinks = Kinks { clocked: !inputs.is_empty(), ..Kinks::default() };
         parsed.iter_mut().for_each(|one| kinks.of(one));
         let deep = parsed.iter().chain(&kinks.surfaces).any(|one| one.depth() > SHALLOW);
         let Ok(equations) = <[Expression; D]>::try_from(parsed) else { unreachable!("as many as states") };
         let states = states.iter().map(|name| (name.clone(), false)).collect();
         let (equations, kinks) = (Arc::new(equations), Arc::new(kinks));
-        Ok(Self { equations, kinks, deep, parameters: parameters.to_vec(), states })
+        let (parameters, inputs, records) = (parameters.to_vec(), inputs.len(), Arc::default());
+        Ok(Self { equations, kinks, deep, parameters, states, inputs, records, record: 0 })
+    }
+
+    /// With what was measured of its inputs, record by record, and the number of that which counts by itself.
+    ///
+    /// # Panics
+    /// Where a record has another number of inputs than the model, or the model has more than [`MAX_INPUTS`].
+    pub fn with_records(mut self, records: Vec<Signals>, record: usize) -> Self {
+        assert!(self.inputs <= MAX_INPUTS && records.iter().all(|record| record.len() == self.inputs));
+        (self.records, self.record) = (records.into(), record);
+        self
     }
 
     /// These of its states are angles.
@@ -180,12 +249,20 @@ impl<const D: usize> FormulaFamily<D> {
             deep: self.deep,
             parameters: self.parameters.clone(),
             states: self.states.clone(),
+            inputs: self.inputs,
+            records: self.records.clone(),
+            record: self.record,
         }
     }
 
     /// The names of the states that are not idle, and which of them are angles.
     pub fn states(&self) -> Vec<(String, bool)> {
         self.states.clone()
+    }
+
+    fn built<S: Scalar>(&self, values: &[S], inputs: InputValues<S>) -> Own<S, D> {
+        let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
+        Own { equations, kinks, deep: self.deep, parameters: values.to_vec(), inputs }
     }
 
     /// The right-hand sides.
@@ -201,7 +278,7 @@ impl<const D: usize> Family<D> for FormulaFamily<D> {
     const STARTS_IN_PACKETS: bool = matches!(D, 2..=4);
 
     fn goes_in_packets(&self) -> bool {
-        self.kinks.surfaces.is_empty()
+        self.kinks.surfaces.is_empty() && self.inputs == 0
     }
 
     fn idle(&self) -> usize {
@@ -213,7 +290,27 @@ impl<const D: usize> Family<D> for FormulaFamily<D> {
     }
 
     fn build<S: Scalar>(&self, values: &[S]) -> Own<S, D> {
-        let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
-        Own { equations, kinks, deep: self.deep, parameters: values.to_vec() }
+        self.build_for(self.record, values)
+    }
+
+    fn build_for<S: Scalar>(&self, record: usize, values: &[S]) -> Own<S, D> {
+        let inputs = match self.records.get(record) {
+            _ if self.inputs == 0 => InputValues::None,
+            Some(signals) => InputValues::Measured(signals.with(values)),
+            None => InputValues::Constant(vec![S::zero(); self.inputs]),
+        };
+        self.built(values, inputs)
+    }
+
+    fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    fn is_open(&self) -> bool {
+        self.inputs > 0 && self.records.is_empty()
+    }
+
+    fn build_at<S: Scalar>(&self, values: &[S], inputs: Vec<S>) -> Own<S, D> {
+        self.built(values, InputValues::Constant(inputs))
     }
 }

@@ -11,6 +11,7 @@ mod dle;
 pub mod effects;
 mod either;
 mod formula_model;
+mod inputs;
 mod lugre;
 mod pendulum;
 pub mod stick_slip;
@@ -20,7 +21,8 @@ pub use disk::{Disk, DiskFamily};
 pub use dle::{Dle, DleFamily};
 pub use effects::{Effect, FrictionModel, Momentum};
 pub use either::Either;
-pub use formula_model::{FormulaFamily, Own};
+pub use formula_model::{FormulaFamily, MAX_INPUTS, Own};
+pub use inputs::{COEFFICIENTS as PIECE_COEFFICIENTS, Inputs, Piece, Signal, Signals};
 pub use lugre::WithLuGre;
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick_slip::Sticking;
@@ -84,6 +86,27 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         None
     }
 
+    /// The surface that only time passes, where the law has measured [inputs](Inputs): one behind the
+    /// [others](System::surfaces). Runs do not look for it; they stop at its [knots](System::next_knot).
+    fn clock(&self) -> Option<usize> {
+        None
+    }
+
+    /// The next time in the direction of `end`, and not beyond it, at which the clock's surface is passed.
+    fn next_knot(&self, _t: S::Real, _sides: &Sides<S>, _end: S::Real) -> Option<f64> {
+        None
+    }
+
+    /// The side of the clock's surface on which a run lies that starts here, forwards or backwards.
+    fn clock_side(&self, _t: S::Real, _forwards: bool) -> bool {
+        true
+    }
+
+    /// The polynomial that input `k` is at this time.
+    fn input(&self, _k: usize, _t: S::Real, _sides: &Sides<S>) -> Piece<S> {
+        Piece { origin: S::zero(), coefficients: [0.0; PIECE_COEFFICIENTS] }
+    }
+
     /// Looks on which side of every surface, and of the wall, a step's places are; see [`beyond`].
     fn beyond(
         &self,
@@ -137,6 +160,19 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
         (**self).wall(x)
     }
     #[inline(always)]
+    fn clock(&self) -> Option<usize> {
+        (**self).clock()
+    }
+    fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64> {
+        (**self).next_knot(t, sides, end)
+    }
+    fn clock_side(&self, t: S::Real, forwards: bool) -> bool {
+        (**self).clock_side(t, forwards)
+    }
+    fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
+        (**self).input(k, t, sides)
+    }
+    #[inline(always)]
     fn beyond(
         &self,
         at: &StepStart<S, D>,
@@ -155,6 +191,9 @@ pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: 
     for j in 0..system.surfaces() {
         let value = system.surface(j, t, x, &sides);
         sides[j] = S::zero().less(value);
+    }
+    if let Some(clock) = system.clock() {
+        sides[clock] = S::mask(system.clock_side(t.real(), true));
     }
     system.settle(t, x, &mut sides);
     sides
@@ -201,8 +240,28 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;
 
-    /// The system with these parameter values.
+    /// The system with these parameter values; one with measured inputs feels those of the record that it is of.
     fn build<S: Scalar>(&self, values: &[S]) -> Self::Built<S>;
+
+    /// The same with the measured inputs of this record.
+    fn build_for<S: Scalar>(&self, _record: usize, values: &[S]) -> Self::Built<S> {
+        self.build(values)
+    }
+
+    /// How many measured inputs there are.
+    fn inputs(&self) -> usize {
+        0
+    }
+
+    /// Whether it has inputs of which nothing was measured.
+    fn is_open(&self) -> bool {
+        false
+    }
+
+    /// The system with these values of its inputs, which do not change in time.
+    fn build_at<S: Scalar>(&self, values: &[S], _inputs: Vec<S>) -> Self::Built<S> {
+        self.build(values)
+    }
 }
 
 pub(crate) fn parameter(name: &str, unit: &'static str) -> Parameter {

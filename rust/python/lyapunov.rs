@@ -100,7 +100,7 @@ fn lyapunov<'py>(
     transient: f64,
     goal: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = batch.model()?;
+    let model = batch.model()?.undriven()?;
     let options = LyapunovOptions { time, transient, goal, tolerance: batch.tolerance() };
     let rows = batch.rows(&model)?;
     let jobs = batch.jobs();
@@ -146,7 +146,7 @@ fn frames<'py>(
     rtol: f64,
     atol: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.filled();
+    let model = AnyModel::from_python(model)?.undriven()?.filled();
     let tolerance = Tolerance { rtol, atol };
     let (states, growth, covariant, dimension) = with_wide_model!(tangents: &model, |family, values| {
         let x0 = state(&state0, family.idle())?;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 
@@ -11,8 +11,8 @@ use crate::analysis::batch::rows::tape;
 use crate::formula::is_reserved;
 use crate::model::effects::{Body, Formula, FrictionModel, Kind, Slot, Source};
 use crate::model::{
-    DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, Momentum, PendulumFamily, System,
-    WithLuGre, sides_of,
+    DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, MAX_INPUTS, Momentum, PendulumFamily,
+    Signal, Signals, System, WithLuGre, sides_of,
 };
 
 /// Any model with its parameter values, in the order of its family's parameters.
@@ -108,8 +108,23 @@ type EffectSpec = (String, Option<String>, Option<String>, Option<FormulaSpec>);
 type Spec = (String, Vec<f64>, Vec<EffectSpec>, bool);
 
 impl AnyModel {
-    /// Reads the attribute `_spec` of a Python model.
+    /// Reads the attribute `_spec` of a Python model that is to be integrated.
     pub fn from_python(model: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let parsed = Self::parsed(model)?;
+        if with_model!(&parsed, |family, _values| family.is_open()) {
+            let names: Vec<String> = model.getattr("inputs")?.extract()?;
+            let message = format!(
+                "the model's inputs {} need signals: give inputs={{\"{}\": ...}}",
+                names.join(", "),
+                names[0]
+            );
+            return Err(ModelError::new_err(message));
+        }
+        Ok(parsed)
+    }
+
+    /// The same of one that is only asked what it consists of.
+    fn parsed(model: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = model.py();
         let spec = model.getattr("_spec").and_then(|spec| spec.extract::<Spec>());
         let (kind, values, effects, edge) = match spec {
@@ -194,6 +209,17 @@ impl AnyModel {
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
     }
 
+    /// Refuses one with measured inputs, which are known for as long as its record lasts.
+    pub fn undriven(self) -> PyResult<Self> {
+        if with_model!(&self, |family, _values| family.inputs()) == 0 {
+            return Ok(self);
+        }
+        Err(ModelError::new_err(
+            "a model with measured inputs is for udd.simulate, udd.ensemble, udd.fit, udd.discover and udd.forecast: \
+             its law is known for as long as its record lasts",
+        ))
+    }
+
     /// With idle states up to a number that analyses are compiled for: own models of one state as if there were two, those
     /// of five as if there were six.
     pub fn filled(self) -> Self {
@@ -229,19 +255,56 @@ impl AnyModel {
     }
 }
 
-/// What a user's own model consists of: the states' names, the rates' formulas, the parameters' names.
-/// and which states are angles.
-type FormulaModelSpec = (Vec<String>, Vec<String>, Vec<String>, Vec<String>);
+/// What a user's own model consists of, as `udd.models.formula_model.FormulaText`.
+#[derive(FromPyObject)]
+struct FormulaModelSpec<'py> {
+    states: Vec<String>,
+    equations: Vec<String>,
+    parameters: Vec<String>,
+    angles: Vec<String>,
+    inputs: Vec<String>,
+    /// Each input's delay: a parameter's name.
+    delays: Vec<Option<String>>,
+    /// The inputs' signals, record by record.
+    records: Vec<Vec<InputSignal<'py>>>,
+    /// The number of the record that counts where none is named.
+    record: usize,
+}
 
-fn own((states, equations, parameters, angles): &FormulaModelSpec, values: Vec<f64>) -> PyResult<AnyModel> {
-    for (i, name) in states.iter().chain(parameters).enumerate() {
-        let what = if i < states.len() { "state" } else { "parameter" };
+/// As `udd.InputSignal`, with the polynomials between the samples.
+#[derive(FromPyObject)]
+struct InputSignal<'py> {
+    t: PyReadonlyArray1<'py, f64>,
+    values: PyReadonlyArray1<'py, f64>,
+    coefficients: PyReadonlyArray2<'py, f64>,
+}
+
+impl InputSignal<'_> {
+    fn read(&self, delay: Option<usize>) -> PyResult<Signal> {
+        let t = self.t.as_slice()?.to_vec();
+        let pieces = self.coefficients.as_slice()?.as_chunks().0.to_vec();
+        match self.values.as_slice()? {
+            [.., last] if t.len() == pieces.len() + 1 => Ok(Signal::new(t, pieces, *last, delay)),
+            _ => Err(ModelError::new_err("an input needs a polynomial between each two samples")),
+        }
+    }
+}
+
+fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
+    let FormulaModelSpec { states, equations, parameters, angles, inputs, delays, records, record } = spec;
+    let all = || states.iter().chain(parameters).chain(inputs);
+    for (i, name) in all().enumerate() {
+        let what = match i {
+            _ if i < states.len() => "state",
+            _ if i < states.len() + parameters.len() => "parameter",
+            _ => "input",
+        };
         if is_reserved(name) {
             let message =
                 format!("a {what} cannot be called {name}, which means something else in a formula");
             return Err(ModelError::new_err(message));
         }
-        if states.iter().chain(parameters).filter(|other| *other == name).count() > 1 {
+        if all().filter(|other| *other == name).count() > 1 {
             return Err(ModelError::new_err(format!("the name {name} is given twice")));
         }
     }
@@ -249,12 +312,27 @@ fn own((states, equations, parameters, angles): &FormulaModelSpec, values: Vec<f
         let message = format!("there are {} states but {} equations", states.len(), equations.len());
         return Err(ModelError::new_err(message));
     }
+    if inputs.len() > MAX_INPUTS {
+        let message = format!("a model has at most {MAX_INPUTS} inputs, not {}", inputs.len());
+        return Err(ModelError::new_err(message));
+    }
+    let delay =
+        |name: &Option<String>| name.as_ref().and_then(|name| parameters.iter().position(|p| p == name));
+    let delays: Vec<Option<usize>> = delays.iter().map(delay).collect();
+    let mut signals = Vec::with_capacity(records.len());
+    for record in records {
+        if record.len() != inputs.len() || delays.len() != inputs.len() {
+            return Err(ModelError::new_err("each record needs a signal for every input"));
+        }
+        let own = record.iter().zip(&delays).map(|(signal, &delay)| signal.read(delay));
+        signals.push(Signals::new(own.collect::<PyResult<_>>()?));
+    }
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     macro_rules! parsed {
         ($($d:literal $Kind:ident |$family:ident| $held:expr),+) => {
             match states.len() {
-                $($d => FormulaFamily::<$d>::parse(states, &texts, parameters).map(|family| {
-                    let $family = family.with_angles(angles);
+                $($d => FormulaFamily::<$d>::parse(states, &texts, parameters, inputs).map(|family| {
+                    let $family = family.with_angles(angles).with_records(signals, *record);
                     AnyModel::$Kind($held, values)
                 }),)+
                 n => return Err(ModelError::new_err(format!("a model has 1 to 6 states, not {n}"))),
@@ -375,14 +453,14 @@ pub fn state<const D: usize>(values: &[f64], idle: usize) -> PyResult<[f64; D]> 
 /// Whether the model's solutions have power series, which the Taylor method needs.
 #[pyfunction]
 fn has_series(model: &Bound<'_, PyAny>) -> PyResult<bool> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::parsed(model)?;
     Ok(with_model!(&model, |family, values| tape(family, &[values.to_vec()]).is_some()))
 }
 
 /// Names and units of a model's parameters, in order.
 #[pyfunction]
 fn model_parameters(model: &Bound<'_, PyAny>) -> PyResult<Vec<(String, &'static str)>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::parsed(model)?;
     let list = with_model!(&model, |family, _values| family.parameters());
     Ok(list.into_iter().map(|p| (p.name, p.unit)).collect())
 }

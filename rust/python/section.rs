@@ -25,7 +25,7 @@ fn code(ended: CrossingOutcome) -> u8 {
 }
 
 fn parse(text: &str, direction: i32, states: &[String], parameters: &[String]) -> PyResult<Section> {
-    let names = Names { states, parameters, rates: true };
+    let names = Names { states, parameters, inputs: &[], rates: true };
     let wrong = |what: String| Err(ModelError::new_err(format!("the section {text:?} {what}")));
     match Expression::parse(text, names) {
         Err(mistake) => wrong(mistake.to_string()),
@@ -132,7 +132,7 @@ fn sections<'py>(
     count: usize,
     t_max: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = batch.model()?;
+    let model = batch.model()?.undriven()?;
     if section.is_empty() || section.len() > usize::from(u8::MAX) {
         return Err(ModelError::new_err(format!("{} sections cannot be used at once", section.len())));
     }

@@ -31,7 +31,7 @@ fn shoot<'py>(
     rtol: f64,
     atol: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.filled();
+    let model = AnyModel::from_python(model)?.undriven()?.filled();
     let tolerance = Tolerance { rtol, atol };
     let rows = jobs::values(&model, &values)?;
     let (t, spans) = (t.as_slice()?, spans.as_slice()?);
@@ -105,7 +105,7 @@ fn expansion<'py>(
     x: Vec<f64>,
     all: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?;
+    let model = AnyModel::from_python(model)?.undriven()?;
     let (d, rate, by_state, by_parameter, surfaces, more) = with_model!(&model, |family, values| {
         let x = state(&x, family.idle())?;
         let found = linear(family, values, t, &x);

@@ -82,7 +82,7 @@ impl Node {
     /// The series that it needs.
     fn operands(self) -> impl Iterator<Item = u16> {
         let (a, b) = match self {
-            Node::Time | Node::Hold(_) => (None, None),
+            Node::Time | Node::Hold(_) | Node::Input(_) => (None, None),
             Node::Add(a, b) | Node::Sub(a, b) | Node::Mul(a, b) | Node::Div(a, b) | Node::Select(_, a, b) => {
                 (Some(a), Some(b))
             }

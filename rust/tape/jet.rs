@@ -3,8 +3,8 @@
 use super::fuse::Program;
 use super::node::{INVERSE, hold};
 use super::specialised::Specialised;
-use super::{Node, Tape, disk_series, dle_series};
-use crate::model::Sides;
+use super::{Invariant, Node, Tape, disk_series, dle_series};
+use crate::model::{Piece, Sides};
 use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work};
 use crate::unroll::{unroll, vector};
 
@@ -55,6 +55,24 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         hold(&tape.held, parameters, sides, &mut self.held);
         for i in 0..self.held.len() {
             self.held_values[i] = self.held[i].real();
+        }
+    }
+
+    /// Takes these pieces of the inputs until they are set anew.
+    #[inline(never)]
+    pub fn set_inputs(&mut self, tape: &Tape<D>, piece: &dyn Fn(usize) -> Piece<S>) {
+        for (i, held) in tape.held.iter().enumerate() {
+            // Its coefficients are behind it.
+            if let Invariant::Input(k, 0) = *held {
+                let Piece { origin, coefficients } = piece(usize::from(k));
+                self.held[i] = origin;
+                for (held, c) in self.held[i + 1..].iter_mut().zip(coefficients) {
+                    *held = S::constant(c);
+                }
+                for j in i..=i + coefficients.len() {
+                    self.held_values[j] = self.held[j].real();
+                }
+            }
         }
     }
 

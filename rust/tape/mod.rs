@@ -49,6 +49,7 @@ pub struct Tape<const D: usize> {
     known: specialised::Specialised,
     levels_off: bool,
     switches_held: bool,
+    driven: bool,
 }
 
 impl<const D: usize> Tape<D> {
@@ -73,6 +74,12 @@ impl<const D: usize> Tape<D> {
     #[inline(always)]
     pub fn switches_held(&self) -> bool {
         self.switches_held
+    }
+
+    /// Whether the law has measured inputs, whose [pieces](Jets::set_inputs) a step has to know.
+    #[inline(always)]
+    pub fn is_driven(&self) -> bool {
+        self.driven
     }
 
     /// Whether its series are computed by a program of their own.

@@ -13,6 +13,8 @@ use crate::scalar::{InstructionSet, Scalar};
 pub enum Invariant {
     Constant(f64),
     Parameter(u16),
+    /// The origin of an input's present [piece](crate::model::Piece), or, counted from 1, one of its coefficients.
+    Input(u16, u16),
     Neg(u16),
     Add(u16, u16),
     Sub(u16, u16),
@@ -31,6 +33,8 @@ pub enum Node {
     Time,
     /// `h`
     Hold(u16),
+    /// The polynomial with its origin in `h`, its coefficients behind it.
+    Input(u16),
     /// `-a`
     Neg(u16),
     /// `a + b`
@@ -107,6 +111,8 @@ pub(super) fn hold<S: Scalar>(list: &[Invariant], parameters: &[S], sides: &Side
         values[i] = match held {
             Invariant::Constant(value) => S::constant(value),
             Invariant::Parameter(i) => parameters[usize::from(i)],
+            // Set apart, from one step to the next.
+            Invariant::Input(..) => continue,
             Invariant::Neg(a) => -of!(a),
             Invariant::Add(a, b) => of!(a) + of!(b),
             Invariant::Sub(a, b) => of!(a) - of!(b),
@@ -154,6 +160,16 @@ impl Step {
         to[0][0] = match self.node {
             Node::Time => t,
             Node::Hold(c) => h!(c),
+            Node::Input(origin) => {
+                let (at, since) = (usize::from(origin), t - h!(origin));
+                let [c0, c1, c2, c3] = [held[at + 1], held[at + 2], held[at + 3], held[at + 4]];
+                let slope = c1 + since * (c2.scale(2.0) + since * c3.scale(3.0));
+                let series = [slope, c2 + since * c3.scale(3.0), c3];
+                for (to, from) in to[0][1..].iter_mut().zip(series) {
+                    *to = from;
+                }
+                c0 + since * (c1 + since * (c2 + since * c3))
+            }
             Node::Neg(a) => -of!(a),
             Node::Add(a, b) => of!(a) + of!(b),
             Node::Sub(a, b) => of!(a) - of!(b),
@@ -242,6 +258,9 @@ impl Step {
         of!(to, k) = match self.node {
             Node::Time if k == 1 => S::one(),
             Node::Time | Node::Hold(_) => S::zero(),
+            // Known since the start.
+            Node::Input(_) if k < 4 => of!(to, k),
+            Node::Input(_) => S::zero(),
             // The quotient q of a = q b.
             Node::Div(a, b) => (of!(a, k) - sum.fused(of!(to, 0), of!(b, k))) * of!(to + 1, 0),
             Node::Over(_, b) => -(sum.fused(of!(to, 0), of!(b, k)) * of!(to + 1, 0)),

@@ -46,7 +46,8 @@ impl<const D: usize> Tape<D> {
             None => symbol::make(Made::Parameter(i)),
         };
         let parameters: Vec<Symbol> = (0..family.parameters().len()).map(parameter).collect();
-        let system = family.build(&parameters);
+        let inputs = (0..family.inputs()).map(|k| symbol::make(Made::Input(k))).collect();
+        let system = family.build_at(&parameters, inputs);
         let x = from_fn(|n| symbol::make(Made::State(n)));
         let sides: Sides<Symbol> = from_fn(|j| match j < System::<Symbol, D>::surfaces(&system) {
             true => SurfaceSideRef::Surface(j),
@@ -91,6 +92,7 @@ impl<'a> Lowering<'a> {
         let rates = rates.map(|s| self.slot(s));
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
         let switches_held = self.held.iter().any(|held| matches!(held, Invariant::Select(..)));
+        let driven = self.held.iter().any(|held| matches!(held, Invariant::Input(..)));
         let levels_off = self.steps.iter().any(|step| step.node.levels_off());
         let program = Program::of(&self.steps, &rates, self.slots, true);
         let mut tape = Tape {
@@ -102,6 +104,7 @@ impl<'a> Lowering<'a> {
             known: Specialised::Not,
             levels_off,
             switches_held,
+            driven,
         };
         tape.known = Specialised::of(&tape);
         tape
@@ -130,11 +133,19 @@ impl<'a> Lowering<'a> {
             Made::Div(a, b) => Invariant::Div(self.held(a), self.held(b)),
             Made::Apply(f, a) => Invariant::Apply(f, self.held(a)),
             Made::Select(j, a, b) => Invariant::Select(index(j), self.held(a), self.held(b)),
-            Made::Time | Made::State(_) => unreachable!("time and state vary"),
+            Made::Time | Made::State(_) | Made::Input(_) => unreachable!("time, state and inputs vary"),
         };
         self.held.push(held);
         let at = index(self.held.len() - 1);
         self.held_at.insert(s, at);
+        at
+    }
+
+    /// Where an input's origin is held, and its coefficients behind it.
+    fn input(&mut self, k: usize) -> u16 {
+        let at = index(self.held.len());
+        let parts = 0..=index(crate::model::PIECE_COEFFICIENTS);
+        self.held.extend(parts.map(|part| Invariant::Input(index(k), part)));
         at
     }
 
@@ -163,6 +174,7 @@ impl<'a> Lowering<'a> {
         let node = match self.made(s) {
             Made::State(n) => return index(n),
             Made::Time => Node::Time,
+            Made::Input(k) => Node::Input(self.input(k)),
             Made::Neg(a) => Node::Neg(self.slot(a)),
             Made::Add(a, b) if !self.varies(a) => Node::Plus(self.slot(b), self.held(a)),
             Made::Add(a, b) if !self.varies(b) => Node::Plus(self.slot(a), self.held(b)),

@@ -26,6 +26,8 @@ pub(super) enum Made {
     Parameter(usize),
     Time,
     State(usize),
+    /// A measured input.
+    Input(usize),
     Neg(Symbol),
     Add(Symbol, Symbol),
     Sub(Symbol, Symbol),
@@ -133,7 +135,7 @@ impl Recording {
         let varies = |s: Symbol| self.varies[s.0 as usize];
         let varies = match made {
             Made::Constant(_) | Made::Parameter(_) => false,
-            Made::Time | Made::State(_) => true,
+            Made::Time | Made::State(_) | Made::Input(_) => true,
             Made::Neg(a) | Made::Apply(_, a) => varies(a),
             Made::Add(a, b) | Made::Sub(a, b) | Made::Mul(a, b) | Made::Div(a, b) => varies(a) || varies(b),
             Made::Select(_, a, b) => varies(a) || varies(b),

@@ -13,7 +13,7 @@ fn own() -> FormulaFamily<4> {
     let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let equations = ["b-a*d", "c*t", "d-k1*a", "k2*k3*a"];
     let parameters = names(&["k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8"]);
-    FormulaFamily::parse(&names(&["a", "b", "c", "d"]), &equations, &parameters).unwrap()
+    FormulaFamily::parse(&names(&["a", "b", "c", "d"]), &equations, &parameters, &[]).unwrap()
 }
 
 /// Compares all that a system says at a state, on both sides of every surface.

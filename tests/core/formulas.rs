@@ -239,7 +239,7 @@ fn what_is_no_effect_is_refused() {
 
 fn dle() -> FormulaFamily<3> {
     let texts = ["y - omega", "omega*z", "w - omega*y - B*w*z"];
-    FormulaFamily::parse(&names(&["omega", "y", "z"]), &texts, &names(&["w", "B"])).unwrap()
+    FormulaFamily::parse(&names(&["omega", "y", "z"]), &texts, &names(&["w", "B"]), &[]).unwrap()
 }
 
 /// The model from text is recorded as the built-in one is, so that its series are unrolled too.
@@ -260,7 +260,8 @@ fn a_model_as_text_has_the_tape_of_the_compiled_one() {
 #[test]
 fn equations_that_cannot_be_used_are_named() {
     let mistake = |texts: &[&str; 2]| {
-        let (n, mistake) = FormulaFamily::<2>::parse(&names(&["x", "v"]), texts, &names(&["k"])).unwrap_err();
+        let (n, mistake) =
+            FormulaFamily::<2>::parse(&names(&["x", "v"]), texts, &names(&["k"]), &[]).unwrap_err();
         format!("{n}: {mistake}")
     };
     assert!(mistake(&["v", "-q*x"]).starts_with("1: has the unknown name q; allowed are the state x, v"));

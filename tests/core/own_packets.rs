@@ -12,7 +12,7 @@ const VALUES: [f64; 2] = [1.5, 0.3];
 
 fn model<const D: usize>(states: [&str; D], equations: [&str; D]) -> FormulaFamily<D> {
     let names = ["k", "c"].map(str::to_owned);
-    FormulaFamily::parse(&states.map(str::to_owned), &equations, &names).unwrap()
+    FormulaFamily::parse(&states.map(str::to_owned), &equations, &names, &[]).unwrap()
 }
 
 /// Spread over a cube of side 4 around `centre`.

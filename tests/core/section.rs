@@ -27,7 +27,8 @@ fn section<F: Family<D>, const D: usize>(family: &F, text: &str, direction: i32)
     };
     let parameters: Vec<String> = family.parameters().into_iter().map(|p| p.name).collect();
     let function =
-        Expression::parse(text, Names { states: &states, parameters: &parameters, rates: true }).unwrap();
+        Expression::parse(text, Names { states: &states, parameters: &parameters, inputs: &[], rates: true })
+            .unwrap();
     Section { function, rising: direction >= 0, falling: direction <= 0 }
 }
 
@@ -300,15 +301,21 @@ fn laws_without_a_series_have_sections_too() {
 
 fn value(text: &str) -> f64 {
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "tilt.angle"]));
-    let names = Names { states: &states, parameters: &parameters, rates: true };
+    let names = Names { states: &states, parameters: &parameters, inputs: &[], rates: true };
     let parsed = Expression::parse(text, names).unwrap_or_else(|mistake| panic!("{text} {mistake}"));
-    let place = Place { t: 0.25, x: &[2.0, -3.0, 0.5], rates: &[7.0, 11.0, 13.0], parameters: &[5.0, 0.1] };
+    let place = Place {
+        t: 0.25,
+        x: &[2.0, -3.0, 0.5],
+        rates: &[7.0, 11.0, 13.0],
+        parameters: &[5.0, 0.1],
+        inputs: &[],
+    };
     parsed.value(&place, &mut parsed.stack())
 }
 
 fn mistake(text: &str) -> String {
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w"]));
-    Expression::parse(text, Names { states: &states, parameters: &parameters, rates: true })
+    Expression::parse(text, Names { states: &states, parameters: &parameters, inputs: &[], rates: true })
         .unwrap_err()
         .to_string()
 }

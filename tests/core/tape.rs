@@ -538,7 +538,7 @@ proptest! {
     ) {
         let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
         let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
-        let family = FormulaFamily::<3>::parse(&names(&["x", "y", "z"]), &texts, &names(&["k", "c"])).unwrap();
+        let family = FormulaFamily::<3>::parse(&names(&["x", "y", "z"]), &texts, &names(&["k", "c"]), &[]).unwrap();
         let tape = Tape::record(&family, &[]).unwrap();
         prop_assume!(!tape.is_unrolled());
         let apart = tape.unfused();

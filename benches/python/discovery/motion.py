@@ -18,6 +18,7 @@ from scipy.integrate import solve_ivp
 EDGE = 0.97  # of the radius: a record stays well between the wheels
 RTOL, ATOL = 1e-9, 1e-11
 STEP = 0.04  # s, the longest step: k has kinks
+_WILD = 10.0  # m^2/s, of the momentum over the mass: at 1000 rad/s and more there is no device
 
 
 @dataclass(frozen=True)
@@ -119,12 +120,16 @@ class Run:
 
 
 def run(world: World, start: Sequence[float], duration: float) -> Run | None:
-    """The motion from a start [Omega, Y, Z, beta]; None where the disk leaves the wheels."""
+    """The motion from a start [Omega, Y, Z, beta]; None where the disk leaves the wheels or spins up."""
 
     def edge(_t: float, s: np.ndarray) -> float:
         return (EDGE * world.device.R) ** 2 - float(s[1] ** 2 + s[2] ** 2)
 
-    edge.terminal = True  # type: ignore[attr-defined]
+    def spinning(_t: float, s: np.ndarray) -> float:
+        return _WILD - abs(float(s[0]))
+
+    # A drawn law may push without bound: the solver then took ever smaller steps, and kept all of them.
+    edge.terminal = spinning.terminal = True  # type: ignore[attr-defined]
     begin = [world.momentum(0.0, start), *start[1:]]
     found = solve_ivp(
         lambda t, s: world.rates(t, s.tolist()),
@@ -134,7 +139,7 @@ def run(world: World, start: Sequence[float], duration: float) -> Run | None:
         rtol=RTOL,
         atol=ATOL,
         max_step=STEP,
-        events=edge,
+        events=(edge, spinning),
         dense_output=True,
     )
     return Run(world, found.sol) if found.status == 0 else None

@@ -15,7 +15,7 @@ from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .estimator_input import FilmParameters
-from .formula_models import levels_of
+from .formula_models import driven, levels_of
 from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
@@ -264,7 +264,8 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
             raise FitError(
                 "the models of several measurements must be alike but for their parameters' values"
             )
-    return models
+    written = [own for own in models if isinstance(own, FormulaModel)]
+    return driven(written, measurements) if written and written[0].inputs else models
 
 
 def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) -> tuple[Problem, Point]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import FitError
+from udd.measurement import Measurement
 from udd.models.formula_model import FormulaModel
 
 from .sensor import roughness
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 #: changes by from frame to frame; of a state that is not seen it is a larger share of that.
 _LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
 _OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
+#: Samples of an input that may be missing at a measurement's ends, where the nearest one holds.
+_LATE = 2.0
 
 
 def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
@@ -28,6 +31,35 @@ def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
         if len(run) > 1:
             rate[run] = np.gradient(x[run], t[run])
     return rate
+
+
+def driven(models: Sequence[FormulaModel], measurements: Sequence[Measurement]) -> tuple[FormulaModel, ...]:
+    """Models with the inputs that their measurements hold, counted from each measurement's first row.
+
+    Raises
+    ------
+    FitError
+        An input that a measurement lacks, or one that does not last as long as its rows.
+    """
+    records = []
+    for model, measurement in zip(models, measurements, strict=True):
+        signals = {}
+        for name in model.inputs:
+            if name not in measurement.inputs:
+                known = ", ".join(measurement.inputs) or "none"
+                raise FitError(f"the measurement lacks the model's input {name}; its inputs are {known}")
+            signal, (start, end) = measurement.inputs[name], measurement.t[[0, -1]]
+            first, last = signal.span
+            # A sample may come just after a row that it belongs to.
+            slack = _LATE * float(np.median(np.diff(signal.t)))
+            if start < first - slack or end > last + slack:
+                raise FitError(
+                    f"the input {name} is known from t = {first:g} to {last:g}, "
+                    f"but the measurement goes from {start:g} to {end:g}"
+                )
+            signals[name] = signal.shifted(-float(start))
+        records.append(signals)
+    return tuple(model.with_inputs(*records, record=k) for k, model in enumerate(models))
 
 
 def guessed(

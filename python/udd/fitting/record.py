@@ -17,7 +17,7 @@ from udd.measurement import Measurement
 from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
-from .formula_models import checked_start, guessed, slope, typical_noise
+from .formula_models import checked_start, driven, guessed, slope, typical_noise
 from .sensor import frame_noise, is_encoder, lattice, moving
 
 Array = NDArray[np.float64]
@@ -153,6 +153,8 @@ def record_of(
     if not own and profile_of(measurement.kind).written:
         given = ", ".join(measurement.names)
         raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
+    if own and own.inputs:
+        (own,) = driven((own,), (measurement,))
     values, seen = measurement.values, measurement.seen & (np.arange(len(measurement)) < moving(measurement))
     if seen.sum() < 10:
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")

@@ -77,6 +77,10 @@ class InputSignal:
         """The times between which it is known [s]."""
         return float(self.t[0]), float(self.t[-1])
 
+    def shifted(self, by: float) -> InputSignal:
+        """The same signal later by so much [s]."""
+        return InputSignal(self.t + by, self.values, self.hold)
+
     def coefficients(self) -> NDArray[np.float64]:
         """The polynomial between each two samples, over the time since the first of them.
 

@@ -58,6 +58,12 @@ class Model:
         equation is another state), in their order: formulas of the states and parameters. The equations are
         stated in full all the same; with it, what :func:`udd.discover` finds missing is a force that enters
         every acceleration, such as friction in a joint.
+    inputs : sequence of str, optional
+        Measured inputs (exogenous signals), such as a motor's torque: names that the equations may use. What
+        was measured of them comes with the run or the record: ``udd.simulate(..., inputs=...)``,
+        ``udd.Measurement(..., inputs=...)``.
+    delays : mapping of str to str, optional
+        Inputs that the model feels later, each with the parameter that is the delay [s].
 
     Raises
     ------
@@ -96,6 +102,8 @@ class Model:
     """Their units, empty where dimensionless."""
     angles: ClassVar[tuple[str, ...]] = ()
     """The components that are angles: they may grow without end."""
+    inputs: ClassVar[tuple[str, ...]] = ()
+    """Its measured inputs."""
     profile: ClassVar[ModelProfile]
     """What is known of it beside its equations."""
     _plain: ClassVar[tuple[str, ...]]
@@ -110,6 +118,8 @@ class Model:
         *,
         angles: Iterable[str] = (),
         mass: Sequence[Sequence[Expression]] | None = None,
+        inputs: Iterable[str] = (),
+        delays: Mapping[str, str] | None = None,
     ) -> FormulaModel:
         """A user's own model is one of a subclass, like those that are built in."""
         from .formula_model import FormulaModel

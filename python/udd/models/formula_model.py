@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from udd._util.validation import number
 from udd.effects import Effect
 from udd.effects.user_defined import along_of
 from udd.errors import ModelError
+from udd.measurement.input_signal import InputSignal
 
 from .base import Model
 from .profile import DiscoveryProfile, DynamicsProfile, FitProfile, ModelProfile
@@ -24,6 +25,27 @@ __all__ = ["FormulaModel"]
 
 _MOST_STATES = 6
 _POINT = "__"
+
+
+class FormulaText(NamedTuple):
+    """What the core needs to know of a formula model beside the values of its parameters."""
+
+    states: list[str]
+    equations: list[str]
+    parameters: list[str]
+    angles: list[str]
+    inputs: list[str]
+    delays: list[str | None]
+    records: list[list[SampledSignal]]
+    record: int
+
+
+class SampledSignal(NamedTuple):
+    """An input signal, with the polynomials between its samples."""
+
+    t: NDArray[np.float64]
+    values: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -45,11 +67,28 @@ class FormulaModel(Model):
         as in ``"force(x)"``.
     mass : tuple of tuple of str
         The mass matrix; empty where none was given.
+    inputs : tuple of str
+        The measured inputs.
+    delays : tuple of (str, str)
+        Inputs that are felt later, each with the parameter that says by how much.
+    records : tuple of mapping of str to InputSignal
+        What was measured of the inputs, record by record; empty until :meth:`with_inputs`.
+    record : int
+        The number of the record that :meth:`rates` and runs follow.
     """
 
     kind: ClassVar[str] = "own"
     _plain: ClassVar[tuple[str, ...]] = ()
-    _options: ClassVar[tuple[str, ...]] = ("states", "equations", "parameters", "angles", "effects", "mass")
+    _options: ClassVar[tuple[str, ...]] = (
+        "states",
+        "equations",
+        "parameters",
+        "angles",
+        "effects",
+        "mass",
+        "inputs",
+        "delays",
+    )
 
     state_names: tuple[str, ...]  # type: ignore[misc]
     texts: tuple[str, ...]
@@ -57,6 +96,10 @@ class FormulaModel(Model):
     angles: tuple[str, ...]  # type: ignore[misc]
     effects: tuple[Effect, ...]
     mass: tuple[tuple[str, ...], ...]
+    inputs: tuple[str, ...]  # type: ignore[misc]
+    delays: tuple[tuple[str, str], ...]
+    records: tuple[Mapping[str, InputSignal], ...] = field(compare=False)
+    record: int = field(compare=False)
 
     def __new__(cls, *_arguments: Any, **_options: Any) -> FormulaModel:
         """Leave everything to the initialisation, which a copy or a pickle does not need."""
@@ -71,6 +114,8 @@ class FormulaModel(Model):
         angles: Iterable[str] = (),
         effects: Iterable[Effect] = (),
         mass: Sequence[Sequence[Expression]] | None = None,
+        inputs: Iterable[str] = (),
+        delays: Mapping[str, str] | None = None,
     ) -> None:
         names = _names("states", states)
         if not 1 <= len(names) <= _MOST_STATES:
@@ -86,30 +131,36 @@ class FormulaModel(Model):
         for name in turning:
             if name not in names:
                 raise ModelError(f"the angle {name!r} is no state; there are {', '.join(names)}")
-        self._set(names, _equations(names, equations), values, turning)
+        driven = _names("inputs", inputs)
+        self._set(
+            state_names=names,
+            texts=_equations(names, equations),
+            values=values,
+            angles=turning,
+            effects=(),
+            mass=(),
+            inputs=driven,
+            delays=_delays(driven, given, delays),
+            records=(),
+            record=0,
+        )
         _core.model_parameters(self)  # which parses the equations
         if mass:
-            object.__setattr__(self, "mass", _mass_matrix(self, mass))
+            self._set(mass=_mass_matrix(self, mass))
         added = self._effects(effects)
         if added:
-            object.__setattr__(self, "effects", added)
+            self._set(effects=added)
             _core.model_parameters(self)
 
-    def _set(
-        self,
-        names: tuple[str, ...],
-        texts: tuple[str, ...],
-        values: tuple[tuple[str, float], ...],
-        angles: tuple[str, ...],
-        effects: tuple[Effect, ...] = (),
-        mass: tuple[tuple[str, ...], ...] = (),
-    ) -> None:
-        object.__setattr__(self, "state_names", names)
-        object.__setattr__(self, "texts", texts)
-        object.__setattr__(self, "values", values)
-        object.__setattr__(self, "angles", angles)
-        object.__setattr__(self, "effects", effects)
-        object.__setattr__(self, "mass", mass)
+    def _set(self, **fields: Any) -> None:
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    def _with(self, **fields: Any) -> Self:
+        """A copy with other fields, which are not checked."""
+        changed = object.__new__(type(self))
+        changed._set(**vars(self) | fields)
+        return changed
 
     @property
     def state_units(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -224,7 +275,7 @@ class FormulaModel(Model):
         return self.kind, list(self.parameters.values()), [], False
 
     @property
-    def _own(self) -> tuple[list[str], list[str], list[str], list[str]]:
+    def _own(self) -> FormulaText:
         """What the core needs to know beside the values."""
         texts = dict(self.equations)
         for effect in self.effects:
@@ -233,7 +284,17 @@ class FormulaModel(Model):
                 texts[state] = f"{texts[state]} + ({term})" + (f"*({factor})" if factor else "")
         # A point is no part of a name there.
         names = [name.replace(".", _POINT) for name in self.parameters]
-        return list(self.state_names), list(texts.values()), names, list(self.angles)
+        delays = {name: parameter.replace(".", _POINT) for name, parameter in self.delays}
+        return FormulaText(
+            states=list(self.state_names),
+            equations=list(texts.values()),
+            parameters=names,
+            angles=list(self.angles),
+            inputs=list(self.inputs),
+            delays=[delays.get(name) for name in self.inputs],
+            records=[[_sampled(record[name]) for name in self.inputs] for record in self.records],
+            record=self.record,
+        )
 
     def _entered(self, slot: str) -> dict[str, str]:
         """The states whose rates a slot adds to, and the factor in front of each; none for a rate itself."""
@@ -257,9 +318,42 @@ class FormulaModel(Model):
         for effect in self.effects:
             own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
             effects.append(effect.replace(**own) if own else effect)
-        changed = object.__new__(type(self))
-        changed._set(self.state_names, self.texts, tuple(new), self.angles, tuple(effects), self.mass)
-        return changed
+        return self._with(values=tuple(new), effects=tuple(effects))
+
+    def with_inputs(self, *records: Mapping[str, InputSignal], record: int = 0) -> Self:
+        """The model with what was measured of its inputs.
+
+        Parameters
+        ----------
+        *records : mapping of str to InputSignal
+            A signal for every input; several records where a fit has several.
+        record : int
+            The number of the record that :meth:`rates` and runs follow.
+
+        Raises
+        ------
+        ModelError
+            An input without a signal, or a signal of what is no input.
+
+        Examples
+        --------
+        >>> import udd
+        >>> cart = udd.Model(["x", "v"], ["v", "u - v"], inputs=["u"])
+        >>> cart.with_inputs({"u": udd.InputSignal([0.0, 2.0], [0.0, 4.0])}).rates(1.0, [0.0, 0.5])
+        array([0.5, 1.5])
+        """
+        checked = []
+        for own in records:
+            if unknown := next((name for name in own if name not in self.inputs), None):
+                known = ", ".join(self.inputs) or "none"
+                raise ModelError(f"the model has no input {unknown!r}; it has {known}")
+            for name in self.inputs:
+                if not isinstance(own.get(name), InputSignal):
+                    raise ModelError(
+                        f"the input {name} needs a signal (a udd.InputSignal), not {own.get(name)!r}"
+                    )
+            checked.append(dict(own))
+        return self._with(records=tuple(checked) if self.inputs else (), record=record)
 
     def with_term(self, equation: str, term: Expression, **amplitude: float) -> FormulaModel:
         """The model with a term added to one of its equations.
@@ -298,14 +392,24 @@ class FormulaModel(Model):
         if name in self.parameters:
             raise ModelError(f"the model has a parameter {name!r} already")
         text = f"{self.equations[equation]} + {name}*({text_of('the term', term)})"
-        return FormulaModel(
-            self.state_names,
-            self.equations | {equation: text},
-            dict(self.values) | amplitude,
-            angles=self.angles,
-            effects=self.effects,
-            mass=self.mass,
-        )
+        arguments = self._arguments() | {
+            "equations": self.equations | {equation: text},
+            "parameters": dict(self.values) | amplitude,
+        }
+        return FormulaModel(**arguments)._with(records=self.records, record=self.record)
+
+    def _arguments(self) -> dict[str, Any]:
+        """What the constructor makes it of."""
+        return {
+            "states": self.state_names,
+            "equations": self.equations,
+            "parameters": dict(self.values),
+            "angles": self.angles,
+            "effects": self.effects,
+            "mass": self.mass,
+            "inputs": self.inputs,
+            "delays": dict(self.delays),
+        }
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
         """The model with these effects instead of those added before.
@@ -323,10 +427,7 @@ class FormulaModel(Model):
         ModelError
             An effect of disk or pendulum, one given twice, or one that names what the model does not have.
         """
-        changed = object.__new__(type(self))
-        changed._set(
-            self.state_names, self.texts, self.values, self.angles, self._effects(effects), self.mass
-        )
+        changed = self._with(effects=self._effects(effects))
         _core.model_parameters(changed)
         return changed
 
@@ -357,26 +458,24 @@ class FormulaModel(Model):
         ModelError
             An unknown name or an unusable value.
         """
-        arguments: dict[str, Any] = {
-            "states": self.state_names,
-            "equations": self.equations,
-            "parameters": dict(self.values),
-            "angles": self.angles,
-            "effects": self.effects,
-            "mass": self.mass,
-        }
+        arguments = self._arguments()
         own = {name: changes.pop(name) for name in list(changes) if name in self.parameters}
         for name in changes:
             if name not in arguments:
                 known = ", ".join((*arguments, *self.parameters))
                 raise ModelError(f"the model has no {name!r}; it has {known}")
         new = FormulaModel(**(arguments | changes))
+        if new.inputs == self.inputs:
+            new = new._with(records=self.records, record=self.record)
         return new.with_parameters(own) if own else new
 
     def __repr__(self) -> str:
         angles = f", angles={list(self.angles)!r}" if self.angles else ""
         mass = f", mass={[list(row) for row in self.mass]!r}" if self.mass else ""
-        text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{angles}{mass})"
+        inputs = f", inputs={list(self.inputs)!r}" if self.inputs else ""
+        delays = f", delays={dict(self.delays)!r}" if self.delays else ""
+        more = f"{angles}{mass}{inputs}{delays}"
+        text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{more})"
         return f"{text}.with_effects({list(self.effects)!r})" if self.effects else text
 
 
@@ -409,8 +508,7 @@ def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> 
     if [len(row) for row in rows] != [len(known)] * len(known):
         raise ModelError(f"mass must be a table with a row and a column for each of {', '.join(known)}")
     mass = tuple(tuple(text_of("the mass matrix", one) for one in row) for row in rows)
-    held = object.__new__(FormulaModel)
-    held._set(model.state_names, model.texts, model.values, model.angles, (), mass)
+    held = model._with(mass=mass)
     # Numbers without a pattern, in which no formula is symmetric by accident.
     states = np.sin(np.arange(1.0, 3 * len(model.state_names) + 1)).reshape(3, -1)
     try:
@@ -423,6 +521,27 @@ def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> 
     if len(at) and np.linalg.eigvalsh(at).min() <= 0.0:
         raise ModelError("the mass matrix must be positive definite")
     return mass
+
+
+def _sampled(signal: InputSignal) -> SampledSignal:
+    return SampledSignal(signal.t, signal.values, np.ascontiguousarray(signal.coefficients()))
+
+
+def _delays(
+    inputs: tuple[str, ...], parameters: Mapping[str, float], delays: Mapping[str, str] | None
+) -> tuple[tuple[str, str], ...]:
+    """The inputs that are felt later, each with its parameter."""
+    if not isinstance(delays, Mapping | None):
+        raise ModelError(f"delays must be a table of inputs and parameters, not {delays!r}")
+    for name, parameter in (delays or {}).items():
+        if name not in inputs:
+            raise ModelError(
+                f"there is a delay of {name!r}, but the inputs are {', '.join(inputs) or 'none'}"
+            )
+        if parameter not in parameters:
+            known = ", ".join(parameters) or "none"
+            raise ModelError(f"the delay of {name} must be one of the parameters {known}, not {parameter!r}")
+    return tuple((delays or {}).items())
 
 
 def _determinant(matrix: Sequence[Sequence[str]]) -> str:

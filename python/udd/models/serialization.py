@@ -12,7 +12,7 @@ from .base import Model
 from .formula_model import FormulaModel
 from .registry import COMPILED
 
-_OWN = ("states", "equations", "parameters", "angles", "effects", "mass")
+_OWN = FormulaModel._options
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
@@ -32,7 +32,11 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "angles": list(model.angles),
             "effects": [effect_to_dict(effect) for effect in model.effects],
         }
-        return own | ({"mass": [list(row) for row in model.mass]} if model.mass else {})
+        if model.mass:
+            own["mass"] = [list(row) for row in model.mass]
+        if model.inputs:
+            own |= {"inputs": list(model.inputs), "delays": dict(model.delays)}
+        return own
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
     if COMPILED.get(cls.kind) is cls:

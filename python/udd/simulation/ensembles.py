@@ -18,11 +18,14 @@ from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
 
 from .batch import Batch
+from .model_inputs import driven
 from .outcomes import OUTCOMES
 from .trajectory import method_for, tolerances
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from udd.measurement import InputSignal
 
 __all__ = ["Ensemble", "ensemble"]
 
@@ -91,6 +94,7 @@ def ensemble(
     threads: int | None = None,
     progress: bool | None = None,
     partial: bool = False,
+    inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
 ) -> Ensemble:
     """Run a model from many states, or with many values of its parameters, on all cores.
 
@@ -114,6 +118,8 @@ def ensemble(
         Whether to show a progress bar on stderr; by default for many runs, where stderr is a terminal.
     partial : bool
         After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+    inputs
+        As for :func:`udd.simulate`.
 
     Returns
     -------
@@ -161,6 +167,7 @@ def ensemble(
     if not (np.diff(times) > 0).all():
         raise ModelError("the times must increase, without duplicates")
     require_model(model)
+    model = driven(model, times, inputs)
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     runs = max(len(rows), len(starts))
     stepper = method_for(model, method, rtol)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,8 +17,12 @@ from udd._util.validation import array, number
 from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model, require_model
 
+from .model_inputs import driven
+
 if TYPE_CHECKING:
     import xarray as xr
+
+    from udd.measurement import InputSignal
 
 __all__ = ["Event", "Events", "Stats", "Trajectory", "simulate"]
 
@@ -238,6 +242,7 @@ def simulate(
     atol: float = 1e-12,
     method: str = "dopri5",
     dense: bool = False,
+    inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
 ) -> Trajectory:
     """Run a model from an initial state.
 
@@ -263,6 +268,9 @@ def simulate(
         and ``"rodas"`` for one of a model of your own that turns out to be stiff.
     dense : bool
         Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
+    inputs : mapping of str to InputSignal or array_like, optional
+        The signal of each of the model's measured inputs; samples without times belong to the times `t`. The
+        steps land on the samples where the signal has a kink.
 
     Returns
     -------
@@ -295,8 +303,15 @@ def simulate(
     ((101, 3), 'finished')
     >>> print(np.round(run.state[-1], 8))
     [0.97664031 0.9831748  0.04343309]
+
+    A mass that a measured force pushes, here x = t^3/6:
+
+    >>> mass = udd.Model(["x", "v"], ["v", "force"], inputs=["force"])
+    >>> push = udd.InputSignal([0.0, 2.0], [0.0, 2.0])
+    >>> print(np.round(udd.simulate(mass, [0, 1, 2], [0, 0], inputs={"force": push}).x, 12))
+    [0.         0.16666667 1.33333333]
     """
-    found = integrated(model, t, state0, rtol=rtol, atol=atol, method=method, dense=dense)
+    found = integrated(model, t, state0, rtol=rtol, atol=atol, method=method, dense=dense, inputs=inputs)
     if found.outcome == "ejected":
         warnings.warn(
             f"the disk left the wheels at t = {found.t[-1]:.6g} s, where the run ends; a disk with "
@@ -316,6 +331,7 @@ def integrated(
     atol: float = 1e-12,
     method: str = "dopri5",
     dense: bool = False,
+    inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
 ) -> Trajectory:
     """The same for who looks at the outcome: a run that leaves the disk is not warned of."""
     state = initial_state(model, state0)
@@ -324,6 +340,7 @@ def integrated(
     times = array("t", t)
     if times.ndim > 1 or times.size == 0:
         raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
+    model = driven(model, times if times.ndim else np.array([0.0, float(times)]), inputs)
     if times.ndim == 0:
         end = number("t", float(times), least=0.0)
         found = _core.simulate(model, None, end, state.tolist(), rtol, atol, stepper, dense)

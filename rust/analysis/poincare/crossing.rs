@@ -71,7 +71,7 @@ fn general<M: System<R, D>, R: Real, const D: usize>(
         true => law.system.rates(*t, x, law.sides),
         false => [R::zero(); D],
     };
-    function.value(&Place { t: *t, x, rates: &rates, parameters: law.parameters }, stack)
+    function.value(&Place { t: *t, x, rates: &rates, parameters: law.parameters, inputs: &[] }, stack)
 }
 
 /// A step that was taken.

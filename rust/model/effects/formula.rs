@@ -59,7 +59,8 @@ impl Formula {
             return wrong("has =, but what is wanted is only what adds to its slot".to_owned());
         }
         let states = QUANTITIES.map(str::to_owned);
-        let mut function = Expression::parse(text, Names { states: &states, parameters, rates: false })?;
+        let mut function =
+            Expression::parse(text, Names { states: &states, parameters, inputs: &[], rates: false })?;
         // The side of |Omega| is known, so that its kink is landed on.
         function
             .replace(&[Op::Push(Leaf::State(OMEGA)), Op::Unary(Unary::Abs)], Op::Push(Leaf::State(SPEED)));
@@ -134,6 +135,7 @@ impl Formula {
             Leaf::Time => at.t,
             Leaf::State(n) | Leaf::Rate(n) => at.quantity(n),
             Leaf::Parameter(i) => lift(values[i]),
+            Leaf::Input(_) => unreachable!("effects have no inputs"),
         };
         let value = if self.function.depth() <= SHALLOW {
             self.function.value_of(leaf, &mut [A::zero(); SHALLOW])

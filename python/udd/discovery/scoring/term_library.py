@@ -31,12 +31,13 @@ _WIDTHS = (0.3, 0.03, 0.002)
 def terms(model: FormulaModel) -> list[Candidate]:
     """Every term that is tried in the equations of a user's own model, but for dry friction.
 
-    Of the states that are no angles: a constant, all products up to the third degree, and each times its own
-    size; of each angle and of every two angles' difference sine and cosine, also times each other state; of
-    every angle the rate, where that is no state itself. An equation that only says that one state is the rate
-    of another gets none. Of a mechanical model, where a state is another one's rate, those come first by a
-    handicap that are forces as machines have them: springs, drags, gravity. Where it has a mass matrix, all
-    are forces along its coordinates, and those of machines act between two of them too.
+    Of the states that are no angles and of the measured inputs: a constant, all products up to the third
+    degree, and each times its own size; of each angle and of every two angles' difference sine and cosine,
+    also times each of the others; of every angle the rate, where that is no state itself. An equation that
+    only says that one state is the rate of another gets none. Of a mechanical model, where a state is another
+    one's rate, those come first by a handicap that are forces as machines have them: inputs, springs, drags,
+    gravity. Where it has a mass matrix, all are forces along its coordinates, and those of machines act
+    between two of them too.
     """
     plain = [(text, _name(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}
@@ -111,7 +112,13 @@ def _forces(model: FormulaModel, state: str) -> set[str]:
     turning = [*model.angles, *(f"{a} - {b}" for a, b in itertools.combinations(model.angles, 2))]
     drags = [text for v in speeds for text in (v, f"abs({v})*{v}", f"{v}^3")]
     springs = [text for x in places for text in (x, f"{x}^3")]
-    return {"1", *drags, *springs, *(f"{wave}({a})" for a in turning for wave in ("sin", "cos"))}
+    return {
+        "1",
+        *drags,
+        *springs,
+        *model.inputs,
+        *(f"{wave}({a})" for a in turning for wave in ("sin", "cos")),
+    }
 
 
 def _speeds(model: FormulaModel) -> dict[str, str]:
@@ -247,14 +254,14 @@ def _place(slot: str) -> str:
 
 def _unused(model: FormulaModel, *wanted: str) -> list[str]:
     """Names for a term's parameters that mean nothing in the model."""
-    taken = {*model.state_names, *dict(model.values), "t", "pi"}
+    taken = {*model.state_names, *dict(model.values), *model.inputs, "t", "pi"}
     return [
         next(n for n in (name, *(f"{name}{k}" for k in range(1, 99))) if n not in taken) for name in wanted
     ]
 
 
 def _of_states(model: FormulaModel) -> list[str]:
-    plain = [name for name in model.state_names if name not in model.angles]
+    plain = [name for name in (*model.state_names, *model.inputs) if name not in model.angles]
     degree = _DEGREE if len(plain) <= _FEW else 2
     powers = [p for d in range(degree + 1) for p in itertools.combinations_with_replacement(plain, d)]
     result = [_product(p) for p in powers] + [f"abs({name})*{name}" for name in plain]

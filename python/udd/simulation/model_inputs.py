@@ -1,0 +1,55 @@
+"""The signals that a run's inputs follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from udd.errors import MeasurementError, ModelError
+from udd.measurement import InputSignal, input_signals
+from udd.models import Model
+from udd.models.formula_model import FormulaModel
+
+__all__ = ["driven"]
+
+M = TypeVar("M", bound=Model)
+
+
+def driven(model: M, times: NDArray[np.float64], inputs: Mapping[str, InputSignal | ArrayLike] | None) -> M:
+    """The model with the signals of its inputs, which must be known for all of the run.
+
+    Parameters
+    ----------
+    model : Model
+    times : ndarray, shape (n,)
+        The first and the last time of the run at least; samples that come without times belong to these.
+    inputs : mapping of str to InputSignal or array_like, or None
+        None leaves the model as it is.
+
+    Raises
+    ------
+    ModelError
+        Inputs that the model does not have, or a signal that does not last as long as the run.
+    """
+    if inputs is None:
+        return model
+    if not isinstance(model, FormulaModel):
+        raise ModelError(f"a {type(model).__name__} has no inputs; a udd.Model(..., inputs=[...]) has")
+    if not isinstance(inputs, Mapping):
+        raise ModelError(f"inputs must be a table of names and signals, not {inputs!r}")
+    try:
+        signals = input_signals(inputs, times)
+    except MeasurementError as error:
+        raise ModelError(str(error)) from None
+    for name, signal in signals.items():
+        first, last = signal.span
+        slack = 1e-9 * (last - first)
+        if times[0] < first - slack or times[-1] > last + slack:
+            raise ModelError(
+                f"the input {name} is known from t = {first:g} to {last:g}, but the run goes from "
+                f"{times[0]:g} to {times[-1]:g}"
+            )
+    return model.with_inputs(signals)
