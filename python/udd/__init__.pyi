@@ -58,6 +58,8 @@ from .models import DLE as DLE
 from .models import Disk as Disk
 from .models import Model as Model
 from .models import Pendulum as Pendulum
+from .models import mechanism as mechanism
+from .models import pendulum_chain as pendulum_chain
 from .result_file import load as load
 from .result_file import save as save
 from .simulation.energy import energy_balance as energy_balance

@@ -22,6 +22,7 @@ from udd.chaos.largest_exponent import lyapunov
 from udd.errors import FitError, IntegrationError, ModelError
 from udd.measurement import Measurement
 from udd.models import Model, beyond_the_edge
+from udd.models.formula_model import FormulaModel
 from udd.models.profile import SensorProfile
 from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED
@@ -30,6 +31,7 @@ from udd.simulation.trajectory import method_for
 from . import Fit, Record, predicted, record_of
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .fit import fit
+from .formula_models import driven
 from .time_scale import motion_time_scale
 
 __all__ = ["Forecast", "forecast"]
@@ -252,7 +254,10 @@ def forecast(
     part, origin = _window(fitted, film, record, length)
 
     scale = max(fitted.scatter, 1.0) ** 0.5
-    models, cameras, states = _starts(fitted, film, part, asked, scale, random)
+    own = fitted.models[film]
+    if isinstance(own, FormulaModel) and own.inputs:
+        (own,) = driven((own,), (measurement,), origin)
+    models, cameras, states = _starts((fitted, own), film, part, asked, scale, random)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
@@ -279,7 +284,7 @@ def forecast(
         valid_time=float(valid_time),
         valid_low=float(shortest),
         valid_high=float(longest),
-        lyapunov_time=_growth(fitted.models[film], states, _GROWTH_TIME * unit),
+        lyapunov_time=_growth(own, states, _GROWTH_TIME * unit),
         measured_valid_time=_compared(measurement, profile.sensor, (clock, median), spread, large),
         fit=fitted,
         measurement=measurement,
@@ -337,12 +342,17 @@ def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Reco
 
 
 def _starts(
-    fitted: Fit, film: int, part: Record, asked: tuple[int, float], scale: float, rng: np.random.Generator
+    fit_and_model: tuple[Fit, Model],
+    film: int,
+    part: Record,
+    asked: tuple[int, float],
+    scale: float,
+    rng: np.random.Generator,
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
+    fitted, own = fit_and_model
     seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
     (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
-    own = fitted.models[film]
     order = list(own.parameters)
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []

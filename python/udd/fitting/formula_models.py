@@ -33,8 +33,12 @@ def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
     return rate
 
 
-def driven(models: Sequence[FormulaModel], measurements: Sequence[Measurement]) -> tuple[FormulaModel, ...]:
+def driven(
+    models: Sequence[FormulaModel], measurements: Sequence[Measurement], origin: float | None = None
+) -> tuple[FormulaModel, ...]:
     """Models with the inputs that their measurements hold, counted from each measurement's first row.
+
+    Or from another time on the measurements' clock.
 
     Raises
     ------
@@ -57,7 +61,7 @@ def driven(models: Sequence[FormulaModel], measurements: Sequence[Measurement]) 
                     f"the input {name} is known from t = {first:g} to {last:g}, "
                     f"but the measurement goes from {start:g} to {end:g}"
                 )
-            signals[name] = signal.shifted(-float(start))
+            signals[name] = signal.shifted(-float(start if origin is None else origin))
         records.append(signals)
     return tuple(model.with_inputs(*records, record=k) for k, model in enumerate(models))
 

@@ -6,7 +6,18 @@ from .base import Model, require_model
 from .compiled import beyond_the_edge
 from .disk import Disk
 from .dle import DLE
+from .mechanisms import mechanism, pendulum_chain
 from .pendulum import Pendulum
 from .registry import profile_of
 
-__all__ = ["DLE", "Disk", "Model", "Pendulum", "beyond_the_edge", "profile_of", "require_model"]
+__all__ = [
+    "DLE",
+    "Disk",
+    "Model",
+    "Pendulum",
+    "beyond_the_edge",
+    "mechanism",
+    "pendulum_chain",
+    "profile_of",
+    "require_model",
+]

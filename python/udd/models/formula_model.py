@@ -21,7 +21,7 @@ from udd.measurement.input_signal import InputSignal
 from .base import Model
 from .profile import DiscoveryProfile, DynamicsProfile, FitProfile, ModelProfile
 
-__all__ = ["FormulaModel"]
+__all__ = ["FormulaModel", "cofactor", "determinant"]
 
 _MOST_STATES = 6
 _POINT = "__"
@@ -250,11 +250,11 @@ class FormulaModel(Model):
                 raise ModelError(
                     f"a force acts along one of {', '.join(known)}{between}, not along {along!r}"
                 )
-        n, whole = len(known), _determinant(self.mass)
+        n, whole = len(known), determinant(self.mass)
         result = {}
         for i, speed in enumerate(self.speeds.values()):
-            parts = [_cofactor(self.mass, known.index(first), i)]
-            parts += [f"({_cofactor(self.mass, known.index(name), i)})" for name in rest]
+            parts = [cofactor(self.mass, known.index(first), i)]
+            parts += [f"({cofactor(self.mass, known.index(name), i)})" for name in rest]
             result[speed] = f"({' - '.join(parts)})/({whole})" if n > 1 else f"1/({whole})"
         return result
 
@@ -544,20 +544,20 @@ def _delays(
     return tuple((delays or {}).items())
 
 
-def _determinant(matrix: Sequence[Sequence[str]]) -> str:
+def determinant(matrix: Sequence[Sequence[str]]) -> str:
     """The determinant of a matrix of formulas, by its first row."""
     if len(matrix) == 1:
         return matrix[0][0]
-    parts = (f"({one})*({_cofactor(matrix, 0, k)})" for k, one in enumerate(matrix[0]))
+    parts = (f"({one})*({cofactor(matrix, 0, k)})" for k, one in enumerate(matrix[0]))
     return " + ".join(parts)
 
 
-def _cofactor(matrix: Sequence[Sequence[str]], i: int, k: int) -> str:
+def cofactor(matrix: Sequence[Sequence[str]], i: int, k: int) -> str:
     """A cofactor of a matrix of formulas; the inverse of a symmetric one is these over its determinant."""
     if len(matrix) == 1:
         return "1"
     rest = [[*row[:k], *row[k + 1 :]] for row in (*matrix[:i], *matrix[i + 1 :])]
-    return f"-({_determinant(rest)})" if (i + k) % 2 else f"({_determinant(rest)})"
+    return f"-({determinant(rest)})" if (i + k) % 2 else f"({determinant(rest)})"
 
 
 def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:

@@ -1,0 +1,202 @@
+"""Mechanisms stated as M(q) q'' = f: mass matrix and generalised forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from udd._util.expressions import Expression, text_of
+from udd.errors import ModelError
+
+from .formula_model import FormulaModel, cofactor, determinant
+
+__all__ = ["mechanism", "pendulum_chain"]
+
+_MOST_LINKS = 3  # six states
+
+
+def mechanism(
+    coordinates: Mapping[str, str],
+    mass: Sequence[Sequence[Expression]],
+    forces: Sequence[Expression],
+    parameters: Mapping[str, float] | None = None,
+    *,
+    angles: Iterable[str] = (),
+    inputs: Iterable[str] = (),
+    delays: Mapping[str, str] | None = None,
+) -> FormulaModel:
+    """Make a model of a mechanism from its equations of motion ``M(q) q'' = f(q, q', u, t)``.
+
+    The accelerations are those of Cramer's rule. What :func:`udd.discover` finds missing is a force, which
+    enters every acceleration through the mass matrix.
+
+    Parameters
+    ----------
+    coordinates : mapping of str to str
+        The name of each coordinate and of its speed.
+    mass : sequence of sequence of formula, shape (n, n)
+        The mass matrix M, symmetric.
+    forces : sequence of formula, shape (n,)
+        The generalised forces f, those of gravity and those of Coriolis among them.
+    parameters, angles, inputs, delays
+        As for :class:`udd.Model`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    ModelError
+        Tables that do not fit together, or what :class:`udd.Model` refuses.
+
+    Examples
+    --------
+    A motor with a torque and friction:
+
+    >>> import udd
+    >>> motor = udd.mechanism({"q": "v"}, [["J"]], ["torque - b*v"], {"J": 0.5, "b": 0.1}, inputs=["torque"])
+    >>> motor.equations["v"]
+    '(torque - b*v)/(J)'
+    """
+    if not isinstance(coordinates, Mapping) or not coordinates:
+        raise ModelError(f"coordinates must be a table of coordinates and their speeds, not {coordinates!r}")
+    n = len(coordinates)
+    try:
+        rows = [[text_of("the mass matrix", one) for one in row] for row in mass]
+        force = [text_of("a force", one) for one in forces]
+    except TypeError:
+        raise ModelError("mass must be a table of formulas, and forces a list of them") from None
+    if len(force) != n or [len(row) for row in rows] != [n] * n:
+        found = ", ".join(str(len(row)) for row in rows) or "none"
+        raise ModelError(
+            f"{n} coordinates need {n} forces and a mass matrix of {n} x {n}, "
+            f"not {len(force)} forces and rows of {found}"
+        )
+    whole = determinant(rows)
+    accelerations = []
+    for i in range(n):
+        parts = [f"({force[k]})*({cofactor(rows, k, i)})" for k in range(n)]
+        accelerations.append(f"({' + '.join(parts)})/({whole})" if n > 1 else f"({force[0]})/({whole})")
+    return FormulaModel(
+        [*coordinates, *coordinates.values()],
+        [*coordinates.values(), *accelerations],
+        parameters,
+        angles=angles,
+        mass=rows,
+        inputs=inputs,
+        delays=delays,
+    )
+
+
+def pendulum_chain(
+    masses: Sequence[float],
+    lengths: Sequence[float],
+    centres: Sequence[float],
+    inertias: Sequence[float],
+    *,
+    friction: Sequence[float] | None = None,
+    g: float = 9.81,
+    motors: bool = False,
+) -> FormulaModel:
+    """A chain of rigid pendulums in a plane, by Lagrange's equations: 1 to 3 links.
+
+    Angles ``a1, a2, ...`` are counted from hanging down [rad], each link's own (not relative to the link
+    above); speeds are ``w1, w2, ...``.
+
+    Parameters
+    ----------
+    masses : sequence of float, shape (n,)
+        [kg], parameters ``m1, ...``.
+    lengths : sequence of float, shape (n,)
+        From joint to joint [m], parameters ``l1, ...``; that of the last link plays no part.
+    centres : sequence of float, shape (n,)
+        From a link's upper joint to its centre of mass [m], parameters ``r1, ...``.
+    inertias : sequence of float, shape (n,)
+        Moments of inertia about the upper joints [kg m^2], parameters ``I1, ...``.
+    friction : sequence of float, shape (n,), optional
+        Viscous friction of the joints [N m s], parameters ``b1, ...``.
+    g : float
+        Gravity [m/s^2].
+    motors : bool
+        Whether each joint has a motor whose torque is a measured input, ``tau1, ...`` [N m].
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    ModelError
+        Lists of different lengths, or of more than three links.
+
+    Notes
+    -----
+    With ``M_ij = c_ij cos(a_i - a_j)``, ``c_ii = I_i + l_i^2 sum_{k>i} m_k`` and, for i < j,
+    ``c_ij = l_i (m_j r_j + l_j sum_{k>j} m_k)``, the equations are ``M a'' = -(c_ij sin(a_i - a_j) w_j^2
+    summed over j) - g (m_i r_i + l_i sum_{k>i} m_k) sin a_i`` and the joints' torques.
+
+    Examples
+    --------
+    A double pendulum keeps its energy:
+
+    >>> import numpy as np
+    >>> import udd
+    >>> chain = udd.pendulum_chain([1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0])
+    >>> run = udd.simulate(chain, 10.0, [2.0, 2.5, 0.0, 0.0], method="auto")
+    >>> a1, a2, w1, w2 = run.state[[0, -1]].T
+    >>> kinetic = w1**2 + w2**2 / 2 + w1 * w2 * np.cos(a1 - a2)
+    >>> energy = kinetic - 9.81 * (2 * np.cos(a1) + np.cos(a2))
+    >>> bool(abs(energy[1] - energy[0]) < 1e-6)
+    True
+    """
+    n = len(masses)
+    columns = {"m": masses, "l": lengths, "r": centres, "I": inertias}
+    if friction is not None:
+        columns["b"] = friction
+    if not 1 <= n <= _MOST_LINKS or any(len(values) != n for values in columns.values()):
+        raise ModelError(
+            f"a chain has 1 to {_MOST_LINKS} links with a mass, length, centre and inertia each, "
+            f"not {', '.join(str(len(values)) for values in columns.values())} of them"
+        )
+    links = range(1, n + 1)
+    below = {i: " + ".join(f"m{k}" for k in links if k > i) for i in links}
+
+    def moment(i: int) -> str:
+        """The first moment of link i about its joint, with the links below hanging at its end."""
+        return f"(m{i}*r{i} + l{i}*({below[i]}))" if below[i] else f"m{i}*r{i}"
+
+    def coefficient(i: int, j: int) -> str:
+        if i == j:
+            return f"(I{i} + l{i}^2*({below[i]}))" if below[i] else f"I{i}"
+        return f"l{min(i, j)}*{moment(max(i, j))}"
+
+    mass = [
+        [coefficient(i, j) + (f"*cos(a{min(i, j)} - a{max(i, j)})" if i != j else "") for j in links]
+        for i in links
+    ]
+    forces = []
+    for i in links:
+        parts = [f"-g*{moment(i)}*sin(a{i})"]
+        parts += [f"-{coefficient(i, j)}*sin(a{i} - a{j})*w{j}^2" for j in links if j != i]
+        # A joint's torque turns the link below it and turns the one above back.
+        for joint, sign, speed in ((i, "", f"(w{i} - w{i - 1})"), (i + 1, "-", f"(w{i + 1} - w{i})")):
+            if joint > n:
+                continue
+            if motors:
+                parts.append(f"{sign}tau{joint}")
+            if friction is not None:
+                speed = f"w{joint}" if joint == 1 else speed
+                parts.append(f"{'' if sign else '-'}b{joint}*{speed}")
+        forces.append(" + ".join(f"({part})" for part in parts))
+    values = {
+        f"{name}{i}": float(v) for name, own in columns.items() for i, v in zip(links, own, strict=True)
+    }
+    del values[f"l{n}"]
+    return mechanism(
+        {f"a{i}": f"w{i}" for i in links},
+        mass,
+        forces,
+        values | {"g": float(g)},
+        angles=[f"a{i}" for i in links],
+        inputs=[f"tau{i}" for i in links] if motors else [],
+    )

@@ -1,0 +1,86 @@
+"""Mechanisms: the double pendulum as textbooks have it, energy, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import udd
+from udd.errors import ModelError
+
+G = 9.81
+
+
+def point_masses(n: int, **more: Any) -> Any:
+    ones = [1.0] * n
+    return udd.pendulum_chain(ones, ones, ones, ones, **more)
+
+
+def test_the_double_pendulum_of_the_textbooks() -> None:
+    # Two unit point masses on unit rods, solved for the accelerations by hand.
+    rng = np.random.default_rng(1)
+    for a1, a2, w1, w2 in rng.normal(size=(20, 4)) * 2:
+        d = a1 - a2
+        low = 3 - np.cos(2 * d)
+        first = (
+            -3 * G * np.sin(a1) - G * np.sin(a1 - 2 * a2) - 2 * np.sin(d) * (w2**2 + w1**2 * np.cos(d))
+        ) / low
+        second = 2 * np.sin(d) * (2 * w1**2 + 2 * G * np.cos(a1) + w2**2 * np.cos(d)) / low
+        rates = point_masses(2).rates(0.0, [a1, a2, w1, w2])
+        np.testing.assert_allclose(rates, [w1, w2, first, second], rtol=1e-12, atol=1e-12)
+
+
+def test_three_links_keep_their_energy() -> None:
+    chain = point_masses(3)
+    run = udd.simulate(chain, np.linspace(0, 5, 50), [1.0, 2.0, 2.5, 0, 0, 0], method="auto", rtol=1e-11)
+    a, w = run.state[:, :3], run.state[:, 3:]
+    kinetic = 0.5 * np.einsum("ni,nij,nj->n", w, chain.mass_matrix(run.state), w)
+    energy = kinetic - G * (3 * np.cos(a[:, 0]) + 2 * np.cos(a[:, 1]) + np.cos(a[:, 2]))
+    # Some thousand steps of 1e-11 of energies of some tens.
+    np.testing.assert_allclose(energy, energy[0], atol=1e-7)
+
+
+def test_friction_and_motors_act_in_the_joints() -> None:
+    chain = point_masses(2, friction=[0.3, 0.2], motors=True)
+    signals = {
+        name: udd.InputSignal([0.0, 1.0], [value] * 2) for name, value in (("tau1", 0.7), ("tau2", -0.4))
+    }
+    state = np.array([0.0, 0.0, 1.5, -0.5])
+    rates = chain.with_inputs(signals).rates(0.5, state)[2:]
+    # Hanging, M = [[2, 1], [1, 1]]; joint 2 turns link 2 by its torque and link 1 back.
+    second = -0.4 - 0.2 * (-0.5 - 1.5)
+    force = [0.7 - 0.3 * 1.5 - second, second]
+    np.testing.assert_allclose(rates, np.linalg.solve([[2.0, 1.0], [1.0, 1.0]], force), rtol=1e-12)
+
+
+def test_a_missing_force_enters_every_acceleration() -> None:
+    chain = point_masses(2)
+    pushed = chain.with_effects([udd.effects.formula("force(a2)", "c", c=0.5)])
+    state = [0.3, -0.4, 0.0, 0.0]
+    more = pushed.rates(0.0, state) - chain.rates(0.0, state)
+    np.testing.assert_allclose(more[2:], np.linalg.solve(chain.mass_matrix(state), [0.0, 0.5]), rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (({"q": "v"}, [["1", "0"]], ["0"]), "1 coordinates need 1 forces and a mass matrix of 1 x 1"),
+        (({"q": "v"}, [["1"]], []), "not 0 forces and rows of 1"),
+        (({"q": "v"}, 3, ["0"]), "mass must be a table of formulas"),
+        ((["q"], [["1"]], ["0"]), "coordinates must be a table"),
+        (({"q": "v"}, [["-1"]], ["0"]), "must be positive definite"),
+        (({"q": "v"}, [["m"]], ["0"]), "unknown name m"),
+    ],
+)
+def test_bad_mechanisms_are_named(arguments: Any, says: str) -> None:
+    with pytest.raises(ModelError, match=says):
+        udd.mechanism(*arguments)
+
+
+def test_chains_have_one_to_three_links() -> None:
+    with pytest.raises(ModelError, match="1 to 3 links"):
+        udd.pendulum_chain([1.0] * 4, [1.0] * 4, [1.0] * 4, [1.0] * 4)
+    with pytest.raises(ModelError, match="not 2, 2, 1, 2 of them"):
+        udd.pendulum_chain([1.0] * 2, [1.0] * 2, [1.0], [1.0] * 2)
