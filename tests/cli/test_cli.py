@@ -244,6 +244,32 @@ def test_bad_files_are_refused(
     assert set(tmp_path.iterdir()) == before
 
 
+def test_columns_and_inputs_by_name_of_several_kinds_of_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t = np.arange(80) / 20
+    swing = 0.3 * np.exp(-0.1 * t) * np.cos(4 * t) + np.random.default_rng(2).normal(0, 1e-3, t.size)
+    rows = [f"{a};{b:.6f};{c:.6f}".replace(".", ",") for a, b, c in zip(t, np.degrees(swing), t, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["Zeit (s);Winkel (deg);Moment (N m)", *rows]), "utf-8-sig")
+    np.savez(tmp_path / "b.npz", time=t, winkel=swing, moment=t)
+    model = {"states": ["theta", "v"], "equations": {"theta": "v", "v": "-a*theta - c*v"}}
+    (tmp_path / "m.json").write_text(json.dumps(model | {"parameters": {"a": 15.0, "c": 0.1}}))
+    argv = ["fit", tmp_path / "a.csv", tmp_path / "b.npz", "--model", tmp_path / "m.json"]
+    argv += ["--columns", "theta=Winkel", "--inputs", "tau=Moment"]
+    assert main([*map(str, argv), "--json"]) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)["parameters"]
+    assert (
+        abs(found["a"]["value"] - 16.01) < 0.1 and abs(found["c"]["value"] - 0.2) < 0.1
+    )  # by the closed form
+    assert (
+        "a.csv: read t from Zeit (s), theta from Winkel (deg), deg to rad, input tau from Moment (N m)" in err
+    )
+    assert "b.npz: read t from time, theta from winkel, input tau from moment" in err
+    argv[5:] = ["--columns", "theta=Angle"]
+    assert "a.csv: no column Angle: found Zeit (s), Winkel (deg), Moment (N m)" in failed(argv, capsys)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -134,7 +134,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
         from udd.measurement import read_measurement
         from udd.measurement.read import columns_of, told
 
-        states = None
+        states, inputs = None, args.inputs
         if args.model is not None:
             there = columns_of(args.file, args.columns)
             model = own_model(args)
@@ -144,11 +144,13 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                     f"{args.file} has columns {', '.join(there)}, none of which is a state of {args.model}: "
                     f"{', '.join(model.state_names)}"
                 )
+            if inputs is None:
+                inputs = [name for name in getattr(model, "inputs", ()) if name in there]
         measurement = read_measurement(
             args.file,
             args.columns,
             states,
-            inputs=args.inputs,
+            inputs=inputs,
             rate=args.sampling,
             repeated=args.repeated,
             part=args.part,
