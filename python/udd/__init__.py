@@ -12,7 +12,7 @@ import lazy_loader
 _attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 #: Names of before, which work for one release more.
-_RENAMED = {"energy_books": "energy_balance"}
+_RENAMED = {"energy_books": "energy_balance", "relatives": "related_systems"}
 
 
 def __getattr__(name: str) -> object:

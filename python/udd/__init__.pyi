@@ -4,7 +4,7 @@ from . import effects as effects
 from . import errors as errors
 from . import paper as paper
 from . import plot as plot
-from . import relatives as relatives
+from . import related_systems as related_systems
 from .attractors import basins as basins
 from .attractors import bifurcation as bifurcation
 from .bifurcations import BifurcationPoint as BifurcationPoint

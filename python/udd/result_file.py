@@ -16,13 +16,14 @@ import zlib
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
 from udd._util.atomic_files import write_whole
+from udd._util.schema import consistent, is_a
 from udd.discovery import Discovery
 from udd.discovery.nonparametric.bsplines import Spline
 from udd.discovery.nonparametric.curve_scan import Curve
@@ -59,6 +60,23 @@ _TYPES: dict[str, type] = {
         *(Curve, Spline, Score, Absorbed),
     )
 }
+#: Shapes of what goes together: n frames, m channels, d states, p free parameters, l links, f films.
+_SHAPES = {
+    "Record": "t:n seen:nm sigma:nm rho:nmm linked:l states:nd odd:n row:n film:n origins:f",
+    "Problem": "record.t:n record.seen:nm noise.weight:n noise.factor:m models:f record.origins:f",
+    "Noise": "factor:m blur:m memory:m weight:n",
+    "Fit": "record.t:n record.seen:nm record.linked:l states:nd state_covariance:ndd misfit:nm defect:ld "
+    "misfit_variance:nm noise.factor:m noise.weight:n parameters:p errors:p covariance:pp problem.free:p "
+    "point.states:nd models:f measurements:f point.sets:f record.origins:f",
+    "Errors": "horizons:h median:h low:h high:h floor:h samples:sh blocks:s run:r run_blocks:r",
+    "Curve": "coefficients:k covariance:kk score.gradient:k score.information:kk coordinates:c splines:c "
+    "places:c",
+    "Score": "gradient:k information:kk alone:k",
+    "Absorbed": "rows:ak vectors:ka",
+    "Discovery": "scans:s curves:s comparisons:s",
+}
+#: Fields that were called otherwise in files of before.
+_RENAMED = {"Discovery": {"looks": "comparisons", "refused": "rejected"}}
 _BROKEN = (
     *(AttributeError, IndexError, KeyError, OSError, OverflowError, RecursionError, TypeError, ValueError),
     *(EOFError, MemoryError, NotImplementedError, zipfile.BadZipFile, zlib.error),
@@ -206,6 +224,24 @@ class _Writer:
         return {"type": name, "fields": known | more}
 
 
+def checked(name: str, given: dict[str, Any]) -> Any:
+    """An object of one of the types of a file, its fields' types and shapes checked.
+
+    Raises
+    ------
+    ValueError
+        A field of another type, or shapes that do not go together.
+    """
+    hints = get_type_hints(_TYPES[name])
+    for field, value in given.items():
+        if field in hints and not is_a(value, hints[field]):
+            raise ValueError(field)
+    result = _TYPES[name](**given)
+    if not consistent(result, _SHAPES.get(name, "")):
+        raise ValueError(name)
+    return result
+
+
 def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
     """The last object of a file."""
     model = model_from_dict(tree["model"])
@@ -238,9 +274,10 @@ def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
         if "type" not in data:
             ((kind, content),) = data.items()
             return made[kind](content)
-        given = {name: value(x) for name, x in data["fields"].items()}
+        before = _RENAMED.get(data["type"], {})
+        given = {before.get(name, name): value(x) for name, x in data["fields"].items()}
         doubts = given.pop("doubts", None)
-        result = _TYPES[data["type"]](**given)
+        result = checked(data["type"], given)
         if doubts is not None:
             vars(result)["doubts"] = doubts
         return result

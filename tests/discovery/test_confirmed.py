@@ -35,7 +35,7 @@ def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path
     found = udd.discover(*in_air())
     assert found.verdict == "fits the first part, not confirmed"
     assert found.effects == [] and found.model.effects == ()
-    assert [(near.title, near.why) for near in found.refused] == [("quadratic drag", "unconfirmed")]
+    assert [(near.title, near.why) for near in found.rejected] == [("quadratic drag", "unconfirmed")]
     first = describe(found).splitlines()[0]
     assert first.startswith(
         "fits the first part, not confirmed: Not confirmed: quadratic drag fits the first"

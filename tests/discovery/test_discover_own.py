@@ -180,18 +180,18 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
     train = frames.first(TRAIN)
     part, whole = (fit_record(record, some, known, search=True) for some in (frames.part(train), frames))
     search = Search(frames, ~train, Clock(None, lambda _text: None), motion_time_scale(part))
-    states, accepted, looks = [SearchState(part, whole, search.errors(part))], [], []
+    states, accepted, rounds = [SearchState(part, whole, search.errors(part))], [], []
     for title in ("v^3 in v'", "v in v'"):
-        looks.append(score_round(states[-1].part))
-        (wanted,) = (s for s in looks[-1].library.scored if s.candidate.title == title)
+        rounds.append(score_round(states[-1].part))
+        (wanted,) = (s for s in rounds[-1].library.scored if s.candidate.title == title)
         trial = of_library(states[-1].part, [wanted.candidate], list(wanted.amplitudes))
-        step = search._accept(states[-1], fitted_ones([trial]), looks[-1])
+        step = search._accept(states[-1], fitted_ones([trial]), rounds[-1])
         assert step
         accepted.append(step[0])
         states.append(step[1])
-    search._leave_out(accepted, states, looks)
+    search._leave_out(accepted, states, rounds)
     assert [[c.title for c in step.candidates] for step in accepted] == [["v in v'"]]
-    assert len(states) == 2 and len(looks) == 1
+    assert len(states) == 2 and len(rounds) == 1
 
 
 @pytest.mark.slow

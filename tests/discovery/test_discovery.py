@@ -102,7 +102,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     ],
 )
 def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, found):
-    monkeypatch.setattr(acceptance_tests, "held_ratio", lambda *_: ratio)
+    monkeypatch.setattr(acceptance_tests, "held_out_ratio", lambda *_: ratio)
     monkeypatch.setattr(acceptance_tests, "_expected", lambda *_: expected)
     assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0).effects) == found
 
@@ -199,10 +199,10 @@ def test_the_strongest_ripple_is_found_between_lines_too(shift):
     fitted = udd.fit(measured, udd.Disk(0.08))
     listed = ripples(fitted.model, fitted.record.t)
     best = max(scan_ripples(fitted, listed), key=lambda s: s.chi2)
-    found, looks = strongest_ripple(fitted)
+    found, comparisons = strongest_ripple(fitted)
     assert best.chi2 > 30.0
     assert found is not None and found.candidate == best.candidate
-    assert looks == len(listed)
+    assert comparisons == len(listed)
 
 
 def test_a_result_is_data():
@@ -235,14 +235,14 @@ def test_what_comes_nearest_is_told_but_not_added():
     assert found.verdict == "effect present, form not identified"
     assert found.effects == []
     assert found.ratio == (1.0, 1.0, 1.0)
-    assert "quadratic drag" in [near.title for near in found.refused]
-    for near in found.refused:
+    assert "quadratic drag" in [near.title for near in found.rejected]
+    for near in found.rejected:
         assert near.why == "chance"
         assert near.p >= acceptance_tests.ALPHA
         assert near.ratio[2] < 1.0
         assert near.errors.whole < found.error_before.whole
-    assert [near["name"] for near in found.to_dict()["refused"]] == [n.effect.name for n in found.refused]
-    assert "would bring the held-out error" in wording.refused(found)[0]
+    assert [near["name"] for near in found.to_dict()["refused"]] == [n.effect.name for n in found.rejected]
+    assert "would bring the held-out error" in wording.rejected(found)[0]
 
 
 def test_a_short_record_is_refused():
@@ -279,6 +279,6 @@ def test_a_formula_that_free_runs_contradict_ends_the_search(shared):
     said: list[str] = []
     found = udd.discover(measured, udd.Pendulum(0.65, k0=0.01 * 0.65**2), progress=said.append)
     assert [f.effect.name for f in found.effects] == ["cubic_drag"]
-    if [r.why for r in found.refused] != ["unconfirmed"]:
+    if [r.why for r in found.rejected] != ["unconfirmed"]:
         pytest.skip("the symbolic regression, which rounds as the processor does, finds another formula here")
     assert not any("surfaces" in step for step in said)  # which took nine tenths of the time

@@ -19,7 +19,7 @@ def fitted() -> udd.Fit:
 
 
 def test_contributions_add_up_to_the_standard_errors(fitted: udd.Fit) -> None:
-    found = fitted.budget(held={})
+    found = fitted.budget(fixed={})
     assert found.sources[0] == "noise" and {"camera", "scale", "W"} <= set(found.sources)
     for name in ("k0", "k1", "k2", "W"):
         # C = C N C + C P C is exact.
@@ -31,13 +31,13 @@ def test_contributions_add_up_to_the_standard_errors(fitted: udd.Fit) -> None:
 def test_a_number_that_the_frames_do_not_tell_is_its_prior(fitted: udd.Fit) -> None:
     measured = fitted.measurement
     held = udd.fit(measured, udd.Disk(0.042), free=["k0", "W"], priors={"W": (0.042, 1e-9)})
-    found = held.budget(held={})
+    found = held.budget(fixed={})
     k = found.sources.index("W")
     assert found.shares[list(found.values).index("W"), k] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_what_was_held_contributes_as_a_fit_with_another_value_moves(fitted: udd.Fit) -> None:
-    found = fitted.budget(held={"g": 0.02})
+    found = fitted.budget(fixed={"g": 0.02})
     other = udd.fit(fitted.measurement, udd.Disk(0.042, g=9.81 + 0.02))
     k = found.sources.index("g")
     for i, name in enumerate(found.values):

@@ -35,7 +35,7 @@ def test_names_of_the_profile_are_names_of_the_model(model: Model) -> None:
         model.profile.dynamics, model.profile.sensor, model.profile.fit, model.profile.shown
     )  # fmt: skip
     parameters, states = set(model.parameters), set(model.state_names)
-    assert set(fit.priors or ()) | set(fit.held) | set(fit.stated) | set(fit.unknown) <= parameters
+    assert set(fit.priors or ()) | set(fit.fixed) | set(fit.stated) | set(fit.unknown) <= parameters
     assert {dynamics.drive} - {None} <= parameters and set(shown.meanings) <= parameters
     assert {dynamics.section, dynamics.rotation} - {None} <= states
     assert set(sensor.columns) | set(fit.equations or ()) | set(shown.columns) | set(shown.path) <= states

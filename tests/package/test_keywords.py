@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 import warnings
 
 import pytest
@@ -49,3 +51,16 @@ def test_a_partial_result_is_warned_of_where_the_package_was_called() -> None:
         warnings.simplefilter("always")
         udd.errors.interrupted(None, "half is missing", partial=True)
     assert told[0].filename == __file__
+
+
+def test_attributes_and_modules_of_before_work_with_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = udd.DLE(1.0)
+    with pytest.warns(DeprecationWarning, match="DLE.slow is called time_scale now") as told:
+        before = model.slow
+    assert told[0].filename == __file__ and before == model.time_scale
+    with pytest.warns(DeprecationWarning, match="called udd.related_systems now"):
+        assert udd.relatives is udd.related_systems
+    monkeypatch.delitem(sys.modules, "udd.relatives", raising=False)
+    with pytest.warns(DeprecationWarning, match="called udd.related_systems now"):
+        again = importlib.import_module("udd.relatives")
+    assert again.lorenz is udd.related_systems.lorenz

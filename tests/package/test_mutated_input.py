@@ -57,7 +57,7 @@ SWEEPS: list[Any] = [
     {
         "quantity": "final_state",
         "model": {
-            "kind": "own",
+            "kind": "formula",
             "states": ["x", "v"],
             "equations": {"x": "v", "v": "-k*x"},
             "parameters": [["k", 1.0]],

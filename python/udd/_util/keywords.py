@@ -40,6 +40,17 @@ def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return decorator
 
 
+def renamed_attribute(old: str, new: str) -> property:
+    """Let an attribute be read by its name of before, too, with a DeprecationWarning."""
+
+    def read(self: Any) -> Any:
+        text = f"{type(self).__name__}.{old} is called {new} now"
+        warnings.warn(text, DeprecationWarning, stacklevel=outside())
+        return getattr(self, new)
+
+    return property(read, doc=f"Name of before of `{new}`.")
+
+
 def with_defaults(function: str, defaults: Options, given: Mapping[str, Any]) -> Options:
     """The keyword arguments that a function shares with others, those not given by their defaults.
 

@@ -164,9 +164,9 @@ def lyapunov(
     n, shape = len(orbits), orbits.shape
     for drives in (orbits.values[name] for name in own if n):
         DLE(float(drives.min()))  # refuses what is negative
-    slow = model.slow
-    time, skipped = span(t, transient, longest=1e5 * slow, skip=400.0 * slow)
-    goal = number("tol", 2e-3 / slow if tol is None else tol, above=0.0)
+    time_scale = model.time_scale
+    time, skipped = span(t, transient, longest=1e5 * time_scale, skip=400.0 * time_scale)
+    goal = number("tol", 2e-3 / time_scale if tol is None else tol, above=0.0)
     rtol, atol = tolerances(rtol, atol)
     start = initial_state(model, default_state(model) if state0 is None else state0)
     workers = thread_count(threads)

@@ -174,9 +174,9 @@ def lyapunov_spectrum(
     ((600,), True)
     """
     model = w if isinstance(w, Model) else DLE(number("w", w, least=0.0))
-    slow = model.slow
-    time, skipped = span(t, transient, longest=2e5 * slow, skip=400.0 * slow)
-    goal = number("tol", 1e-3 / slow if tol is None else tol, above=0.0)
+    time_scale = model.time_scale
+    time, skipped = span(t, transient, longest=2e5 * time_scale, skip=400.0 * time_scale)
+    goal = number("tol", 1e-3 / time_scale if tol is None else tol, above=0.0)
     rtol, atol = tolerances(rtol, atol)
     start = initial_state(model, default_state(model) if state0 is None else state0)
 
@@ -186,7 +186,7 @@ def lyapunov_spectrum(
     found = run(start, time, skipped, goal)
     fate = run.fate(found["end"][0])
     spent, finer = float(found["time"][0]), goal
-    while not (fate.ordered or _positive(found, slow)) and spent < time:
+    while not (fate.ordered or _positive(found, time_scale)) and spent < time:
         # Neither order nor chaos yet: on from here, for longer.
         finer /= 2.0
         found = run(found["end"][0], time - spent, 0.0, finer)
@@ -195,13 +195,13 @@ def lyapunov_spectrum(
     if not fate.ordered:
         # Chaos that has not ended may yet do so; without tangents the way there is short.
         fate = run.fate(found["end"][0], time - spent)
-    other = fate.kind != "aperiodic" and (_positive(found, slow) or fate.t > 0.0)
+    other = fate.kind != "aperiodic" and (_positive(found, time_scale) or fate.t > 0.0)
     aside = spent + fate.t if other else 0.0
     if fate.kind != "aperiodic" and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
         # The averages are of the way there: once more, of what it leads to.
         found = run(fate.state, time, 0.0, goal)
         fate = run.fate(found["end"][0])
-        if fate.kind == "settling" and _positive(found, slow):
+        if fate.kind == "settling" and _positive(found, time_scale):
             # Neighbours part all the way: chaos in bands too narrow to be told from points.
             fate = replace(fate, kind="aperiodic")
         aside = aside if fate.kind != "aperiodic" else 0.0
@@ -225,7 +225,7 @@ def lyapunov_spectrum(
         verdict = fate.kind
     else:
         verdict = "undecided"
-        if fate.kind == "aperiodic" and _positive(found, slow):
+        if fate.kind == "aperiodic" and _positive(found, time_scale):
             verdict = "chaos"
         elif fate.kind == "aperiodic" and _on_torus(model, found):
             verdict = "torus"
@@ -234,7 +234,7 @@ def lyapunov_spectrum(
     # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
     dimension = {"equilibrium": 0.0, "periodic orbit": 1.0}.get(verdict) or kaplan_yorke(values)
     if verdict == "torus":
-        dimension = kaplan_yorke(np.where(np.abs(values) < _STAYS / slow, 0.0, values))
+        dimension = kaplan_yorke(np.where(np.abs(values) < _STAYS / time_scale, 0.0, values))
     return Spectrum(
         values,
         errors,
@@ -251,14 +251,14 @@ def lyapunov_spectrum(
     )
 
 
-def _positive(found: _core._Orbits, slow: float) -> bool:
+def _positive(found: _core._Orbits, time_scale: float) -> bool:
     """Whether neighbouring orbits part, and faster than by any power of the time up to the second.
 
     Where energy is kept those of regular motion part in proportion to time. The scatter of an exponent's
     means does not show that: all of them are above zero.
     """
     value, time = found["value"][0, 0], float(found["time"][0])
-    grown = value * time > _POWER * np.log1p(time / slow)
+    grown = value * time > _POWER * np.log1p(time / time_scale)
     return bool(value > _SIGMAS * found["standard_error"][0, 0] and grown)
 
 
@@ -266,7 +266,7 @@ def _on_torus(model: Model, found: _core._Orbits) -> bool:
     """Whether distances stay as they are in two directions, and grow in none."""
     # Angles that nothing depends on neither grow nor shrink on any motion.
     free = int((~np.isfinite(coordinates_of(model, found["end"]).size)).sum())
-    value, zero = found["value"][0], _STAYS / model.slow
+    value, zero = found["value"][0], _STAYS / model.time_scale
     return bool(value.max() < zero and (np.abs(value) < zero).sum() - free >= 2)
 
 
@@ -483,9 +483,9 @@ def covariant_vectors(
     """
     require_model(model)
     n = whole("n", n, 1)
-    slow = model.slow
-    step = number("dt", 0.5 * slow if dt is None else dt, above=0.0)
-    aside = number("transient", 200.0 * slow if transient is None else transient, least=0.0)
+    time_scale = model.time_scale
+    step = number("dt", 0.5 * time_scale if dt is None else dt, above=0.0)
+    aside = number("transient", 200.0 * time_scale if transient is None else transient, least=0.0)
     rtol, atol = tolerances(rtol, atol)
     start = initial_state(model, default_state(model) if state0 is None else state0)
     extra = int(np.ceil(aside / step))

@@ -88,7 +88,7 @@ def describe(found: Discovery) -> str:
         lines.append(f"  ratio {numbers.ratio}, 95 % interval {numbers.interval}")
     else:
         lines.append(f"  held-out error {span}: {numbers.before}")
-    lines += [f"  nearest: {plain(sentence)}" for sentence in wording.refused(found)]
+    lines += [f"  nearest: {plain(sentence)}" for sentence in wording.rejected(found)]
     lines.append(f"  noise floor after {at}: {numbers.floor}")
     lines.append(f"  noise: {wording.noise(found)}")
     for other in found.alternatives:

@@ -223,7 +223,7 @@ def own_model(args: argparse.Namespace) -> Model:
         raise UddError("--model says everything of the model: --pendulum and --W do not apply")
     data = _own(args)
     data.pop("state0", None)
-    return model_from_dict({"kind": "own"} | data)
+    return model_from_dict({"kind": "formula"} | data)
 
 
 def start_of(args: argparse.Namespace) -> Any:

@@ -161,12 +161,12 @@ def discover(
     random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
     lost = not found and misses_the_motion(before, record, ~train)
     unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
-    refused: list[RejectedEffect] = end.unconfirmed
+    rejected: list[RejectedEffect] = end.unconfirmed
     stopped = end.stopped
-    if unexplained and not refused and end.looks:
+    if unexplained and not rejected and end.rounds:
         try:
             clock.tell("trying what comes nearest")
-            refused = search.refused(begin, end.looks[-1])
+            rejected = search.rejected(begin, end.rounds[-1])
         except TimeUpError as up:
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
@@ -194,12 +194,12 @@ def discover(
         error_before=before,
         error_after=end.errors,
         ratio=ratio,
-        scans=[sorted(look.library.scored, key=lambda s: -s.chi2) for look in end.looks],
-        curves=[look.curves for look in end.looks],
-        looks=[look.looks for look in end.looks],
+        scans=[sorted(one.library.scored, key=lambda s: -s.chi2) for one in end.rounds],
+        curves=[one.curves for one in end.rounds],
+        comparisons=[one.comparisons for one in end.rounds],
         split=float(record.clock[np.flatnonzero(~train)[0]]),
         trained=end.part.put_away(),
-        refused=refused,
+        rejected=rejected,
         thinned=thin if any(own.every > 1 for own in thin) else [],
         budget=clock.budget if stopped else None,
         stopped=stopped,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from udd._util.keywords import renamed_attribute
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.held_out_errors import Errors, Ratio, comparison_horizon, lacks_more
@@ -185,7 +186,7 @@ class Discovery:
     verdict : str
         ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or
         ``"fits the first part, not confirmed"`` where free runs over the held-out data do not bear it out:
-        what that is stands in `refused`. ``"search not finished"`` where its time was up before anything
+        what that is stands in `rejected`. ``"search not finished"`` where its time was up before anything
         was found.
     baseline, fit : Fit
         The model without and with the added effects, each fitted to all data; the same where none was added.
@@ -202,11 +203,11 @@ class Discovery:
         What the score said of every candidate, for each round of the search, the best first.
     curves : list of list of Curve
         The same of every curve that an equation may lack, as a function of anything.
-    looks : list of int
+    comparisons : list of int
         How many candidates and curves each round looked at, every frequency counted.
     split : float
         Time from which the data were held out, s; of the first measurement.
-    refused : list of RejectedEffect
+    rejected : list of RejectedEffect
         Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
         was not confirmed.
     thinned : list of Thinned
@@ -234,15 +235,18 @@ class Discovery:
     ratio: Ratio
     scans: list[list[Scored]]
     curves: list[list[Curve]]
-    looks: list[int]
+    comparisons: list[int]
     split: float
     trained: Fit = field(repr=False)
-    refused: list[RejectedEffect] = field(default_factory=list)
+    rejected: list[RejectedEffect] = field(default_factory=list)
     thinned: list[Thinned] = field(default_factory=list)
     budget: float | None = None
     stopped: str | None = None
     excused: list[str] | None = None
     random: list[ModelError] = field(default_factory=list)
+
+    looks = renamed_attribute("looks", "comparisons")
+    refused = renamed_attribute("refused", "rejected")
 
     def __repr__(self) -> str:
         """The verdict on one line."""
@@ -325,10 +329,10 @@ class Discovery:
                 for one in readings(self.fit)
                 if one.coarse
             ]
-        held = [name for name in self.baseline.parameters if name not in self.fit.parameters]
-        if held:
+        fixed = [name for name in self.baseline.parameters if name not in self.fit.parameters]
+        if fixed:
             said.append(
-                f"Held as stated, because they run away where they are free: {', '.join(held)}. What was "
+                f"Held as stated, because they run away where they are free: {', '.join(fixed)}. What was "
                 "found may make up for errors in these."
             )
         said += [
@@ -358,7 +362,7 @@ class Discovery:
             "noise": [vars(one) for one in self.noise],
             "effects": [found.to_dict() for found in self.effects],
             "alternatives": [other.to_dict() for other in self.alternatives],
-            "refused": [near.to_dict() for near in self.refused],
+            "refused": [near.to_dict() for near in self.rejected],
             "error_before": self.error_before.to_dict(),
             "error_after": self.error_after.to_dict(),
             "held_out_ratio": _named(self.ratio),

@@ -31,7 +31,7 @@ class ScoreRound:
     library : Scan
     curves : list of Curve
         The likeliest first.
-    looks : int
+    comparisons : int
         How many scores could have been the best, around all fits that were tried: the number of tests, by
         which Bonferroni's correction multiplies each probability.
     """
@@ -39,7 +39,7 @@ class ScoreRound:
     fit: Fit
     library: Scan
     curves: list[Curve]
-    looks: int
+    comparisons: int
 
     def usable(self) -> list[Scored]:
         """The candidates with physical numbers whose work no free parameter does, the strongest first."""
@@ -49,7 +49,7 @@ class ScoreRound:
     def passing(self) -> list[Scored]:
         """Those of them that neither chance nor a film's faults explain."""
         faults = self.fit.faults
-        return [s for s in self.usable() if s.p * self.looks < ALPHA and s.chi2 > faults]
+        return [s for s in self.usable() if s.p * self.comparisons < ALPHA and s.chi2 > faults]
 
     def nats(self, scored: Scored) -> float:
         """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
@@ -81,23 +81,23 @@ def score_round(
     candidates; `watched` makes work that does not begin once a search's time is up.
     """
 
-    def look(current: Fit) -> ScoreRound:
+    def score(current: Fit) -> ScoreRound:
         ripple, frequencies = strongest_ripple(current)
         best = [ripple.candidate] if ripple else []
         scanned = scan(current, [*library(current.model, given, current.states), *best])
         curves = scan_curves(current)
-        looks = len(scanned.scored) + frequencies + curves.looks
-        return ScoreRound(current, scanned, curves.curves, looks)
+        comparisons = len(scanned.scored) + frequencies + curves.comparisons
+        return ScoreRound(current, scanned, curves.curves, comparisons)
 
-    found = parallel_map(watched(look), dict.fromkeys((fitted, with_larger_model_error(fitted, _SCATTER))))
-    return replace(max(found, key=ScoreRound.strongest), looks=sum(look.looks for look in found))
+    found = parallel_map(watched(score), dict.fromkeys((fitted, with_larger_model_error(fitted, _SCATTER))))
+    return replace(max(found, key=ScoreRound.strongest), comparisons=sum(one.comparisons for one in found))
 
 
-def with_surfaces(look: ScoreRound) -> ScoreRound:
+def with_surfaces(scores: ScoreRound) -> ScoreRound:
     """With the surfaces over two coordinates."""
-    found = scan_curves(look.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
-    curves = sorted(look.curves + found.curves, key=lambda c: -c.evidence)
-    return replace(look, curves=curves, looks=look.looks + found.looks)
+    found = scan_curves(scores.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
+    curves = sorted(scores.curves + found.curves, key=lambda c: -c.evidence)
+    return replace(scores, curves=curves, comparisons=scores.comparisons + found.comparisons)
 
 
 def states_first(curves: list[Curve]) -> list[Curve]:

@@ -131,7 +131,7 @@ def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tupl
     return list(zip(left, right, strict=False))
 
 
-def _chance(pair: Pair, trial: TrialFit, look: ScoreRound) -> tuple[float, float]:
+def _chance(pair: Pair, trial: TrialFit, scores: ScoreRound) -> tuple[float, float]:
     """By how much chi2 fell from one fit of all data to another, and the probability of that by chance."""
     from scipy.stats import ncx2  # takes half a second to import
 
@@ -139,7 +139,7 @@ def _chance(pair: Pair, trial: TrialFit, look: ScoreRound) -> tuple[float, float
     inflation = after.inflation(before)
     fall = (before.chi2 - after.chi2) / inflation
     # What a film's faults make up is no sum of squares of chance alone.
-    return fall, min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * look.looks, 1.0)
+    return fall, min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * scores.comparisons, 1.0)
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Outcome:
     whole: Fit
     errors: Errors
     accepted: list[Step]
-    looks: list[ScoreRound]
+    rounds: list[ScoreRound]
     unconfirmed: list[RejectedEffect]
     stopped: str | None = None
 
@@ -186,13 +186,13 @@ class Search:
     def __init__(
         self,
         record: Record,
-        held: NDArray[np.bool_],
+        held_out: NDArray[np.bool_],
         clock: Clock,
         unit: float = 1.0,
         given: Sequence[Candidate] = (),
         free: Sequence[Free] = (),
     ) -> None:
-        self.record, self.held, self.clock, self.tell = record, held, clock, clock.tell
+        self.record, self.held_out, self.clock, self.tell = record, held_out, clock, clock.tell
         self.unit, self.given, self.free = unit, given, free
 
     def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
@@ -201,7 +201,7 @@ class Search:
 
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
-        return held_out_errors(fitted, self.record, self.held, unit=self.unit)
+        return held_out_errors(fitted, self.record, self.held_out, unit=self.unit)
 
     def improvement(self, before: Errors, after: Errors) -> Ratio:
         """Held-out error after over before.
@@ -215,39 +215,39 @@ class Search:
     def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
         """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
         accepted: list[Step] = []
-        looks: list[ScoreRound] = []
+        rounds: list[ScoreRound] = []
         states = [begin]
         stopped = None
         try:
-            self._grow(accepted, states, looks)
+            self._grow(accepted, states, rounds)
         except TimeUpError as up:
             stopped = str(up)
         number = self._confirmed(known or states[0], states)
         unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
         end = states[number] if number else known or states[0]
-        return Outcome(end.part, end.whole, end.errors, accepted[:number], looks, unconfirmed, stopped)
+        return Outcome(end.part, end.whole, end.errors, accepted[:number], rounds, unconfirmed, stopped)
 
-    def _grow(self, accepted: list[Step], states: list[SearchState], looks: list[ScoreRound]) -> None:
+    def _grow(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
         """Add effects to the lists as they pass."""
         known: set[tuple[str, ...]] = set()
         while sum(len(step.candidates) for step in accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
-            look = score_round(states[-1].part, self.given, self.clock.watched)
-            looks.append(look)
+            scores = score_round(states[-1].part, self.given, self.clock.watched)
+            rounds.append(scores)
             # What the library has been asked for already, and what a curve still says far more of than
             # anything in it, is no bent view of something known.
-            tried = look.curves if accepted and look.curve_leads() else []
-            found = self._located(states[-1], look) if tried else None
-            found = found or self._known(states[-1], look)
+            tried = scores.curves if accepted and scores.curve_leads() else []
+            found = self._located(states[-1], scores) if tried else None
+            found = found or self._known(states[-1], scores)
             if found is None:
                 self.tell("scoring surfaces over two coordinates")
-                looks[-1] = look = with_surfaces(look)
-                found = self._located(states[-1], look, tried)
+                rounds[-1] = scores = with_surfaces(scores)
+                found = self._located(states[-1], scores, tried)
             if found is None:
                 break
             accepted.append(found[0])
             states.append(found[1])
-            self._prune(accepted, states, looks)
+            self._prune(accepted, states, rounds)
             states[-1] = self._released(states[-1])
             # What takes another's place may give way to it again: then the search goes in circles.
             titles = tuple(c.title for step in accepted for c in step.candidates)
@@ -310,17 +310,17 @@ class Search:
             return state
         return state if self._worse(state.errors, errors) else SearchState(part, whole, errors)
 
-    def refused(self, base: SearchState, look: ScoreRound) -> list[RejectedEffect]:
+    def rejected(self, base: SearchState, scores: ScoreRound) -> list[RejectedEffect]:
         """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
         strongest: dict[object, Scored] = {}
-        for one in look.usable():
+        for one in scores.usable():
             strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
-        shown = [s.candidate for s in look.passing()]
-        refused = []
+        shown = [s.candidate for s in scores.passing()]
+        rejected = []
         for trial in self._tried(base, list(strongest.values())[:_NEAREST]):
             if trial.fit.level < base.part.level:
                 continue
-            judged, errors = self._judged(base, trial, look), self._errors_or_none(trial.fit)
+            judged, errors = self._judged(base, trial, scores), self._errors_or_none(trial.fit)
             if judged is None or errors is None:
                 continue
             why: RejectionReason = "form"
@@ -334,46 +334,46 @@ class Search:
                 why = "held"
             effect, ratio = judged.whole.model.effects[-1], self.improvement(base.errors, errors)
             title = trial.candidates[0].title
-            refused.append(RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why))
-        return sorted((r for r in refused if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
+            rejected.append(RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why))
+        return sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
 
-    def _known(self, current: SearchState, look: ScoreRound) -> tuple[Step, SearchState] | None:
+    def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
         """The best addition of the library that passes: an effect, or some of them together.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
         """
-        passing = look.passing()
-        curve = next((c for c in states_first(look.curves) if len(c.coordinates) == 1), None)
+        passing = scores.passing()
+        curve = next((c for c in states_first(scores.curves) if len(c.coordinates) == 1), None)
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
         if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             # Formulas that may explain the data as well as what the library has.
-            known = max(look.nats(s) for s in passing)
+            known = max(scores.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
-            singles += self._pairs(current, look)
+            singles += self._pairs(current, scores)
         return (
-            self._accept(current, singles, look)
-            or self._group(current, look, 2)
-            or self._group(current, look, 3)
+            self._accept(current, singles, scores)
+            or self._group(current, scores, 2)
+            or self._group(current, scores, 3)
         )
 
     def _located(
-        self, current: SearchState, look: ScoreRound, tried: Sequence[Curve] = ()
+        self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
     ) -> tuple[Step, SearchState] | None:
         """The best curve or surface that passes; of some those that would have been chosen were tried."""
-        faults = look.fit.faults
+        faults = scores.fit.faults
 
         def best(curves: Sequence[Curve]) -> list[Curve]:
-            shown = [c for c in curves if c.p * look.looks < ALPHA and c.chi2 > faults]
+            shown = [c for c in curves if c.p * scores.comparisons < ALPHA and c.chi2 > faults]
             return states_first(shown)[:_CURVES]
 
         known = [c.name for c in best(tried)]
-        likely = [c for c in best(look.curves) if c.name not in known]
-        return self._accept(current, self._curves(current, likely), look)
+        likely = [c for c in best(scores.curves) if c.name not in known]
+        return self._accept(current, self._curves(current, likely), scores)
 
     def _written(self, current: SearchState, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
         """Formulas for a curve, fitted."""
@@ -398,12 +398,12 @@ class Search:
         found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
-    def _pairs(self, current: SearchState, look: ScoreRound) -> list[TrialFit]:
+    def _pairs(self, current: SearchState, scores: ScoreRound) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
 
         One that drives where it should brake may do so because another one brakes too much.
         """
-        scored = sorted((s for s in look.library.scored if not s.absorbed), key=lambda s: -s.chi2)
+        scored = sorted((s for s in scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
         for one in scored:
             if one.candidate.usual:
@@ -424,17 +424,17 @@ class Search:
         self._trying([" with ".join(c.title for c in group) for group in groups])
         return fitted_ones(self._each(tried, groups))
 
-    def _group(self, current: SearchState, look: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
+    def _group(self, current: SearchState, scores: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
         """Several effects at once that pass only together."""
-        best = look.library.groups(size)
+        best = scores.library.groups(size)
         likely = [
             [s.candidate for s in group]
             for group, fall in best[:_TRIED]
             if len({s.candidate.effect.name for s in group}) == size
-            and fall > look.fit.faults
+            and fall > scores.fit.faults
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
-        return self._accept(current, self._together(current, likely), replace(look, looks=len(best)))
+        return self._accept(current, self._together(current, likely), replace(scores, comparisons=len(best)))
 
     def _curves(self, current: SearchState, likely: list[Curve]) -> list[TrialFit]:
         """The likeliest curves, as splines and by short formulas."""
@@ -446,13 +446,13 @@ class Search:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))
         return trials
 
-    def _prune(self, accepted: list[Step], states: list[SearchState], looks: list[ScoreRound]) -> None:
+    def _prune(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
         """Leave out effects that a later one makes needless.
 
         A wrong form of the library takes up a part of what an effect outside of it does, or of what another
         one of the library does that is found after it.
         """
-        self._leave_out(accepted, states, looks)
+        self._leave_out(accepted, states, rounds)
         for k in range(len(accepted) - 1):
             last = accepted[-1]
             if last.curve is None:
@@ -460,14 +460,14 @@ class Search:
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
             before = states[k]
-            found = self._accept(before, self._curves(before, [last.curve]), looks[k])
+            found = self._accept(before, self._curves(before, [last.curve]), rounds[k])
             if found is None:
                 continue
             if _cheaper(found, accepted[k:], states[k], states[-1]):
-                accepted[k:], states[k + 1 :], looks[k + 1 :] = [found[0]], [found[1]], []
+                accepted[k:], states[k + 1 :], rounds[k + 1 :] = [found[0]], [found[1]], []
                 return
 
-    def _leave_out(self, accepted: list[Step], states: list[SearchState], looks: list[ScoreRound]) -> None:
+    def _leave_out(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
         """Leave out effects of the library that chance explains beside those found after them."""
         whole = states[-1].whole
         for k, step in enumerate(accepted[:-1]):
@@ -479,17 +479,17 @@ class Search:
                 kept = [c for s in later for c in s.candidates if c is not one]
                 values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
                 trial = of_library(states[k].part, kept, values)
-                found = self._accept(states[k], fitted_ones([trial]), looks[k])
+                found = self._accept(states[k], fitted_ones([trial]), rounds[k])
                 if found is None or not _cheaper(found, later, states[k], states[-1]):
                     continue
                 names = {c.effect.name for c in kept}
                 others = [a for s in later for a in s.alternatives if a.instead_of in names]
                 accepted[k:] = [replace(found[0], alternatives=others)]
-                states[k + 1 :], looks[k + 1 :] = [found[1]], []
+                states[k + 1 :], rounds[k + 1 :] = [found[1]], []
                 return
 
     def _accept(
-        self, current: SearchState, trials: list[TrialFit], look: ScoreRound
+        self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
     ) -> tuple[Step, SearchState] | None:
         """The best trial that passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
@@ -511,12 +511,12 @@ class Search:
         near = self._foretelling(near, costs, foretelling)
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
-            judged = self._judged(current, trial, look)
+            judged = self._judged(current, trial, scores)
             if judged is None or judged.witness is None:
                 continue
             errors = self._errors_or_none(trial.fit)
             if errors is not None and not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, look.library, costs, foretelling)
+                others = self._alternatives(trial, trials, scores.library, costs, foretelling)
                 step = Step(
                     candidates=trial.candidates,
                     curve=trial.curve,
@@ -580,20 +580,20 @@ class Search:
                 continue
         return result, {id(t): w for t, w in wholes}
 
-    def _judged(self, current: SearchState, trial: TrialFit, look: ScoreRound) -> TestResult | None:
+    def _judged(self, current: SearchState, trial: TrialFit, scores: ScoreRound) -> TestResult | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
         try:
             whole = self._again(current.whole, trial)
             if whole is None:
                 return None
             pair = same_level(current.whole, whole.fit)
-            fall, p = _chance(pair, trial, look)
+            fall, p = _chance(pair, trial, scores)
             ratio: Ratio = (math.nan, math.nan, math.nan)
             witness: Confirmation | None = None
             before, after = pair
             drifts = _DRIFT * (before.chi2 - after.chi2) / max(before.scatter, 1.0) < drift_gain(before)
             if p < ALPHA and not drifts:
-                part, rest = (current.part, trial.fit), self.record.part(self.held)
+                part, rest = (current.part, trial.fit), self.record.part(self.held_out)
                 ratio, witness = confirmed_by(part, pair, rest, trial.names, self.unit)
         except FitError:
             return None

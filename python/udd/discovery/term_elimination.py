@@ -231,10 +231,10 @@ class _Pruning:
                 some = [name for name, change in order[:1] if change < 0.0]
             if not some:
                 return current
-            after = self._held(current, some)
+            after = self._fixed_at_zero(current, some)
             while len(some) > 1 and not self._better(current, after, _FAR * len(some)):
                 some = some[: len(some) // 2]
-                after = self._held(current, some)
+                after = self._fixed_at_zero(current, some)
             if after is not None and self._better(current, after, 0.0):
                 self.tell(f"without {', '.join(some)}")
                 current = after
@@ -260,7 +260,7 @@ class _Pruning:
             gone.append(left.pop(k))
         return result
 
-    def _held(self, fitted: Fit, gone: Iterable[str]) -> Fit | None:
+    def _fixed_at_zero(self, fitted: Fit, gone: Iterable[str]) -> Fit | None:
         """The fit with these parameters held at zero, from where it is expected to end."""
         gone = list(gone)
         names = list(fitted.parameters)
@@ -295,18 +295,18 @@ class _Pruning:
 
     def _exchanged(self, current: Fit) -> Fit | None:
         """A better set of terms, found by putting one back and leaving out others."""
-        held = [
+        fixed = [
             f for f in self.full.problem.free if f.name in self.names and f.name not in current.parameters
         ]
-        if not held:
+        if not fixed:
             return None
         gradient, information, _alone = _core.score(
-            current.problem.at(current.point), [(current.model, [f.index]) for f in held]
+            current.problem.at(current.point), [(current.model, [f.index]) for f in fixed]
         )
         own = np.maximum(np.diag(information), 1e-300)
         # With each one in turn, nearly fitted: what could go then?
         wider = [
-            (f.name, self._with(current, f.name, g / i)) for f, g, i in zip(held, gradient, own, strict=True)
+            (f.name, self._with(current, f.name, g / i)) for f, g, i in zip(fixed, gradient, own, strict=True)
         ]
         hopes = [(self._hope(more, name), name, more) for name, more in wider if more is not None]
         for hope, name, more in sorted(hopes, key=lambda h: h[0])[:_TRIED]:

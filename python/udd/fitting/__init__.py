@@ -14,7 +14,7 @@ from .fit import (
     released,
     widened,
 )
-from .model_error_schedule import at_level, eased, held, with_larger_model_error
+from .model_error_schedule import at_level, eased, smoothed_states, with_larger_model_error
 from .problem import Fit
 from .record import Record, record_of
 from .solve import filtered, frame_costs, predicted, within
@@ -32,12 +32,12 @@ __all__ = [
     "fit",
     "fit_record",
     "frame_costs",
-    "held",
     "predicted",
     "ran_away",
     "record_of",
     "refit",
     "released",
+    "smoothed_states",
     "widened",
     "with_larger_model_error",
     "within",

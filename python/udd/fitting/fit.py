@@ -212,10 +212,10 @@ def checked_units(
     free_parameters(models, **options)  # which says what is wrong with them
     ask(measurements, models)
     unknown = models[0].profile.fit.unknown
-    held = [name for name in unknown if free is None or name in free]
+    left = [name for name in unknown if free is None or name in free]
 
     def check() -> None:
-        told = other_unit(measurements, models, lambda some, own: _loosest(some, own, held))
+        told = other_unit(measurements, models, lambda some, own: _loosest(some, own, left))
         if told:
             raise FitError(told)
 

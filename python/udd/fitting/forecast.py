@@ -202,7 +202,7 @@ def forecast(
     -----
     The fan is that of the motion as the camera would see it; the noise of single frames comes on top. Where
     the fit does not explain its data (chi2 per degree of freedom above 1), all spreads are widened by the
-    root of that. The clock's error is held at its fitted value.
+    root of that. The clock's error is fixed at its fitted value.
 
     Examples
     --------
@@ -369,8 +369,8 @@ def _starts(
         model = own.with_parameters(values)
         try:
             films = [FilmParameters(list(model.parameters.values()), camera, clock)]
-            held = EstimatorInput(model, seen, part.states, films, (), diffusion)
-            _first, last, spread = _core.filter(held, window)
+            fixed = EstimatorInput(model, seen, part.states, films, (), diffusion)
+            _first, last, spread = _core.filter(fixed, window)
         except ValueError as error:
             raise FitError(f"the state cannot be filtered from the window: {error}") from error
         models.append(model)
@@ -380,12 +380,12 @@ def _starts(
 
 
 def _draws(fitted: Fit, members: int, scale: float, rng: np.random.Generator) -> list[Mapping[str, float]]:
-    """Parameters from the fit's covariance; the clock's error is held."""
+    """Parameters from the fit's covariance; the clock's error is fixed."""
     names = list(fitted.parameters)
     mean = np.array([fitted.parameters[name] for name in names])
     covariance = fitted.covariance
-    held = [k for k, free in enumerate(fitted.problem.free) if free.role == "clock"]
-    for k in held:
+    fixed = [k for k, free in enumerate(fitted.problem.free) if free.role == "clock"]
+    for k in fixed:
         column = covariance[:, k]
         covariance = covariance - np.outer(column, column) / column[k]
         covariance[k, :] = covariance[:, k] = 0.0

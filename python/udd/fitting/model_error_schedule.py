@@ -47,13 +47,13 @@ def reduce_model_error(
     if best is None:
         if not levels:
             raise FitError("the fit has no level to solve at")
-        best = provisional_fit(measurements, problem.held(levels.pop(0)), point, steps)
+        best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps)
         point = best.point
     far = _leapt(best, point, levels) if problem.likeliest else None
     if far:
         best = _eased(far, levels)
     for diffusion in () if far else levels:
-        result = provisional_fit(measurements, best.problem.held(diffusion), point, steps)
+        result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, steps)
         if not _stands(result, best):
             break
         best, point = result, result.point
@@ -104,7 +104,7 @@ def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit 
     """
     for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
         try:
-            result = provisional_fit(best.measurements, best.problem.held(diffusion), point, FEW)
+            result = provisional_fit(best.measurements, best.problem.with_model_error(diffusion), point, FEW)
         except FitError:
             return None
         if not _stands(result, best):
@@ -116,7 +116,7 @@ def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit 
 def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     """The fit held more loosely again, level by level, as long as that is likelier."""
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
-        problem = fitted.problem.held(diffusion)
+        problem = fitted.problem.with_model_error(diffusion)
         looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
         if _stands(fitted, looser):
             break
@@ -128,7 +128,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     """The end of a rough fit, or where it has none in sight that of a looser one."""
     own = fitted.problem.diffusion
     for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
-        problem = fitted.problem.held(diffusion)
+        problem = fitted.problem.with_model_error(diffusion)
         fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps), steps)
         if fitted.converged:
             break
@@ -163,7 +163,7 @@ def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
     for diffusion in reversed(problem.schedule[: fitted.level]):
         if result.scatter < scatter:
             break
-        result = solve(fitted.measurements, problem.held(diffusion), result.point)
+        result = solve(fitted.measurements, problem.with_model_error(diffusion), result.point)
     return result
 
 
@@ -171,7 +171,7 @@ def at_level(fitted: Fit, level: int) -> Fit:
     """The same model, held as tightly as a level of the schedule says."""
     if level == fitted.level:
         return fitted
-    problem = fitted.problem.held(fitted.problem.schedule[level])
+    problem = fitted.problem.with_model_error(fitted.problem.schedule[level])
     return solve(fitted.measurements, problem, fitted.point)
 
 
@@ -181,7 +181,7 @@ def eased(fitted: Fit) -> Fit:
     return _eased(replace(fitted, problem=problem), problem.schedule)
 
 
-def held(fitted: Fit, record: Record, level: int) -> Fit:
+def smoothed_states(fitted: Fit, record: Record, level: int) -> Fit:
     """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
 
     A wrong model may not get that far: the level of the result says how far it got.

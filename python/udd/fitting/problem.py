@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.keywords import renamed
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
 
@@ -56,7 +57,7 @@ class Problem:
     diffusion: tuple[float, ...]
     likeliest: bool = True
 
-    def held(self, diffusion: tuple[float, ...]) -> Problem:
+    def with_model_error(self, diffusion: tuple[float, ...]) -> Problem:
         """The same with the model held this tightly: its assumed error, per square root of a second."""
         return replace(self, diffusion=diffusion)
 
@@ -258,11 +259,12 @@ class Fit:
         result.__dict__["doubts"] = self.doubts
         return result
 
-    def budget(self, held: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
+    @renamed(held="fixed")
+    def budget(self, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
         """Uncertainty budget (GUM) of the fitted numbers, see :mod:`udd.fitting.uncertainty_budget`."""
         from .uncertainty_budget import budget
 
-        return budget(self, held, k)
+        return budget(self, fixed, k)
 
     def summary(self) -> str:
         """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""

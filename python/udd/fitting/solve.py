@@ -132,8 +132,8 @@ def filtered(
     All parameters are a fit's.
     """
     seen = Observations.of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
-    held = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
-    return _core.filter(held, [(int(a), int(b)) for a, b in windows])
+    fixed = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
+    return _core.filter(fixed, [(int(a), int(b)) for a, b in windows])
 
 
 def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.keywords import renamed
 from udd._util.validation import number
 from udd.errors import FitError
 
@@ -34,7 +35,7 @@ class Budget:
     units : dict of str to str
     sources : tuple of str
         What uncertainty comes from: ``noise`` of the frames, ``camera`` (what is known of it beforehand),
-        ``scale`` and the model's parameters with a prior, by name; what was held, by name; and
+        ``scale`` and the model's parameters with a prior, by name; what was fixed, by name; and
         ``model error``, where the fit shows that something is missing.
     contributions : ndarray, shape (number of values, number of sources)
         Standard uncertainties, in the values' units; what comes from different sources is independent.
@@ -96,15 +97,16 @@ class Budget:
         return "\n".join([head, *rows])
 
 
-def budget(fit: Fit, held: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
+@renamed(held="fixed")
+def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
     """Uncertainty budget (GUM) of a fit's numbers.
 
     Parameters
     ----------
     fit : Fit
-    held : mapping of str to float, optional
-        Standard uncertainties of the model's parameters that the fit held; by default 0.1 mm for the radius R
-        and 0.01 m/s^2 for gravity g.
+    fixed : mapping of str to float, optional
+        Standard uncertainties of the parameters that the fit fixed; by default 0.1 mm for the radius R and
+        0.01 m/s^2 for gravity g.
     k : float
         The coverage factor; 2 covers 95 % of a normal distribution.
 
@@ -122,7 +124,7 @@ def budget(fit: Fit, held: Mapping[str, float] | None = None, k: float = 2.0) ->
     -----
     The fit's covariance is ``C = (N + P)^-1`` with the information N of the frames and P of the priors, so
     ``C = C N C + C P C``: the prior of a parameter j, of standard deviation s_j, contributes ``|C_ij|/s_j``
-    to the uncertainty of i, and the rest is the noise's. What was held is moved by its standard uncertainty
+    to the uncertainty of i, and the rest is the noise's. What was fixed is moved by its standard uncertainty
     and the model fitted again: what moves with it is its contribution.
 
     References
@@ -140,11 +142,11 @@ def budget(fit: Fit, held: Mapping[str, float] | None = None, k: float = 2.0) ->
     ('noise', 'camera', 'g')
     """
     k = number("k", k, above=0.0)
-    held = dict(fit.model.profile.fit.held if held is None else held)
-    held = {name: number(name, value, above=0.0) for name, value in held.items()}
+    fixed = dict(fit.model.profile.fit.fixed if fixed is None else fixed)
+    fixed = {name: number(name, value, above=0.0) for name, value in fixed.items()}
     free = fit.problem.free
     known = {f.name.partition("[")[0] for f in free}
-    for name in held:
+    for name in fixed:
         if name not in fit.model.parameters:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(fit.model.parameters)}")
         if name in known:
@@ -160,7 +162,7 @@ def budget(fit: Fit, held: Mapping[str, float] | None = None, k: float = 2.0) ->
         source = one.name if one.role == "model" or one.name.startswith("scale") else _CAMERA
         variances[source] = variances.get(source, 0.0) + share
         variances[_NOISE] -= share
-    for name, sd in held.items():
+    for name, sd in fixed.items():
         variances[name] = np.square(_moved(fit, name, sd)[rows])
     if factor > 1:
         variances[_MODEL] = (factor**2 - 1) * np.diag(covariance)[rows]
@@ -176,7 +178,7 @@ def budget(fit: Fit, held: Mapping[str, float] | None = None, k: float = 2.0) ->
 
 
 def _moved(fit: Fit, name: str, by: float) -> NDArray[np.float64]:
-    """By how much each free parameter moves where one that was held is moved."""
+    """By how much each free parameter moves where one that was fixed is moved."""
     problem = fit.problem
     order = list(fit.model.parameters).index(name)
     models = tuple(own.with_parameters({name: own.parameters[name] + by}) for own in problem.models)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.keywords import renamed_attribute
 from udd._util.validation import array, number
 from udd.effects import Effect
 from udd.effects.spec import Own
@@ -126,8 +127,10 @@ class Model:
 
         return FormulaModel.__new__(FormulaModel)
 
+    slow = renamed_attribute("slow", "time_scale")
+
     @property
-    def slow(self) -> float:
+    def time_scale(self) -> float:
         """About the unit of time in which the motion takes place, that of the disk being 0.27 s."""
         return self.profile.dynamics.time_scale
 

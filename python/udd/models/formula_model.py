@@ -479,7 +479,7 @@ class FormulaModel(Model):
 FormulaModel.profile = ModelProfile(
     written=True,
     dynamics=DynamicsProfile(time_scale=1.0),
-    # The parameters that :mod:`udd.relatives` and models like the disk's and the pendulum's state.
+    # The parameters that :mod:`udd.related_systems` and models like the disk's and the pendulum's state.
     fit=FitProfile(stated=("W", "length"), ahead=10.0, window=1.0, valid_error=0.2),  # of each state's spread
     discovery=DiscoveryProfile(horizons=(0.2, 0.4, 1.0, 2.0, 4.0), filter_window=1.0, filter_level=2),
 )

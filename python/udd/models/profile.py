@@ -174,8 +174,8 @@ class FitProfile:
         for all parameters, without priors.
     each : tuple of str
         The parameters of which by default each of several measurements has a value of its own.
-    held : mapping of str to float
-        Standard uncertainties of what a fit holds, in the parameters' units.
+    fixed : mapping of str to float
+        Standard uncertainties of the parameters that a fit fixes, in the parameters' units.
     stated : tuple of str
         The parameters that a device's owner states: a fit far from them is one of something else.
     unknown : tuple of str
@@ -203,7 +203,7 @@ class FitProfile:
     equations: Mapping[str, str] | None = None
     priors: Mapping[str, float] | None = None
     each: tuple[str, ...] = ("W",)
-    held: Mapping[str, float] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
     stated: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
     hardly: int = 0

@@ -12,6 +12,8 @@ from .base import Model
 from .formula_model import FormulaModel
 from .registry import COMPILED
 
+#: What files call the kind of a model that is given as formulas; files of before say ``"own"``.
+_FORMULA = "formula"
 _OWN = FormulaModel._options
 
 
@@ -25,7 +27,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
     """
     if isinstance(model, FormulaModel):
         own = {
-            "kind": model.kind,
+            "kind": _FORMULA,
             "states": list(model.state_names),
             "equations": model.equations,
             "parameters": [list(pair) for pair in model.values],  # in order, which a table need not keep
@@ -59,7 +61,7 @@ def model_from_dict(data: object) -> Model:
     """
     given = table("the model", data)
     kind = given.pop("kind", None)
-    if kind == FormulaModel.kind:
+    if kind in (_FORMULA, FormulaModel.kind):
         if isinstance(given.get("effects"), list):
             given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
         given = table("a model of your own", given, _OWN, needed=_OWN[:2])
@@ -70,9 +72,7 @@ def model_from_dict(data: object) -> Model:
         except (TypeError, ValueError) as error:
             raise ModelError(f"the model cannot be read: {error}") from None
     if not isinstance(kind, str) or kind not in COMPILED:
-        raise ModelError(
-            f"the model's kind must be one of {', '.join((*COMPILED, FormulaModel.kind))}, not {kind!r}"
-        )
+        raise ModelError(f"the model's kind must be one of {', '.join((*COMPILED, _FORMULA))}, not {kind!r}")
     if "effects" in given:
         if not isinstance(given["effects"], list):
             raise ModelError(f"the model's effects must be a list, not {given['effects']!r}")

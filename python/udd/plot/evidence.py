@@ -81,7 +81,7 @@ def threshold(discovery: Any, stage: int) -> float:
     from udd._util import chi_squared
     from udd.discovery.thresholds import ALPHA
 
-    return float(chi_squared.isf(ALPHA / discovery.looks[stage], 1))
+    return float(chi_squared.isf(ALPHA / discovery.comparisons[stage], 1))
 
 
 def errors(discovery: Any, ax: Axes | None = None) -> Axes:

@@ -245,7 +245,7 @@ def tried_heading(discovery: Discovery) -> str:
 
 def nearest(discovery: Discovery) -> tuple[Part, ...]:
     """What nearly passed."""
-    sentences = wording.refused(discovery)
+    sentences = wording.rejected(discovery)
     return (Paragraph("Nearest come:"), Bullets(tuple(map(pretty, sentences)))) if sentences else ()
 
 

@@ -14,7 +14,7 @@ def loosest(fit: Fit) -> Fit:
     """
     result = fit
     for diffusion in levels(fit.measurement.kind):
-        result = solve(fit.measurements, fit.problem.held(diffusion), fit.point)
+        result = solve(fit.measurements, fit.problem.with_model_error(diffusion), fit.point)
         if result.leverage < FOLLOWS:
             break
     return result

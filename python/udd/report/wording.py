@@ -89,7 +89,7 @@ def verdict(discovery: Discovery) -> str:
 def _verdict(discovery: Discovery) -> str:
     said = "; and ".join(_counted(["; or ".join(_meanings(f, discovery)) for f in discovery.effects]))
     if discovery.verdict == "fits the first part, not confirmed":
-        titles = list(dict.fromkeys(near.title for near in discovery.refused if near.why == "unconfirmed"))
+        titles = list(dict.fromkeys(near.title for near in discovery.rejected if near.why == "unconfirmed"))
         said = " and ".join(titles)
         return (
             f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "
@@ -123,10 +123,10 @@ def _counted(sentences: list[str]) -> list[str]:
     ]
 
 
-def refused(discovery: Discovery) -> list[str]:
+def rejected(discovery: Discovery) -> list[str]:
     """What comes nearest where nothing passes, and why it does not."""
     sentences = []
-    for near in discovery.refused:
+    for near in discovery.rejected:
         numbers = headline(replace(discovery, error_after=near.errors, ratio=near.ratio))
         why = {
             "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "

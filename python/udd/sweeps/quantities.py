@@ -74,10 +74,10 @@ def _rate_unit(model: Model) -> str:
 
 
 def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
-    slow = model.slow
-    defaults = {"t": None, "tol": 2e-3 / slow, "transient": None, "rtol": 1e-8, "atol": 1e-10}
+    time_scale = model.time_scale
+    defaults = {"t": None, "tol": 2e-3 / time_scale, "transient": None, "rtol": 1e-8, "atol": 1e-10}
     chosen = _chosen(given, defaults)
-    t, skipped = span(chosen["t"], chosen["transient"], longest=1e5 * slow, skip=400.0 * slow)
+    t, skipped = span(chosen["t"], chosen["transient"], longest=1e5 * time_scale, skip=400.0 * time_scale)
     return {**chosen, "t": t, "tol": number("tol", chosen["tol"], above=0.0), "transient": skipped}
 
 

@@ -164,7 +164,9 @@ class SweepSpec:
     @cached_property
     def sha256(self) -> str:
         """The hash of the spec and of the format of results."""
-        return hashlib.sha256(f"udd sweep {RESULT_FORMAT} {self.to_json()}".encode()).hexdigest()
+        # Stores that were begun when a formula model's kind was written "own" go on.
+        said = self.to_json().replace('"kind":"formula"', '"kind":"own"')
+        return hashlib.sha256(f"udd sweep {RESULT_FORMAT} {said}".encode()).hexdigest()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, SweepSpec) and self.sha256 == other.sha256

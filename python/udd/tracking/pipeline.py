@@ -370,7 +370,7 @@ def _rim_upright(
     frames = []
     for picture in look_over.pictures:
         here = around.at(picture.index) if picture.index < len(tracks) else None
-        if here is not None and here.held:
+        if here is not None and here.tracked:
             frames.append((picture, here.pose, here.motion(known.exposure)))
     frames.sort(key=lambda f: stood.look.streak(f[2]))
     frames = frames[:SHARP]

@@ -128,12 +128,12 @@ class CurveScan:
     Attributes
     ----------
     curves : list of Curve
-    looks : int
+    comparisons : int
         How many curves could have been the best.
     """
 
     curves: list[Curve]
-    looks: int
+    comparisons: int
 
     @property
     def alike(self) -> list[Curve]:
@@ -143,7 +143,7 @@ class CurveScan:
     @property
     def p(self) -> float:
         """Probability that any of them looks as good as the least likely one by chance."""
-        return min(min((c.p for c in self.curves), default=1.0) * self.looks, 1.0)
+        return min(min((c.p for c in self.curves), default=1.0) * self.comparisons, 1.0)
 
 
 def scan_curves(

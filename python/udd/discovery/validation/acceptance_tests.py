@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd._util import chi_squared
 from udd._util.parallel import parallel_map
 from udd.discovery.thresholds import ALPHA, Confirmation
-from udd.fitting import Fit, Record, at_level, frame_costs, held, within
+from udd.fitting import Fit, Record, at_level, frame_costs, smoothed_states, within
 
 from .held_out_errors import Ratio, cost_improvement, stretches
 
@@ -54,7 +54,7 @@ def confirmed_by(
         What bears it out, the first that does: the cost of the frames that were ``"held"``, these
         ``"fitted"`` too, or the ``"halves"`` of the record.
     """
-    ratio = held_ratio(*part, rest, unit)
+    ratio = held_out_ratio(*part, rest, unit)
     if ratio[2] < 1.0:
         return ratio, "held"
     if ratio[0] < 1.0 and _falls_further(part, whole):
@@ -69,10 +69,10 @@ def same_level(one: Fit, other: Fit) -> Pair:
     return at_level(one, level), at_level(other, level)
 
 
-def held_ratio(before: Fit, after: Fit, rest: Record, unit: float) -> Ratio:
+def held_out_ratio(before: Fit, after: Fit, rest: Record, unit: float) -> Ratio:
     """Cost of frames that were not fitted after over before, all parameters held."""
     level = min(before.level, after.level)
-    costs = same_level(held(before, rest, level), held(after, rest, level))
+    costs = same_level(smoothed_states(before, rest, level), smoothed_states(after, rest, level))
     return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), rest, unit=unit)
 
 

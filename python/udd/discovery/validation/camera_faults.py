@@ -33,7 +33,7 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
         Names of the effects that are not needed once the camera's parameters are free: without them a
         camera explains the data better than they did.
     """
-    more = _held(known)
+    more = _fixed(known)
     there = {e.name for e in known.model.effects}
     effects = [e for e in found.model.effects if e.name not in there]
     if not more or not effects:
@@ -54,7 +54,7 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     return [] if shows else None
 
 
-def _held(known: Fit) -> tuple[Free, ...]:
+def _fixed(known: Fit) -> tuple[Free, ...]:
     """The parameters of a film's camera that were not to be free."""
     if all(is_encoder(own) for own in known.measurements):
         return ()

@@ -88,7 +88,7 @@ class Errors:
 
 
 def held_out_errors(
-    fit: Fit, record: Record, held: NDArray[np.bool_], seed: int = 0, unit: float = 1.0
+    fit: Fit, record: Record, held_out: NDArray[np.bool_], seed: int = 0, unit: float = 1.0
 ) -> Errors:
     """Errors of a fitted model on the frames of `record` that are held out.
 
@@ -101,7 +101,7 @@ def held_out_errors(
         Made without those frames.
     record : Record
         The whole measurement's frames.
-    held : ndarray of bool (n,)
+    held_out : ndarray of bool (n,)
         Which frames are held out: the last ones of each measurement.
     unit : float
         See :func:`udd.fitting.time_scale.motion_time_scale`.
@@ -109,7 +109,7 @@ def held_out_errors(
     profile = fit.model.profile
     wanted = tuple(h * unit for h in profile.discovery.horizons)
     window = profile.discovery.filter_window * unit
-    windows, ends, horizons = _windows(record, held, wanted, window, _EVERY * unit)
+    windows, ends, horizons = _windows(record, held_out, wanted, window, _EVERY * unit)
     firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
@@ -121,7 +121,7 @@ def held_out_errors(
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    own_blocks = _blocks(record, held, _BLOCK * unit)
+    own_blocks = _blocks(record, held_out, _BLOCK * unit)
     blocks = own_blocks[starts]
     low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
     return Errors(
@@ -133,8 +133,8 @@ def held_out_errors(
         floor=floor,
         samples=samples,
         blocks=blocks,
-        run=_run(fit, record, held),
-        run_blocks=own_blocks[held],
+        run=_run(fit, record, held_out),
+        run_blocks=own_blocks[held_out],
     )
 
 
@@ -145,12 +145,12 @@ def stretches(record: Record, length: float) -> NDArray[np.int64]:
     return result
 
 
-def _blocks(record: Record, held: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
+def _blocks(record: Record, held_out: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
     """Stretches to resample; shorter ones where the frames held out would be too few stretches for it."""
     result = stretches(record, length)
-    if len(np.unique(result[held])) >= _FEWEST:
+    if len(np.unique(result[held_out])) >= _FEWEST:
         return result
-    spans = [np.ptp(record.t[held & (record.film == film)]) for film in range(len(record.origins))]
+    spans = [np.ptp(record.t[held_out & (record.film == film)]) for film in range(len(record.origins))]
     return stretches(record, float(max(spans)) / _SHORT)
 
 
@@ -216,7 +216,7 @@ def lacks_more(fit: Fit, errors: Errors) -> bool:
     return written and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
 
 
-def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -> bool:
+def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_]) -> bool:
     """Whether free runs miss by the size of the motion, where noise does not: no such model is complete.
 
     Of a pendulum over the whole held-out part, else at the horizon of comparison.
@@ -227,7 +227,7 @@ def misses_the_motion(errors: Errors, record: Record, held: NDArray[np.bool_]) -
         error, _low, _high, floor = errors.at(comparison_horizon(errors))
     size = 1.0
     if errors.unit != "spread":
-        places = record.seen[held & _there(record)][:, : 2 if errors.unit == "m" else 1]
+        places = record.seen[held_out & _there(record)][:, : 2 if errors.unit == "m" else 1]
         size = float(np.sqrt(places.var(axis=0).sum()))
     return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
 
@@ -240,10 +240,14 @@ def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], Ar
 
 
 def _windows(
-    record: Record, held: NDArray[np.bool_], wanted: tuple[float, ...], window: float, often: float = _EVERY
+    record: Record,
+    held_out: NDArray[np.bool_],
+    wanted: tuple[float, ...],
+    window: float,
+    often: float = _EVERY,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
     """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
-    spans = [np.flatnonzero(held & (record.film == film)) for film in range(len(record.origins))]
+    spans = [np.flatnonzero(held_out & (record.film == film)) for film in range(len(record.origins))]
     longest = max(float(np.ptp(record.t[own])) for own in spans)
     step = float(np.median(np.diff(record.t)))
     horizons = tuple(h for h in wanted if h <= longest / 3 and h >= step)
@@ -275,18 +279,18 @@ def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Arr
     return first, last
 
 
-def _run(fit: Fit, record: Record, held: NDArray[np.bool_]) -> Array:
+def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_]) -> Array:
     """Error of free runs from the last fitted frame of each measurement to its end, frame by frame."""
     errors = np.full(len(record.t), np.nan)
     for film in range(len(record.origins)):
-        own = np.flatnonzero(held & (record.film == film))
+        own = np.flatnonzero(held_out & (record.film == film))
         start = fit.states[fit.record.film == film][-1:]
         times = record.t[own][None, :]
         found = predicted(
             fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
         )[0]
         errors[own] = _distance(fit, record, found, record.seen[own])
-    result: Array = np.where(_there(record), errors, np.nan)[held]
+    result: Array = np.where(_there(record), errors, np.nan)[held_out]
     return result
 
 

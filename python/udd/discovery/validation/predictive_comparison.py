@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd._util.parallel import parallel_map
 from udd.discovery.trial_fits import TrialFit
 from udd.errors import FitError
-from udd.fitting import Fit, Record, frame_costs, held, within
+from udd.fitting import Fit, Record, frame_costs, smoothed_states, within
 
 from .acceptance_tests import same_level
 from .held_out_errors import Ratio, cost_improvement
@@ -45,7 +45,7 @@ class Foretelling:
         firsts = [record.first(share) for share in SPLITS]
         self.firsts = [first for first in firsts if first.sum() >= _FEWEST]
         self._fitted: dict[int, list[Fit | None]] = {}
-        self._held: dict[tuple[int, int, int], Fit] = {}
+        self._rests: dict[tuple[int, int, int], Fit] = {}
 
     def ratio(self, one: TrialFit, other: TrialFit) -> Ratio:
         """Cost of the frames that follow by another form over that by one, all splits together.
@@ -88,6 +88,6 @@ class Foretelling:
     def _rest(self, trial: TrialFit, split: int, fitted: Fit, level: int) -> Fit:
         """The frames after a split, all parameters held."""
         key = id(trial), split, level
-        if key not in self._held:
-            self._held[key] = held(fitted, self.record.part(~self.firsts[split]), level)
-        return self._held[key]
+        if key not in self._rests:
+            self._rests[key] = smoothed_states(fitted, self.record.part(~self.firsts[split]), level)
+        return self._rests[key]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from udd import relatives
+from udd import related_systems as systems
 from udd.chaos.poincare_sections import poincare
 from udd.paper import device
 from udd.paper.branches import RELAXATION, hopf, rotation_of_disk
@@ -27,7 +27,7 @@ from udd.simulation.trajectory import integrated
 def forced_pendulum(_lab: Lab) -> Verdict:
     """A damped one, near resonance."""
     frequency = 0.9
-    model = relatives.torqued_pendulum(1.0, 0.2, 0.2, frequency)
+    model = systems.torqued_pendulum(1.0, 0.2, 0.2, frequency)
     found = poincare(model, "v", 400, state0=[0.0, 0.0], direction="down", transient=400, t_max=20_000.0)
     spread = float(np.ptp(found.return_times) / found.return_times.mean())
     swing = float(np.abs(found.component("theta")).max())
@@ -180,8 +180,8 @@ def no_detuning(_lab: Lab) -> Verdict:
 def isochrony(_lab: Lab) -> Verdict:
     """Periods of both at small and large swings."""
     amplitude = np.array([0.05, 0.5, 1.0, 1.4])
-    plain = swing_period(relatives.pendulum(1.0, 0.0), amplitude)
-    cheeks = swing_period(relatives.cycloidal_pendulum(1.0), amplitude)
+    plain = swing_period(systems.pendulum(1.0, 0.0), amplitude)
+    cheeks = swing_period(systems.cycloidal_pendulum(1.0), amplitude)
     evidence = (
         f"from 0.05 to 1.4 rad the plain pendulum's period grows by {plain[-1] / plain[0] - 1:.1%}, that "
         "between "

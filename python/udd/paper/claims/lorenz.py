@@ -1,10 +1,10 @@
-"""Claims about the relatives: Lorenz, the waterwheel, pendulums."""
+"""Claims about the related systems: Lorenz, the waterwheel, pendulums."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from udd import relatives
+from udd import related_systems as systems
 from udd.models import DLE
 from udd.paper.registry import Verdict, claim, judged
 from udd.paper.shared_films import Lab
@@ -22,7 +22,7 @@ def lorenz_limit(_lab: Lab) -> Verdict:
     """The difference of runs falls with epsilon = 1/sigma."""
     end = simulate(DLE(1.0), 5.0, _START, method="taylor").state[-1]
     gaps = [
-        np.abs(simulate(relatives.scaled_lorenz(1.0, e), 5.0, _START, method="taylor").state[-1] - end).max()
+        np.abs(simulate(systems.scaled_lorenz(1.0, e), 5.0, _START, method="taylor").state[-1] - end).max()
         for e in (1e-3, 1e-4, 1e-5)
     ]
     words = ", ".join(f"{gap:.1e}" for gap in gaps)
@@ -36,7 +36,7 @@ def lorenz_limit(_lab: Lab) -> Verdict:
 def waterwheel(_lab: Lab) -> Verdict:
     """Rates at random states."""
     states = np.random.default_rng(0).normal(size=(1000, 3))
-    gap = np.abs(relatives.waterwheel(3.9).rates(0.0, states) - DLE(3.9).rates(0.0, states)).max()
+    gap = np.abs(systems.waterwheel(3.9).rates(0.0, states) - DLE(3.9).rates(0.0, states)).max()
     return judged(gap == 0, f"without leakage its rates are those of the DLE at 1000 states, to {gap:g}")
 
 
@@ -49,7 +49,7 @@ def unforced_pendulum(_lab: Lab) -> Verdict:
     """Two runs."""
     r, angle = 7.0, 2.5
     dle = simulate(DLE(0.0), 10.0, [0, -r * np.sin(angle), -r * np.cos(angle)], method="taylor").state[-1]
-    own = simulate(relatives.pendulum(r), 10.0, [0, angle], method="taylor").state[-1]
+    own = simulate(systems.pendulum(r), 10.0, [0, angle], method="taylor").state[-1]
     gap = np.abs(dle - [own[0], -r * np.sin(own[1]), -r * np.cos(own[1])]).max()
     return judged(gap < 1e-8, f"from 2.5 rad, r = 7, the states agree to {gap:.0e} after 10 units of time")
 
@@ -64,7 +64,10 @@ def steady_torque(_lab: Lab) -> Verdict:
     held, rounds = [], []
     for torque in np.arange(0.05, 4.0, 0.1):
         run = simulate(
-            relatives.pendulum(1.0, 1.0, float(torque)), np.arange(0, 400, 0.01), [0, 0], method="taylor"
+            systems.pendulum(1.0, 1.0, float(torque)),
+            np.arange(0, 400, 0.01),
+            [0, 0],
+            method="taylor",
         )
         if np.ptp(run.theta[-2000:]) < 1e-6:
             held.append(torque)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from udd import relatives
+from udd import related_systems as systems
 from udd.chaos.poincare_sections import poincare
 from udd.models import DLE, Model
 from udd.paper.canvas import panels, titled
@@ -42,7 +42,7 @@ def jitter(ripple: float, ratio: float, n: int = 400) -> float:
 
 def forced_swings(friction: float, n: int = 120) -> Array:
     """Amplitudes of a pendulum from rest, one after the other, under a torque 5 % below its frequency."""
-    model = relatives.torqued_pendulum(1.0, friction, 0.05, 0.95)
+    model = systems.torqued_pendulum(1.0, friction, 0.05, 0.95)
     found = poincare(model, "v", n, state0=[0.0, 0.0], direction="down", transient=0, t_max=1e4)
     result: Array = found.component("theta")
     return result
@@ -92,7 +92,7 @@ def steady_clock(_lab: Lab) -> Figure:
     axes[1].legend(frameon=False)
     titled(axes[1], 1, "DLE, w = 12, rippled drive")
     amplitude = np.linspace(0.02, 1.5, 40)
-    plain, cheeks = relatives.pendulum(1.0, 0.0), relatives.cycloidal_pendulum(1.0)
+    plain, cheeks = systems.pendulum(1.0, 0.0), systems.cycloidal_pendulum(1.0)
     axes[2].plot(amplitude, swing_period(plain, amplitude), color=BEFORE, label="plain pendulum")
     axes[2].plot(amplitude, swing_period(cheeks, amplitude), color=AFTER, label="between cheeks")
     axes[2].set_xlabel("amplitude [rad]")
@@ -113,7 +113,7 @@ def eight(w: float = 10.0) -> tuple[Array, Array]:
 
 def pumped() -> tuple[Array, Array]:
     """One period of the path of the rider's centre of mass on a pumped swing, in units of its mean length."""
-    model = relatives.pumped_swing(1.0, friction=0.16, depth=0.1, quickness=10.0, sharpness=20.0)
+    model = systems.pumped_swing(1.0, friction=0.16, depth=0.1, quickness=10.0, sharpness=20.0)
     before = simulate(model, 800.0, [0.0, 0.5, 1.0]).state[-1]
     times = poincare(model, "theta", 2, state0=before, transient=0, direction="up").t
     run = simulate(model, np.linspace(0, float(times[1] - times[0]), 801), before)

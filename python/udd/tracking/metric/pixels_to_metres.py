@@ -111,7 +111,7 @@ def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
 
 
 def left_the_wheels(t: Array, values: Array, radius: float, pivot_sigma: float) -> NDArray[np.bool_]:
-    """Frames from the one on in which the disk is held no more.
+    """Frames from the one on in which the disk is tracked no more.
 
     The contact lies outside of it then, or leaps: of a disk that rolls d(Y^2 + Z^2)/dT = 2 W Z, so that its
     distance changes no faster than the wheels turn. Also those after the last in which the disk was seen,

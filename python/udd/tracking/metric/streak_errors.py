@@ -34,9 +34,9 @@ def unit_covariance(tracks: Tracks, look: DiskAppearance, off: Array, group: NDA
     """
     out = np.full((len(tracks), 3, 3), np.nan)
     around = LocalMotion(tracks)
-    held = tracks.held
+    tracked = tracks.tracked
     for number in np.unique(group[group >= 0]):
-        members = [int(k) for k in np.flatnonzero((group == number) & held)]
+        members = [int(k) for k in np.flatnonzero((group == number) & tracked)]
         frames = [_marks(tracks, look, off, around, k) for k in members]
         ratio = _ratio([f for f in frames if f is not None])
         for k, frame in zip(members, frames, strict=True):

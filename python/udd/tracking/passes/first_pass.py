@@ -47,7 +47,7 @@ class TrackerState:
 
 @dataclass(frozen=True)
 class PoseSample:
-    """A frame in which the disk was held."""
+    """A frame in which the disk was tracked."""
 
     t: float
     pose: Pose
@@ -59,9 +59,9 @@ def follow(
     known: TrackerState,
     tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
 ) -> Tracks:
-    """Track the disk through `pictures`; one row per picture, flagged where the disk is not held.
+    """Track the disk through `pictures`; one row per picture, flagged where the disk is not tracked.
 
-    After each picture `tick` is told where the disk is in it, NaN where it is not held.
+    After each picture `tick` is told where the disk is in it, NaN where it is not tracked.
     """
     frames: list[FrameTrack] = []
     past: list[PoseSample] = []

@@ -21,13 +21,13 @@ def quality(tracks: Tracks, given: NDArray[np.bool_]) -> dict[str, NDArray[Any]]
     left = tracks.residuals
     with np.errstate(invalid="ignore", divide="ignore"):
         square = np.where(used, (left**2).sum(axis=2), 0.0).sum(axis=1) / (2 * used.sum(axis=1))
-    held = used.any(axis=1)
+    tracked = used.any(axis=1)
     method = np.where(given, np.array(tracks.method, dtype=np.str_), "none")
     return {
         "marks": used.sum(axis=1),
         "complete": np.round(tracks.complete.mean(axis=1), 4),
-        "residual_px": np.where(held, np.round(np.sqrt(square), 5), np.nan),
-        "blur_px": np.where(held, np.round(tracks.streak, 3), np.nan),
+        "residual_px": np.where(tracked, np.round(np.sqrt(square), 5), np.nan),
+        "blur_px": np.where(tracked, np.round(tracks.streak, 3), np.nan),
         "method": np.where(method == "", "none", method),
     }
 

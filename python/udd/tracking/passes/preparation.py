@@ -161,7 +161,7 @@ def recalibrate(
     frames = []
     for picture in look_over.pictures:
         here = around.at(picture.index) if picture.index < len(tracks) else None
-        if here is not None and here.held and not tracks.flag[picture.index]:
+        if here is not None and here.tracked and not tracks.flag[picture.index]:
             frames.append((picture.y, here))
     if known.look.readout and wanted.given("readout") is None:
         moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]

@@ -41,7 +41,7 @@ class Local:
     spin: float
     bending: complex  # second derivative of the centre
     twisting: float
-    held: bool  # by the first pass
+    tracked: bool  # by the first pass
 
     def motion(self, open_for: float) -> Motion:
         """What the exposure sees of it."""
@@ -59,7 +59,7 @@ def refine(
     """Fit every frame again from what the first pass says about it and its neighbours.
 
     A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
-    the first pass lost between two that it held is tried from these. `streaks_only`: frames with short
+    the first pass lost between two that it tracked is tried from these. `streaks_only`: frames with short
     streaks stay as they are. `look_at` gives each frame's look where it is not always the same.
     """
     better: dict[int, FrameTrack] = {}
@@ -84,15 +84,15 @@ def _refine_frame(
         return None
     motion = here.motion(known.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
-    fit = fit_and_check(picture, known, pose, motion, KNOWN if here.held else FORESEEN)
+    fit = fit_and_check(picture, known, pose, motion, KNOWN if here.tracked else FORESEEN)
     reach = known.look.reach
     streak = known.look.streak(motion)
     if fit is None:
         return None
     away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
-    if away > (APART if here.held else FORESEEN_APART) + APART_BY_STREAK * streak:
+    if away > (APART if here.tracked else FORESEEN_APART) + APART_BY_STREAK * streak:
         return None
-    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.held:
+    if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.tracked:
         return None  # two pale streaks agree with much
     return found_in(float(tracks.t[k]), fit, pose, streak, "refined")
 
@@ -161,13 +161,13 @@ class LocalMotion:
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
     def _near(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
-        """The nearest frames on both sides, how many intervals off, and whether k is held."""
+        """The nearest frames on both sides, how many intervals off, and whether k is tracked."""
         place = int(np.searchsorted(self.good, k))
-        held = place < len(self.good) and bool(self.good[place] == k)
-        low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + held
+        tracked = place < len(self.good) and bool(self.good[place] == k)
+        low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + tracked
         near = self.good[low:high]
         x = (self.t[near] - self.t[k]) / self.interval
-        return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], held
+        return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], tracked
 
     def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
         """How far centre and angle are from what the neighbours alone foretell; 0 where these are too few."""
@@ -181,23 +181,20 @@ class LocalMotion:
         return complex(self.centre[k] - centre), float(self.angle[k] - angle)
 
     def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
-        """Frames that tell the second derivative at a frame that is held, and their weights [1 / s^2]."""
-        near, x, held = self._near(k)
-        if len(near) < 3 or not held:
+        """Frames that tell the second derivative at a frame that is tracked, and their weights [1 / s^2]."""
+        near, x, tracked = self._near(k)
+        if len(near) < 3 or not tracked:
             return np.array([k]), np.zeros(1)
         return near, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
 
     def at(self, k: int) -> Local | None:
         """Polynomials through the nearest poses on both sides; None where too few are near."""
-        near, x, held = self._near(k)
-        if len(near) < 3 or (not held and not (x.min() < 0 < x.max())):
+        near, x, tracked = self._near(k)
+        if len(near) < 3 or (not tracked and not (x.min() < 0 < x.max())):
             return None
         powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]
         c, a = powers @ self.centre[near], powers @ self.angle[near]
-        pose = (
-            Pose(complex(self.centre[k]), float(self.angle[k])) if held else Pose(complex(c[0]), float(a[0]))
-        )
-        h = self.interval
-        return Local(
-            pose, complex(c[1]) / h, float(a[1]) / h, 2 * complex(c[2]) / h**2, 2 * float(a[2]) / h**2, held
-        )
+        place, angle = (self.centre[k], self.angle[k]) if tracked else (c[0], a[0])
+        pose, h = Pose(complex(place), float(angle)), self.interval
+        rate, bend = complex(c[1]) / h, 2 * complex(c[2]) / h**2
+        return Local(pose, rate, float(a[1]) / h, bend, 2 * float(a[2]) / h**2, tracked)

@@ -61,7 +61,7 @@ class Tracks:
         return len(self.t)
 
     @property
-    def held(self) -> NDArray[np.bool_]:
+    def tracked(self) -> NDArray[np.bool_]:
         """Frames with a pose."""
         return np.asarray(np.isfinite(self.information).all(axis=(1, 2)))
 

@@ -28,7 +28,7 @@ class WobbleCorrection:
     short: Array  # (n,) by how much each frame is, below 0
     sigma: Array  # (n,) its standard error
     answer: Array  # (n, 3) change of the pose (u, v, beta) that a foreshortening of 1 made
-    held: NDArray[np.bool_]
+    tracked: NDArray[np.bool_]
 
     def centred(self, at: complex, by: complex) -> WobbleCorrection:
         """With the marks' origin moved to a point among them, and they turned back by an angle."""
@@ -42,7 +42,7 @@ class WobbleCorrection:
 
     def look_at(self, k: int) -> DiskAppearance:
         """The marks as frame k shows them: foreshortened."""
-        turn = np.exp(1j * self.tracks.angle[k]) if self.held[k] else 1.0
+        turn = np.exp(1j * self.tracks.angle[k]) if self.tracked[k] else 1.0
         moved = (
             self.short[k]
             * np.conj(turn)
@@ -57,7 +57,7 @@ class WobbleCorrection:
 
         The wheels hold the disk at the contact, about which it is foreshortened.
         """
-        away = np.where(self.held, self.tracks.centre - pivot, 0)
+        away = np.where(self.tracked, self.tracks.centre - pivot, 0)
         away = (away * np.conj(self.across)).real * self.across
         moved = self.answer + np.column_stack([away.real, away.imag, np.zeros(len(away))])
         centre = self.tracks.centre - self.short * away
@@ -74,8 +74,8 @@ def correct_wobble(
     which they were displaced. `before`: what the marks that the tracks come from were displaced for.
     """
     across = complex(np.exp(1j * found.axis))
-    held = tracks.held
-    frames = {int(k): _Frame.of(tracks, look, int(k)) for k in np.flatnonzero(held)}
+    tracked = tracks.tracked
+    frames = {int(k): _Frame.of(tracks, look, int(k)) for k in np.flatnonzero(tracked)}
     whole = [k for k in frames if np.isfinite(tracks.chi2[k]).all()]
     if not whole:
         return None
@@ -113,7 +113,7 @@ def correct_wobble(
         residuals[k] = np.where(used[:, None], left, np.nan)
     tracks = replace(tracks, centre=centre, angle=angle, chi2=chi2, residuals=residuals)
     marks = [replace(m, place=complex(z)) for m, z in zip(look.marks, places, strict=True)]
-    return WobbleCorrection(tracks, replace(look, marks=marks), across, short, sigma, answer, held)
+    return WobbleCorrection(tracks, replace(look, marks=marks), across, short, sigma, answer, tracked)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The named relatives: each with the relation that makes it one."""
+"""The related systems: each with the relation that makes it one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import simpson
 
 import udd
-from udd import relatives
+from udd import related_systems as systems
 
 Array = NDArray[np.float64]
 
@@ -23,8 +23,8 @@ def test_lorenz_in_the_variables_of_the_dle_is_lorenz() -> None:
     w, epsilon, b = 2.0, 0.1, 8 / 3
     sigma = 1 / epsilon
     r = w * sigma**2 / b
-    omega, y, z = last(relatives.scaled_lorenz(w, epsilon, b), 5.0, [1.0, 1.0, 0.01])
-    own = last(relatives.lorenz(sigma, r, b), 5.0 / sigma, [sigma, sigma, r - sigma * 0.01])
+    omega, y, z = last(systems.scaled_lorenz(w, epsilon, b), 5.0, [1.0, 1.0, 0.01])
+    own = last(systems.lorenz(sigma, r, b), 5.0 / sigma, [sigma, sigma, r - sigma * 0.01])
     # Both are exact: what is left is the integration error, 1e-12 grown by the chaos of 5 units of time.
     np.testing.assert_allclose([sigma * omega, sigma * y, r - sigma * z], own, rtol=1e-9)
 
@@ -32,14 +32,14 @@ def test_lorenz_in_the_variables_of_the_dle_is_lorenz() -> None:
 def test_lorenz_becomes_the_dle_as_diffusion_vanishes() -> None:
     start = [1.0, 1.0, 0.01]
     limit = last(udd.DLE(1.0), 5.0, start)
-    gaps = [np.abs(last(relatives.scaled_lorenz(1.0, e), 5.0, start) - limit).max() for e in (1e-4, 5e-5)]
+    gaps = [np.abs(last(systems.scaled_lorenz(1.0, e), 5.0, start) - limit).max() for e in (1e-4, 5e-5)]
     # The difference is of first order in epsilon: halving it halves the gap, but for terms of second order.
     assert gaps[0] / gaps[1] == pytest.approx(2.0, abs=0.01)
     assert gaps[1] < 1e-3
 
 
 def test_lorenz_strongly_driven_has_the_exponent_of_the_dle() -> None:
-    near = udd.lyapunov(relatives.scaled_lorenz(1.0, 1e-4), t=2e4, tol=0.005, state0=[1.0, 1.0, 0.01])
+    near = udd.lyapunov(systems.scaled_lorenz(1.0, 1e-4), t=2e4, tol=0.005, state0=[1.0, 1.0, 0.01])
     # 0.21016 is the DLE's; the error bar of 2e4 units of time is 0.003.
     assert near == pytest.approx(0.21016, abs=0.012)
 
@@ -47,9 +47,9 @@ def test_lorenz_strongly_driven_has_the_exponent_of_the_dle() -> None:
 @pytest.mark.parametrize("leakage", [0.0, 0.05])
 def test_the_waterwheel_is_lorenz_with_b_1_and_without_leakage_the_dle(leakage: float) -> None:
     states = np.random.default_rng(1).normal(size=(20, 3))
-    wheel = relatives.waterwheel(3.9, leakage).rates(0.0, states)
+    wheel = systems.waterwheel(3.9, leakage).rates(0.0, states)
     np.testing.assert_allclose(
-        wheel, relatives.scaled_lorenz(3.9, leakage, b=1.0).rates(0.0, states), rtol=1e-15
+        wheel, systems.scaled_lorenz(3.9, leakage, b=1.0).rates(0.0, states), rtol=1e-15
     )
     if leakage == 0.0:
         np.testing.assert_array_equal(wheel, udd.DLE(3.9).rates(0.0, states))
@@ -57,9 +57,7 @@ def test_the_waterwheel_is_lorenz_with_b_1_and_without_leakage_the_dle(leakage: 
 
 def test_a_waterwheel_in_other_units_has_the_drive_that_is_said() -> None:
     inflow, friction, gravity = 0.3, 1.7, 6.0
-    omega, a, b = last(
-        relatives.waterwheel(inflow, 0.0, friction, gravity), 4 / friction, [friction, 0.4, 0.1]
-    )
+    omega, a, b = last(systems.waterwheel(inflow, 0.0, friction, gravity), 4 / friction, [friction, 0.4, 0.1])
     unit = gravity / friction**2
     dle = last(udd.DLE(gravity * inflow / friction**3), 4.0, [1.0, unit * 0.4, unit * 0.1])
     np.testing.assert_allclose([omega / friction, unit * a, unit * b], dle, rtol=1e-9)
@@ -67,7 +65,7 @@ def test_a_waterwheel_in_other_units_has_the_drive_that_is_said() -> None:
 
 def test_the_pendulum_is_the_dle_without_a_drive() -> None:
     r, theta = 7.0, 2.5
-    v, end = last(relatives.pendulum(r), 6.0, [0.3, theta])
+    v, end = last(systems.pendulum(r), 6.0, [0.3, theta])
     dle = last(udd.DLE(0.0), 6.0, [0.3, -r * np.sin(theta), -r * np.cos(theta)])
     np.testing.assert_allclose(dle, [v, -r * np.sin(end), -r * np.cos(end)], rtol=1e-9, atol=1e-11)
 
@@ -83,10 +81,10 @@ def test_the_disk_without_a_drive_is_a_pendulum_in_si_units() -> None:
 
 
 def test_a_steady_torque_turns_the_pendulum_or_holds_it() -> None:
-    held = last(relatives.pendulum(1.0, 1.0, 0.9), 60.0, [0.0, 0.0])
+    held = last(systems.pendulum(1.0, 1.0, 0.9), 60.0, [0.0, 0.0])
     # It rests where gravity balances the torque; exp(-60/2) of the start is left.
     np.testing.assert_allclose(held, [0.0, np.arcsin(0.9)], atol=1e-9)
-    turning = relatives.pendulum(1.0, 1.0, 3.0)
+    turning = systems.pendulum(1.0, 1.0, 3.0)
     rounds = udd.simulate(turning, np.arange(0, 80, 0.01), [0.0, 0.0], rtol=1e-10)
     passes = np.interp(2 * np.pi * np.arange(15, 25), rounds.theta, rounds.t)
     # Rotation is a limit cycle: the rounds' times settle on one value. Friction eats the torque's work:
@@ -97,7 +95,7 @@ def test_a_steady_torque_turns_the_pendulum_or_holds_it() -> None:
 
 def test_a_small_periodic_torque_gives_the_linear_response() -> None:
     r, friction, amplitude, frequency = 4.0, 0.5, 1e-4, 1.5
-    model = relatives.torqued_pendulum(r, friction, amplitude, frequency)
+    model = systems.torqued_pendulum(r, friction, amplitude, frequency)
     t = np.linspace(0, 200, 20001)
     run = udd.simulate(model, t, [0.0, 0.0], rtol=1e-10, atol=1e-16)
     late = t > 100  # exp(-friction t/2) has gone
@@ -107,7 +105,7 @@ def test_a_small_periodic_torque_gives_the_linear_response() -> None:
 
 def test_a_strong_periodic_torque_gives_chaos() -> None:
     # The textbook's case; a periodic orbit would have zero within a few errors.
-    model = relatives.torqued_pendulum(1.0, 0.5, 1.5, 2 / 3)
+    model = systems.torqued_pendulum(1.0, 0.5, 1.5, 2 / 3)
     exponent, error = udd.lyapunov(model, t=2e4, tol=0.005, state0=[0.0, 1.0], with_error=True)
     assert exponent > 10 * error > 0
 
@@ -122,7 +120,7 @@ def growth(model: udd.Model, t: float, start: list[float]) -> float:
 
 
 def test_shaking_amplifies_as_mathieu_says() -> None:
-    model = relatives.shaken_pendulum(1.0, 0.02, 0.2, 2.0)
+    model = systems.shaken_pendulum(1.0, 0.02, 0.2, 2.0)
     # amplitude/(4 sqrt(r)) - friction/2, to first order in the amplitude: the next is about 1 % of it.
     assert growth(model, 150.0, [0.0, 1e-8]) == pytest.approx(0.2 / 4 - 0.01, rel=0.03)
     assert growth(model.replace(friction=0.2), 150.0, [0.0, 1e-8]) < 0
@@ -131,18 +129,18 @@ def test_shaking_amplifies_as_mathieu_says() -> None:
 @pytest.mark.parametrize(("amplitude", "stays"), [(40.0, True), (20.0, False)])
 def test_a_fast_shaken_pendulum_stands_on_its_head(amplitude: float, stays: bool) -> None:
     # Kapitza's bound is amplitude > sqrt(2) * 20 = 28.3.
-    theta = last(relatives.shaken_pendulum(1.0, 0.1, amplitude, 20.0), 200.0, [0.0, 3.0])[1]
+    theta = last(systems.shaken_pendulum(1.0, 0.1, amplitude, 20.0), 200.0, [0.0, 3.0])[1]
     assert (abs(theta - np.pi) < 1e-3) == stays
 
 
 def test_pumping_by_the_clock_grows_as_said() -> None:
     # 3/4 of the length's amplitude, to first order; the next order is of the amplitude squared.
-    model = relatives.pumped_pendulum(1.0, 0.0, 0.02, 2.0)
+    model = systems.pumped_pendulum(1.0, 0.0, 0.02, 2.0)
     assert growth(model, 500.0, [0.0, 1e-8]) == pytest.approx(0.75 * 0.02, rel=0.03)
 
 
 def test_a_rider_multiplies_the_swing_every_half_period() -> None:
-    model = relatives.pumped_swing(1.0, depth=0.05, quickness=2000.0, sharpness=1e9)
+    model = systems.pumped_swing(1.0, depth=0.05, quickness=2000.0, sharpness=1e9)
     ends = udd.poincare(model, "v", 8, state0=[0.0, 0.002, 1.05], direction="both", transient=1, t_max=100.0)
     ratios = np.abs(ends.component("theta")[1:] / ends.component("theta")[:-1])
     # The rider takes 1/2000 of the unit of time, in which the swing goes on.
@@ -151,18 +149,18 @@ def test_a_rider_multiplies_the_swing_every_half_period() -> None:
 
 def test_lengths_must_stay_positive() -> None:
     with pytest.raises(udd.UddError, match="must stay positive"):
-        relatives.pumped_pendulum(1.0, 0.0, 1.0, 2.0)
+        systems.pumped_pendulum(1.0, 0.0, 1.0, 2.0)
     with pytest.raises(udd.UddError, match="depth must be between 0 and 1"):
-        relatives.pumped_swing(1.0, depth=1.2)
+        systems.pumped_swing(1.0, depth=1.2)
 
 
 @pytest.mark.parametrize("swing", [0.1, 0.8, 1.4])
 def test_between_cycloidal_cheeks_every_swing_takes_as_long(swing: float) -> None:
     r = 2.3
-    quarter = last(relatives.cycloidal_pendulum(r), np.pi / 2 / np.sqrt(r), [0.0, swing])
+    quarter = last(systems.cycloidal_pendulum(r), np.pi / 2 / np.sqrt(r), [0.0, swing])
     assert abs(quarter[1]) < 1e-10
     # Between plain walls it would not: the largest of these swings takes 14 % longer.
-    assert abs(last(relatives.pendulum(r, 0.0), np.pi / 2 / np.sqrt(r), [0.0, swing])[1]) > 1e-5
+    assert abs(last(systems.pendulum(r, 0.0), np.pi / 2 / np.sqrt(r), [0.0, swing])[1]) > 1e-5
 
 
 def test_the_droplets_waves_are_an_integral_over_its_past() -> None:
@@ -175,9 +173,7 @@ def test_the_droplets_waves_are_an_integral_over_its_past() -> None:
         {},
     )
     v, y, z, x = udd.simulate(model, t, [0.4, 0.0, 0.0, 0.0], method="taylor", **TIGHT).state.T
-    own = udd.simulate(
-        relatives.walking_droplet(R, memory), t, [0.4, 0.0, 0.0], method="taylor", **TIGHT
-    ).state
+    own = udd.simulate(systems.walking_droplet(R, memory), t, [0.4, 0.0, 0.0], method="taylor", **TIGHT).state
     np.testing.assert_allclose(own, np.stack([v, y, z], axis=1), atol=1e-9)
     weight = R * np.exp(-(t[-1] - t) / memory)
     # Simpson's rule over 6000 steps of 0.001: its error is below 1e-10.
@@ -188,11 +184,11 @@ def test_the_droplets_waves_are_an_integral_over_its_past() -> None:
 def test_the_droplet_is_lorenz_and_with_infinite_memory_the_dle() -> None:
     states = np.random.default_rng(1).normal(size=(20, 3))
     np.testing.assert_array_equal(
-        relatives.walking_droplet(3.9).rates(0.0, states), udd.DLE(3.9).rates(0.0, states)
+        systems.walking_droplet(3.9).rates(0.0, states), udd.DLE(3.9).rates(0.0, states)
     )
     np.testing.assert_allclose(
-        relatives.walking_droplet(3.9, 20.0).rates(0.0, states),
-        relatives.scaled_lorenz(3.9, 0.05, b=1.0).rates(0.0, states),
+        systems.walking_droplet(3.9, 20.0).rates(0.0, states),
+        systems.scaled_lorenz(3.9, 0.05, b=1.0).rates(0.0, states),
         rtol=1e-14,
     )
 
@@ -200,4 +196,4 @@ def test_the_droplet_is_lorenz_and_with_infinite_memory_the_dle() -> None:
 @pytest.mark.parametrize("bad", [{"R": 0.0}, {"R": 1.0, "memory": -1.0}, {"R": 1.0, "memory": float("nan")}])
 def test_a_droplet_needs_waves_and_a_memory(bad: dict[str, float]) -> None:
     with pytest.raises(udd.UddError, match=r"R|memory"):
-        relatives.walking_droplet(**bad)
+        systems.walking_droplet(**bad)
