@@ -45,6 +45,7 @@ from udd.fitting.record import Record
 from udd.fitting.thinning import Thinned
 from udd.measurement import InputSignal, Measurement
 from udd.models import Model
+from udd.models.formula_model import FormulaModel
 from udd.models.profile import Coordinate
 from udd.models.serialization import effect_from_dict, effect_to_dict, model_from_dict, model_to_dict
 
@@ -205,6 +206,9 @@ class _Writer:
         return {"object": len(self.objects) - 1}
 
     def _object(self, value: Any) -> dict[str, Any]:
+        if isinstance(value, FormulaModel) and value.records:
+            own = {"equations": model_to_dict(value), "record": value.record}
+            return {"driven": own | {"records": self.value([dict(record) for record in value.records])}}
         if isinstance(value, Model):
             return {"model": model_to_dict(value)}
         if isinstance(value, Effect):
@@ -242,6 +246,19 @@ def checked(name: str, given: dict[str, Any]) -> Any:
     return result
 
 
+def driven(model: Model, records: list[dict[str, InputSignal]], record: int) -> Model:
+    """A model with what was measured of its inputs.
+
+    Raises
+    ------
+    ValueError
+        A model without inputs, or records that do not suit it.
+    """
+    if not isinstance(model, FormulaModel) or not 0 <= record < len(records):
+        raise ValueError(record)
+    return model.with_inputs(*records, record=record)
+
+
 def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
     """The last object of a file."""
     model = model_from_dict(tree["model"])
@@ -257,6 +274,7 @@ def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
     }
     made: dict[str, Callable[[Any], Any]] = {
         "model": model_from_dict,
+        "driven": lambda x: driven(model_from_dict(x["equations"]), value(x["records"]), x["record"]),
         "effect": effect_from_dict,
         "slot": lambda x: curves[x[0], x[1]],
         "coordinate": lambda x: coordinate(model, x),

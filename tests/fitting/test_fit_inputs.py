@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -80,3 +81,13 @@ def test_a_forecast_follows_the_input_of_its_own_measurement() -> None:
     truth = np.interp(ahead.t, other.t, other["q"])
     # Straight lines through an encoder's 1 mrad, and what the state is known to at the start.
     assert np.sqrt(np.mean((ahead.median[:, 0] - truth) ** 2)) < 3e-3
+
+
+def test_a_saved_fit_keeps_its_inputs(tmp_path: Path) -> None:
+    found = udd.fit([record(1), record(2)], ARM)
+    udd.save(found, tmp_path / "fit.npz")
+    again = udd.load(tmp_path / "fit.npz")
+    assert isinstance(again, udd.Fit)
+    at = (3.0, [0.1, 0.2])
+    for one, other in zip(again.models, found.models, strict=True):
+        assert one.rates(*at).tolist() == other.rates(*at).tolist()
