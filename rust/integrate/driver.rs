@@ -279,25 +279,19 @@ where
     #[inline(always)]
     pub fn trial(&mut self, end: S::Real) -> Progress<S::Mask> {
         // Laws with measured inputs do not go in packets.
-        if const { !M::SMOOTH && S::Real::LANES == 1 }
-            && let Some(clock) = self.system.clock()
-        {
-            return self.trial_to_knot(clock, end);
+        if const { M::SMOOTH || S::Real::LANES > 1 } {
+            return self.trial_within(end);
         }
-        self.trial_within(end)
-    }
-
-    /// The same at most up to the next knot of the law's inputs, behind which the next step feels the next pieces.
-    #[inline(never)]
-    fn trial_to_knot(&mut self, clock: usize, end: S::Real) -> Progress<S::Mask> {
         let at = &self.run.at;
-        let Some(knot) = self.system.next_knot(at.t, &at.sides, end) else { return self.trial_within(end) };
-        let progress = self.trial_within(S::Real::constant(knot));
-        if self.run.at.t.lane(0) == knot {
-            let (everywhere, size) = (S::mask(true), self.run.size);
-            let StepStart { t, x, sides } = &mut self.run.at;
-            pass(&self.system, clock, *t, size, x, sides, everywhere);
-            self.begin(everywhere);
+        // At most up to the next knot of the law's inputs, behind which the next step feels the next pieces.
+        let knot = self.system.clock().and_then(|clock| {
+            self.system.next_knot(at.t, &at.sides, end).map(|knot| (clock, S::Real::constant(knot)))
+        });
+        let progress = self.trial_within(knot.map_or(end, |(_, knot)| knot));
+        if let Some((clock, knot)) = knot
+            && is_zero(knot - self.run.at.t).any()
+        {
+            self.run.pass_knot((&self.system, &mut self.method), clock);
         }
         progress
     }
@@ -624,6 +618,15 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         self.work.grazes = tick(grazes, self.work.grazes, 1.0);
         self.begin((law, method), turned);
         turned
+    }
+
+    /// Passes the knot of an input, at which the run stands.
+    #[inline(never)]
+    fn pass_knot(&mut self, (law, method): (&dyn AnySystem<S, D>, &mut dyn Course<S, D>), clock: usize) {
+        let everywhere = S::mask(true);
+        let StepStart { t, x, sides } = &mut self.at;
+        pass(&law, clock, *t, self.size, x, sides, everywhere);
+        self.begin((law, method), everywhere);
     }
 
     /// Lanes where the law switches again and again while time stands still.
