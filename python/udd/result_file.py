@@ -246,16 +246,17 @@ def checked(name: str, given: dict[str, Any]) -> Any:
     return result
 
 
-def driven(model: Model, records: list[dict[str, InputSignal]], record: int) -> Model:
+def driven(equations: Any, records: list[dict[str, InputSignal]], record: int) -> Model:
     """A model with what was measured of its inputs.
 
     Raises
     ------
     ValueError
-        A model without inputs, or records that do not suit it.
+        A model that has none, or records that do not suit it.
     """
-    if not isinstance(model, FormulaModel) or not 0 <= record < len(records):
-        raise ValueError(record)
+    model = model_from_dict(equations)
+    if not isinstance(model, FormulaModel):
+        raise ValueError(model.kind)
     return model.with_inputs(*records, record=record)
 
 
@@ -274,7 +275,7 @@ def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
     }
     made: dict[str, Callable[[Any], Any]] = {
         "model": model_from_dict,
-        "driven": lambda x: driven(model_from_dict(x["equations"]), value(x["records"]), x["record"]),
+        "driven": lambda x: driven(x["equations"], value(x["records"]), x["record"]),
         "effect": effect_from_dict,
         "slot": lambda x: curves[x[0], x[1]],
         "coordinate": lambda x: coordinate(model, x),

@@ -63,11 +63,13 @@ impl<S: Scalar, const D: usize> Own<S, D> {
         sides: &Sides<S>,
         (values, stack): (&mut [S], &mut [S]),
     ) {
-        let mut room = [S::zero(); MAX_INPUTS];
+        // Written only where it is needed: it is long beside a short law.
+        let mut room;
         let inputs = match &self.inputs {
             InputValues::None => &[],
             InputValues::Constant(values) => &values[..],
             InputValues::Measured(inputs) => {
+                room = [S::zero(); MAX_INPUTS];
                 for (k, value) in room[..inputs.len()].iter_mut().enumerate() {
                     *value = inputs.piece(k, t.real(), sides[self.kinks.surfaces.len()]).at(t);
                 }

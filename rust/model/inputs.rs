@@ -117,13 +117,16 @@ pub struct Signals {
     signals: Arc<[Signal]>,
     /// Where none is delayed.
     timeline: Option<Arc<Timeline>>,
+    /// Whether one jumps that is.
+    jumps: bool,
 }
 
 impl Signals {
     pub fn new(signals: Vec<Signal>) -> Self {
         let free = signals.iter().any(|signal| signal.delay.is_some());
         let timeline = (!free).then(|| Arc::new(Timeline::new(&signals, &|_| 0.0)));
-        Self { signals: signals.into(), timeline }
+        let jumps = signals.iter().any(|signal| signal.delay.is_some() && signal.jumps());
+        Self { signals: signals.into(), timeline, jumps }
     }
 
     /// How many inputs there are.
@@ -143,8 +146,7 @@ impl Signals {
         let timeline = self.timeline.clone().unwrap_or_else(|| {
             Arc::new(Timeline::new(&self.signals, &|signal| delay(signal).real().lane(0)))
         });
-        let jumps = self.signals.iter().any(|signal| signal.delay.is_some() && signal.jumps());
-        Inputs { signals: self.signals.clone(), timeline, delays, jumps }
+        Inputs { signals: self.signals.clone(), timeline, delays, jumps: self.jumps }
     }
 }
 

@@ -271,11 +271,12 @@ struct FormulaModelSpec<'py> {
     record: usize,
 }
 
-/// As `udd.InputSignal`, with the polynomials between the samples.
+/// As `udd.InputSignal`.
 #[derive(FromPyObject)]
 struct InputSignal<'py> {
     t: PyReadonlyArray1<'py, f64>,
     values: PyReadonlyArray1<'py, f64>,
+    #[pyo3(attribute("pieces"))]
     coefficients: PyReadonlyArray2<'py, f64>,
 }
 

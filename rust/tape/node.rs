@@ -5,7 +5,7 @@
 
 use super::series::{inner_at, inner_square_at};
 use super::symbol::Function;
-use crate::model::Sides;
+use crate::model::{PIECE_COEFFICIENTS, Sides};
 use crate::scalar::{InstructionSet, Scalar};
 
 /// A value that does not change along a solution; operands are earlier ones.
@@ -259,7 +259,7 @@ impl Step {
             Node::Time if k == 1 => S::one(),
             Node::Time | Node::Hold(_) => S::zero(),
             // Known since the start.
-            Node::Input(_) if k < 4 => of!(to, k),
+            Node::Input(_) if k < PIECE_COEFFICIENTS => of!(to, k),
             Node::Input(_) => S::zero(),
             // The quotient q of a = q b.
             Node::Div(a, b) => (of!(a, k) - sum.fused(of!(to, 0), of!(b, k))) * of!(to + 1, 0),

@@ -257,7 +257,7 @@ def forecast(
     own = fitted.models[film]
     if isinstance(own, FormulaModel) and own.inputs:
         (own,) = driven((own,), (measurement,), origin)
-    models, cameras, states = _starts((fitted, own), film, part, asked, scale, random)
+    models, cameras, states = _starts(fitted, own, film, part, asked, scale, random)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
@@ -342,7 +342,8 @@ def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Reco
 
 
 def _starts(
-    fit_and_model: tuple[Fit, Model],
+    fitted: Fit,
+    own: Model,
     film: int,
     part: Record,
     asked: tuple[int, float],
@@ -350,7 +351,6 @@ def _starts(
     rng: np.random.Generator,
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Every member's model, camera and state at the window's end."""
-    fitted, own = fit_and_model
     seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
     (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
     order = list(own.parameters)

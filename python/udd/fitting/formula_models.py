@@ -52,16 +52,12 @@ def driven(
             if name not in measurement.inputs:
                 known = ", ".join(measurement.inputs) or "none"
                 raise FitError(f"the measurement lacks the model's input {name}; its inputs are {known}")
-            signal, (start, end) = measurement.inputs[name], measurement.t[[0, -1]]
-            first, last = signal.span
+            signal, (start, end) = measurement.inputs[name], measurement.t[[0, -1]].tolist()
             # A sample may come just after a row that it belongs to.
             slack = _LATE * float(np.median(np.diff(signal.t)))
-            if start < first - slack or end > last + slack:
-                raise FitError(
-                    f"the input {name} is known from t = {first:g} to {last:g}, "
-                    f"but the measurement goes from {start:g} to {end:g}"
-                )
-            signals[name] = signal.shifted(-float(start if origin is None else origin))
+            if lacks := signal.lacks(start, end, slack, "measurement"):
+                raise FitError(f"the input {name} {lacks}")
+            signals[name] = signal.shifted(-(start if origin is None else origin))
         records.append(signals)
     return tuple(model.with_inputs(*records, record=k) for k, model in enumerate(models))
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from functools import cached_property
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,6 +82,13 @@ class InputSignal:
         """The same signal later by so much [s]."""
         return InputSignal(self.t + by, self.values, self.hold)
 
+    def lacks(self, start: float, end: float, slack: float, whose: str) -> str:
+        """What it lacks of a span of time, but for so much at its ends, in words; empty where nothing."""
+        first, last = self.span
+        if first - slack <= start and end <= last + slack:
+            return ""
+        return f"is known from t = {first:g} to {last:g}, but the {whose} goes from {start:g} to {end:g}"
+
     def coefficients(self) -> NDArray[np.float64]:
         """The polynomial between each two samples, over the time since the first of them.
 
@@ -89,6 +97,11 @@ class InputSignal:
         ndarray, shape (n - 1, 4)
             Coefficients, lowest power first.
         """
+        return self.pieces
+
+    @cached_property
+    def pieces(self) -> NDArray[np.float64]:
+        """As :meth:`coefficients`; each run and each step of a fit asks for them."""
         pieces = np.zeros((len(self.t) - 1, 4))
         pieces[:, 0] = self.values[:-1]
         if self.hold == "linear":
@@ -97,6 +110,7 @@ class InputSignal:
             from scipy.interpolate import CubicSpline
 
             pieces = CubicSpline(self.t, self.values, bc_type="natural").c[::-1].T.copy()
+        pieces.setflags(write=False)
         return pieces
 
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
@@ -105,7 +119,7 @@ class InputSignal:
         piece = np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, len(self.t) - 2)
         since = at - self.t[piece]
         powers = since[..., None] ** np.arange(4)
-        held = (self.coefficients()[piece] * powers).sum(axis=-1)
+        held = (self.pieces[piece] * powers).sum(axis=-1)
         # A held sample lasts until the next one; the last one is met at the end.
         return np.asarray(np.where(at >= self.t[-1], self.values[-1], held))
 
@@ -115,6 +129,19 @@ class InputSignal:
     def __repr__(self) -> str:
         first, last = self.span
         return f"<InputSignal: {len(self)} samples, t = {first:.6g} to {last:.6g} s, {self.hold} hold>"
+
+
+def named_signal(name: str, t: ArrayLike, values: ArrayLike, hold: Any = "linear") -> InputSignal:
+    """A signal from its samples; what is wrong with them is told with its name.
+
+    Raises
+    ------
+    MeasurementError
+    """
+    try:
+        return InputSignal(t, values, hold)
+    except MeasurementError as error:
+        raise MeasurementError(f"the input {name}: {error}") from None
 
 
 def input_signals(
@@ -127,13 +154,7 @@ def input_signals(
     MeasurementError
         What is none of these, naming the input.
     """
-    signals = {}
-    for name, value in (given or {}).items():
-        if isinstance(value, InputSignal):
-            signals[str(name)] = value
-            continue
-        try:
-            signals[str(name)] = InputSignal(t, value)
-        except MeasurementError as error:
-            raise MeasurementError(f"the input {name}: {error}") from None
-    return signals
+    return {
+        str(name): value if isinstance(value, InputSignal) else named_signal(name, t, value)
+        for name, value in (given or {}).items()
+    }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from udd.errors import MeasurementError
 
 from .formats import Table
 from .formats.headings import COUNTED, Heading, in_base_units, size
-from .input_signal import Hold, InputSignal
+from .input_signal import Hold, InputSignal, named_signal
 
 Asked = str | tuple[str, str]
 
@@ -174,7 +173,7 @@ class Frames:
             self.taken[name] = f"{heading.raw}, input"
             if not there.all():
                 self.taken[name] += f", {int((~there).sum())} samples empty"
-            return signal(name, run.t[there], values[there], hold), heading.unit
+            return named_signal(name, run.t[there], values[there], hold), heading.unit
         raise self.record.missing(asked)
 
     def told(self) -> dict[str, str]:
@@ -191,14 +190,6 @@ class Run:
     t: NDArray[np.float64]
     heading: Heading
     unit: str
-
-
-def signal(name: str, t: NDArray[np.float64], values: NDArray[np.float64], hold: Any) -> InputSignal:
-    """An input from its columns; what is wrong with it is told with its name."""
-    try:
-        return InputSignal(t, values, hold)
-    except MeasurementError as error:
-        raise MeasurementError(f"the input {name}: {error}") from None
 
 
 def _run(record: Recorded, table: Table, convert: bool) -> Run:
@@ -267,7 +258,7 @@ def own_inputs(table: Table) -> dict[str, InputSignal]:
         )
         there = ~np.isnan(t if own else values)
         hold = holds.get(name, "linear") if isinstance(holds, dict) else "linear"
-        found[name] = signal(name, t[there], values[there], hold)
+        found[name] = named_signal(name, t[there], values[there], hold)
     return found
 
 

@@ -36,16 +36,8 @@ class FormulaText(NamedTuple):
     angles: list[str]
     inputs: list[str]
     delays: list[str | None]
-    records: list[list[SampledSignal]]
+    records: list[list[InputSignal]]
     record: int
-
-
-class SampledSignal(NamedTuple):
-    """An input signal, with the polynomials between its samples."""
-
-    t: NDArray[np.float64]
-    values: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -292,7 +284,7 @@ class FormulaModel(Model):
             angles=list(self.angles),
             inputs=list(self.inputs),
             delays=[delays.get(name) for name in self.inputs],
-            records=[[_sampled(record[name]) for name in self.inputs] for record in self.records],
+            records=[[record[name] for name in self.inputs] for record in self.records],
             record=self.record,
         )
 
@@ -329,7 +321,7 @@ class FormulaModel(Model):
         Raises
         ------
         ModelError
-            An input without a signal, or a signal of what is no input.
+            An input without a signal, a signal of what is no input, or a record that there is not.
 
         Examples
         --------
@@ -349,6 +341,8 @@ class FormulaModel(Model):
                         f"the input {name} needs a signal (a udd.InputSignal), not {own.get(name)!r}"
                     )
             checked.append(dict(own))
+        if not 0 <= record < max(len(checked), 1):
+            raise ModelError(f"there is no record {record} of the inputs: there are {len(checked)}")
         return self._with(records=tuple(checked) if self.inputs else (), record=record)
 
     def with_term(self, equation: str, term: Expression, **amplitude: float) -> FormulaModel:
@@ -517,10 +511,6 @@ def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> 
     if len(at) and np.linalg.eigvalsh(at).min() <= 0.0:
         raise ModelError("the mass matrix must be positive definite")
     return mass
-
-
-def _sampled(signal: InputSignal) -> SampledSignal:
-    return SampledSignal(signal.t, signal.values, np.ascontiguousarray(signal.coefficients()))
 
 
 def _delays(

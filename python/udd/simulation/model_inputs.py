@@ -16,6 +16,7 @@ from udd.models.formula_model import FormulaModel
 __all__ = ["driven"]
 
 M = TypeVar("M", bound=Model)
+_ROUNDING = 1e-9  # of a signal's length, by which a run may go on beyond it
 
 
 def driven(model: M, times: NDArray[np.float64], inputs: Mapping[str, InputSignal | ArrayLike] | None) -> M:
@@ -45,11 +46,7 @@ def driven(model: M, times: NDArray[np.float64], inputs: Mapping[str, InputSigna
     except MeasurementError as error:
         raise ModelError(str(error)) from None
     for name, signal in signals.items():
-        first, last = signal.span
-        slack = 1e-9 * (last - first)
-        if times[0] < first - slack or times[-1] > last + slack:
-            raise ModelError(
-                f"the input {name} is known from t = {first:g} to {last:g}, but the run goes from "
-                f"{times[0]:g} to {times[-1]:g}"
-            )
+        slack = _ROUNDING * float(np.ptp(signal.span))
+        if lacks := signal.lacks(float(times[0]), float(times[-1]), slack, "run"):
+            raise ModelError(f"the input {name} {lacks}")
     return model.with_inputs(signals)
