@@ -225,7 +225,7 @@ def bifurcation(
     }
     data["outcome"] = (dims, found.outcome.astype(np.int8).reshape(shape), of_outcomes())
     if attractors:
-        data |= _of_attractors(model, parameter, axis, shape, verdicts, told, kinds)
+        data |= _of_attractors(model, parameter, shape, verdicts, told, kinds)
         if path == "both":
             data |= _of_hysteresis(model, parameter, axis, told)
     coords: Variables = {
@@ -250,7 +250,6 @@ def bifurcation(
 def _of_attractors(
     model: Model,
     parameter: str,
-    axis: Floats,
     shape: tuple[int, ...],
     verdicts: Classification,
     told: DiagramLabels,

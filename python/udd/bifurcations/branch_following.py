@@ -109,7 +109,7 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
         if isinstance(curve, PeriodicOrbitCurve) and (near := _connection(way)) is not None:
             way.end = f"a connection near {near:.13g}: the period grows without bound"
             return way
-        if len(way.places) > 8 and _closes(way.places[0], here, curve, step):
+        if len(way.places) > 8 and _closes(way.places[0], here, step):
             way.end = "the branch is closed"
             return way
 
@@ -243,9 +243,7 @@ def _connection(way: BranchTrace) -> float | None:
     return values[-1] if still and growing else None
 
 
-def _closes(
-    first: tuple[AnyCurve, CurvePoint, TestFunctions, float], here: CurvePoint, curve: AnyCurve, step: float
-) -> bool:
+def _closes(first: tuple[AnyCurve, CurvePoint, TestFunctions, float], here: CurvePoint, step: float) -> bool:
     """Whether the branch has come back to where it began."""
     start = first[1]
     if len(start.u) != len(here.u):
