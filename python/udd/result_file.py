@@ -7,6 +7,7 @@ Only the types listed here are made when a file is read.
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 import math
@@ -27,7 +28,7 @@ from udd._util.schema import consistent, is_a
 from udd.discovery import Discovery
 from udd.discovery.nonparametric.bsplines import Spline
 from udd.discovery.nonparametric.curve_scan import Curve
-from udd.discovery.nonparametric.penalized_curves import Absorbed
+from udd.discovery.nonparametric.penalized_curves import Confounding
 from udd.discovery.results import AddedEffect, Alternative, RejectedEffect
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.coordinates import Slot, coordinate, slots
@@ -58,7 +59,7 @@ _TYPES: dict[str, type] = {
         *(Fit, Problem, Point, Record, Noise, Free, InputSignal, Measurement, Thinned),
         *(diagnostics.Diagnostics, diagnostics.ModelError, diagnostics.Reading, diagnostics.RunawayParameter),
         *(Discovery, AddedEffect, Alternative, RejectedEffect, Candidate, Scored, Errors),
-        *(Curve, Spline, Score, Absorbed),
+        *(Curve, Spline, Score, Confounding),
     )
 }
 #: Shapes of what goes together: n frames, m channels, d states, p free parameters, l links, f films.
@@ -73,10 +74,11 @@ _SHAPES = {
     "Curve": "coefficients:k covariance:kk score.gradient:k score.information:kk coordinates:c splines:c "
     "places:c",
     "Score": "gradient:k information:kk alone:k",
-    "Absorbed": "rows:ak vectors:ka",
+    "Confounding": "rows:ak vectors:ka",
     "Discovery": "scans:s curves:s comparisons:s",
 }
-#: Fields that were called otherwise in files of before.
+#: Types and fields that were called otherwise in files of before.
+_BEFORE = {"Absorbed": "Confounding"}
 _RENAMED = {"Discovery": {"looks": "comparisons", "refused": "rejected"}}
 _BROKEN = (
     *(AttributeError, IndexError, KeyError, OSError, OverflowError, RecursionError, TypeError, ValueError),
@@ -228,6 +230,9 @@ class _Writer:
         return {"type": name, "fields": known | more}
 
 
+_hints = functools.cache(get_type_hints)
+
+
 def checked(name: str, given: dict[str, Any]) -> Any:
     """An object of one of the types of a file, its fields' types and shapes checked.
 
@@ -236,12 +241,12 @@ def checked(name: str, given: dict[str, Any]) -> Any:
     ValueError
         A field of another type, or shapes that do not go together.
     """
-    hints = get_type_hints(_TYPES[name])
+    hints = _hints(_TYPES[name])
     for field, value in given.items():
         if field in hints and not is_a(value, hints[field]):
             raise ValueError(field)
     result = _TYPES[name](**given)
-    if not consistent(result, _SHAPES.get(name, "")):
+    if not consistent(result, _SHAPES.get(name, "")) or (isinstance(result, Fit) and not _named(result)):
         raise ValueError(name)
     return result
 
@@ -258,6 +263,12 @@ def driven(equations: Any, records: list[dict[str, InputSignal]], record: int) -
     if not isinstance(model, FormulaModel):
         raise ValueError(model.kind)
     return model.with_inputs(*records, record=record)
+
+
+def _named(fit: Fit) -> bool:
+    """Whether a fit's numbers are those of the parameters that were free."""
+    free = [one.name for one in fit.problem.free]
+    return list(fit.parameters) == free == list(fit.errors)
 
 
 def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
@@ -293,11 +304,12 @@ def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
         if "type" not in data:
             ((kind, content),) = data.items()
             return made[kind](content)
-        before = _RENAMED.get(data["type"], {})
+        kind = _BEFORE.get(data["type"], data["type"])
+        before = _RENAMED.get(kind, {})
         given = {before.get(name, name): value(x) for name, x in data["fields"].items()}
         doubts = given.pop("doubts", None)
-        result = checked(data["type"], given)
-        if doubts is not None:
+        result = checked(kind, given)
+        if isinstance(doubts, diagnostics.Diagnostics):
             vars(result)["doubts"] = doubts
         return result
 

@@ -205,7 +205,7 @@ where
             let near = crossing.and(early).and(least.less(start).not());
             if near.any() {
                 // On the target: either it goes to the right side for a moment only, or not at all.
-                let gone = excursion(on, &mut low, &mut high, least, near);
+                let gone = leaves_and_returns(on, &mut low, &mut high, least, near);
                 found.stale[target] = near.and(gone.not()).and(stale.not());
                 stale = stale.or(found.stale[target]);
                 crossing = crossing.and(near.not().or(gone));
@@ -236,7 +236,7 @@ fn pick<R: Real>(mask: R::Mask, yes: (R, R), no: (R, R)) -> (R, R) {
 /// Looks ever closer to the start for a point where the function is above `least`, which becomes the
 /// low end of the bracket; the high end becomes the last point seen below zero. Returns the lanes that
 /// have such a point.
-fn excursion<R: Real>(
+fn leaves_and_returns<R: Real>(
     on: impl Fn(R) -> R,
     low: &mut (R, R),
     high: &mut (R, R),

@@ -67,7 +67,7 @@ pub trait Method<S: Scalar, const D: usize> {
     fn extend(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>);
 
     /// Goes on from the end of the last trial, in these lanes.
-    fn accept(&mut self, lanes: S::Mask);
+    fn begin_next(&mut self, lanes: S::Mask);
 
     /// The state at `dt` after the start of the last trial, on its polynomial.
     fn at(&self, dt: S::Real) -> [S; D];
@@ -103,7 +103,7 @@ pub trait Method<S: Scalar, const D: usize> {
 /// What landing asks of a [`Method`] whose type is forgotten. See the methods of the same names.
 pub(super) trait Course<S: Scalar, const D: usize> {
     fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &StepStart<S, D>, lanes: S::Mask);
-    fn accept(&mut self, lanes: S::Mask);
+    fn begin_next(&mut self, lanes: S::Mask);
     fn at(&self, dt: S::Real) -> [S; D];
     fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D];
     fn probes(&self) -> &'static [f64];
@@ -114,8 +114,8 @@ impl<S: Scalar, const D: usize, K: Method<S, D>> Course<S, D> for K {
     fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &StepStart<S, D>, lanes: S::Mask) {
         Method::begin(self, &law, at, lanes);
     }
-    fn accept(&mut self, lanes: S::Mask) {
-        Method::accept(self, lanes);
+    fn begin_next(&mut self, lanes: S::Mask) {
+        Method::begin_next(self, lanes);
     }
     fn at(&self, dt: S::Real) -> [S; D] {
         Method::at(self, dt)

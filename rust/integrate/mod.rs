@@ -1,12 +1,12 @@
 //! How a step is taken.
 //!
-//! [`tableau`] holds methods as data, [`step()`] is pure, [`control`] chooses step sizes, [`root`] finds
+//! [`tableau`] holds methods as data, [`step()`] is pure, [`step_size`] chooses step sizes, [`root`] finds
 //! zeros; a [`Method`] takes steps and has their polynomials. [`Integrator`] puts them together: the one
 //! stepping loop, on which every derived object is built.
 
 mod dop853;
-mod driver;
 mod event_location;
+mod integrator;
 mod method;
 mod propagate;
 mod rodas;
@@ -20,8 +20,8 @@ mod taylor;
 mod tolerance;
 
 pub use dop853::Dop853Scheme;
-pub use driver::{Counts, Ending, Integrator, Progress};
 pub use event_location::{Probes, TARGETS, WALL, beyond};
+pub use integrator::{Counts, Ending, Integrator, Progress};
 pub use method::{MOST_PROBES, Method, StepStart, Trial};
 pub use propagate::propagate;
 pub use rodas::Rodas;

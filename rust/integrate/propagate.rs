@@ -1,6 +1,6 @@
 //! From one time to another, nothing kept on the way.
 
-use super::driver::Integrator;
+use super::integrator::Integrator;
 use super::tolerance::{Failure, Tolerance};
 use crate::model::{AnySystem, System};
 use crate::scalar::Scalar;
@@ -38,13 +38,13 @@ where
         return Ok(x0);
     }
     // Its type is forgotten: one function for each kind of number.
-    let mut driver: Integrator<&dyn AnySystem<S, D>, S, D> =
+    let mut integrator: Integrator<&dyn AnySystem<S, D>, S, D> =
         Integrator::new(system, t0, x0, Some(t1 - t0), tolerance);
-    while driver.t() != t1 {
-        driver.advance(t1)?;
-        if driver.counts().accepted > MOST_STEPS {
-            return Err(Failure::TooManySteps { t: driver.t(), limit: MOST_STEPS });
+    while integrator.t() != t1 {
+        integrator.advance(t1)?;
+        if integrator.counts().accepted > MOST_STEPS {
+            return Err(Failure::TooManySteps { t: integrator.t(), limit: MOST_STEPS });
         }
     }
-    Ok(*driver.x())
+    Ok(*integrator.x())
 }

@@ -230,7 +230,7 @@ impl<const D: usize> Method<f64, D> for Rodas<'_, D> {
 
     fn extend(&mut self, _system: &impl System<f64, D>, _at: &StepStart<f64, D>) {}
 
-    fn accept(&mut self, _lanes: bool) {}
+    fn begin_next(&mut self, _lanes: bool) {}
 
     fn at(&self, dt: f64) -> [f64; D] {
         let part = if self.h == 0.0 { 0.0 } else { dt / self.h };

@@ -197,7 +197,7 @@ where
     }
 
     #[inline(always)]
-    fn accept(&mut self, lanes: S::Mask) {
+    fn begin_next(&mut self, lanes: S::Mask) {
         let last = &self.stages[T::TABLEAU.stages - 1];
         self.first = vector!(S, D; n => S::select(lanes, last[n], self.first[n]));
     }

@@ -1,6 +1,6 @@
 //! A single run, whatever its model and its method.
 
-use super::driver::{Counts, Ending, Integrator};
+use super::integrator::{Counts, Ending, Integrator};
 use super::method::Method;
 use super::tolerance::{ErrorNorm, Failure};
 use crate::model::{Sides, System};
@@ -9,7 +9,7 @@ use crate::model::{Sides, System};
 const MOST: usize = 64;
 
 /// A [`Integrator`] over plain numbers, its model and its method forgotten: what looks at every step of a run is then
-/// compiled once for each number of states. See the driver's methods of the same names.
+/// compiled once for each number of states. See the integrator's methods of the same names.
 pub trait Steps<const D: usize> {
     /// Takes accepted steps up to `end`, until one reaches the time `wanted` or does not end freely, but only so many
     /// that whoever wants the run to stop need not wait. The steps before the last one are not to be looked at.

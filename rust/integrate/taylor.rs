@@ -158,7 +158,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     fn extend(&mut self, _system: &impl System<S, D>, _at: &StepStart<S, D>) {}
 
     #[inline(always)]
-    fn accept(&mut self, _lanes: S::Mask) {}
+    fn begin_next(&mut self, _lanes: S::Mask) {}
 
     fn at(&self, dt: S::Real) -> [S; D] {
         self.jets.at(dt)

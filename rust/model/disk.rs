@@ -58,7 +58,7 @@ impl<S: Scalar> Friction<S> {
 const KINK: usize = 1;
 
 /// What moves the disk: the torque, all told, on its inertia, and the contact's velocity.
-pub(super) struct Balance<S> {
+pub(super) struct EquationOfMotion<S> {
     pub torque: S,
     pub inertia: S,
     pub velocity: (S, S),
@@ -122,7 +122,13 @@ impl<S: Scalar> Disk<S> {
 
     /// The equation of motion with all effects. It is large, and compiled once for each kind of number.
     #[inline(never)]
-    pub(super) fn balance(&self, t: S, x: &[S; 4], contact: &Contact<S>, sides: &Sides<S>) -> Balance<S> {
+    pub(super) fn equation_of_motion(
+        &self,
+        t: S,
+        x: &[S; 4],
+        contact: &Contact<S>,
+        sides: &Sides<S>,
+    ) -> EquationOfMotion<S> {
         let &[omega, y, z, _] = x;
         let at = self.at(|s| s, t, *x, contact, sides);
         let (mut dy, mut dz) = (z * omega, self.w - y * omega);
@@ -161,7 +167,7 @@ impl<S: Scalar> Disk<S> {
             inertia += z * slip.lateral.d[1] - y * slip.vertical.d[1];
         }
         torque = torque - k * omega - (y * u + z * w_c) * omega;
-        Balance { torque, inertia, velocity: (dy, dz), dry: forces.dry }
+        EquationOfMotion { torque, inertia, velocity: (dy, dz), dry: forces.dry }
     }
 }
 
@@ -176,8 +182,8 @@ impl<S: Scalar> Slider<S, 4> for Disk<S> {
 
     fn at_rest(&self, t: S, &[_, y, z, beta]: &[S; 4], sides: &Sides<S>) -> (S, Dry<S>) {
         let contact = Contact { sign: S::zero(), bristle: S::zero() };
-        let balance = self.balance(t, &[S::zero(), y, z, beta], &contact, sides);
-        (balance.torque, balance.dry)
+        let motion = self.equation_of_motion(t, &[S::zero(), y, z, beta], &contact, sides);
+        (motion.torque, motion.dry)
     }
 }
 
@@ -190,8 +196,8 @@ impl<S: Scalar> System<S, 4> for Disk<S> {
             let torque = self.g * y - at.k * omega - z * self.w * omega;
             return [torque / at.inertia, z * omega, self.w - y * omega, omega];
         }
-        let Balance { torque, inertia, velocity: (dy, dz), .. } =
-            self.balance(t, x, &self.contact(sides), sides);
+        let EquationOfMotion { torque, inertia, velocity: (dy, dz), .. } =
+            self.equation_of_motion(t, x, &self.contact(sides), sides);
         [self.held(torque / inertia, sides), dy, dz, omega]
     }
 

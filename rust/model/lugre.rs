@@ -25,10 +25,10 @@ fn contact<S: Scalar>(bristle: S) -> Contact<S> {
 impl<S: Scalar> System<S, 5> for WithLuGre<Disk<S>> {
     #[inline]
     fn rates(&self, t: S, &[omega, y, z, beta, bristle]: &[S; 5], sides: &Sides<S>) -> [S; 5] {
-        let balance = self.0.balance(t, &[omega, y, z, beta], &contact(bristle), sides);
-        let (torque, rate) = balance.dry.bristles(omega, bristle, balance.inertia, sides);
-        let (dy, dz) = balance.velocity;
-        [(balance.torque + torque) / balance.inertia, dy, dz, omega, rate]
+        let motion = self.0.equation_of_motion(t, &[omega, y, z, beta], &contact(bristle), sides);
+        let (torque, rate) = motion.dry.bristles(omega, bristle, motion.inertia, sides);
+        let (dy, dz) = motion.velocity;
+        [(motion.torque + torque) / motion.inertia, dy, dz, omega, rate]
     }
 
     fn surfaces(&self) -> usize {

@@ -14,7 +14,7 @@ import unmodelled
 from udd import _core
 from udd.discovery.curve_effects import fit_curve, fit_formula
 from udd.discovery.nonparametric.bsplines import Spline, along, product, rough_product
-from udd.discovery.nonparametric.confounding import absorbed, distinct
+from udd.discovery.nonparametric.confounding import confounded_directions, identifiable_part
 from udd.discovery.nonparametric.curve_scan import refined, scan_curves
 from udd.discovery.nonparametric.penalized_curves import chance, smooth
 from udd.discovery.scoring.coordinates import coordinate, coordinates, slots
@@ -48,7 +48,7 @@ def test_a_law_of_no_library_is_located_and_described(case):
     assert best.name in case.found
     assert found.p < 1e-4  # a tenth of what a search takes to accept it
     # Friction over the speed has an infinite slope at rest, where it does nothing; its torque is smooth.
-    curve = distinct(refined(next(c for c in found.curves if c.name == case.found[0]), fit), fit)
+    curve = identifiable_part(refined(next(c for c in found.curves if c.name == case.found[0]), fit), fit)
     described = formulas_for(curve, int(np.isfinite(fit.misfit).sum()))
     assert described.identified
     # Some formula within the ten nats is the law, as closely as the curve is known where the data are.
@@ -140,7 +140,7 @@ def test_bands_hold_the_law(case):
     for seed in range(12):
         fit = udd.fit(unmodelled.record(weak(case, 0.4), seed), udd.Disk(W))
         only = scan_curves(fit, only=lambda slot, own: (slot.title, own[0].name) == case.found[0])
-        curve = distinct(refined(only.curves[0], fit), fit)
+        curve = identifiable_part(refined(only.curves[0], fit), fit)
         places = curve.places[0]
         places = np.mod(places, 2 * np.pi) if curve.splines[0].periodic else places
         x = np.quantile(places, np.linspace(0.005, 0.995, 199))
@@ -326,9 +326,9 @@ def test_what_parameters_absorb_is_left_out(null):
         null, only=lambda slot, own: (slot.title, own[0].name) == ("vertical (constraint)", "Z")
     )
     curve = only.curves[0]
-    theirs = absorbed(curve, null)
+    theirs = confounded_directions(curve, null)
     assert theirs.rows.shape[0] >= 1
-    narrowed = distinct(curve, null)
+    narrowed = identifiable_part(curve, null)
     x = np.quantile(curve.places[0], np.linspace(0.05, 0.95, 40))
     assert narrowed.errors(x).mean() < 0.5 * curve.errors(x).mean()
     taken_back = narrowed.beside(narrowed.values(x) + 1e-3, x) - narrowed.values(x)

@@ -113,7 +113,7 @@ def test_both_halves_of_a_record_must_want_an_effect(c):
     measured, _states = simulated.film(truth, np.random.default_rng(12), 20.0)
     before = fit_record(measured, record_of(measured), udd.Disk(0.045), search=True)
     after = extend(before, [E.quadratic_drag()], [0.0])
-    assert acceptance_tests._crosswise(acceptance_tests.same_level(before, after), 1.0) == (c > 0)
+    assert acceptance_tests._split_half_test(acceptance_tests.same_level(before, after), 1.0) == (c > 0)
 
 
 def test_a_shape_between_those_tried_is_found():

@@ -13,7 +13,7 @@ import discovered
 import udd
 from simulated import film
 from udd.cli.discover import describe
-from udd.discovery.experiment_design import PARTED, _films
+from udd.discovery.experiment_design import SEPARATED, _films
 from udd.fitting import at_level, fit_record, record_of
 
 DRIVE = 0.042
@@ -37,7 +37,7 @@ def test_a_second_drive_is_proposed_for_slip_or_relaxation():
     assert any("slip" in other.title for other in found.alternatives)
     assert found.hint is not None and "times the drive" in found.hint.design
     assert any("slip" in title for title in found.hint.parts)
-    assert found.hint.nats >= PARTED
+    assert found.hint.nats >= SEPARATED
     # Neither another start nor a longer film at the one drive would tell.
     telling = [hint for hint in found.hints if any("slip c Z" in title for title in hint.parts)]
     assert all("times the drive" in hint.design for hint in telling)
@@ -90,7 +90,7 @@ def test_a_weak_doubt_that_no_film_settles_is_said_so():
         alternatives=[replace(slip, effect=slip.effect.replace(c=0.02 * DRIVE))],
     )
     (hint,) = faint.hints
-    assert hint.design == "" and hint.nats < PARTED
+    assert hint.design == "" and hint.nats < SEPARATED
     assert hint.text.startswith("no feasible film would part them")
 
 

@@ -102,8 +102,8 @@ def test_mere_products_and_several_terms_pay_more():
     usual, odd = (c for c in library(SPRING) if c.title in ("v^3 in v'", "x*v^2 in v'"))
     order = sorted([usual, odd], key=lambda c: not c.usual)
 
-    def handicap(candidates):
-        return TrialFit(candidates, None, None, [], 0.0, 1).handicap  # type: ignore[arg-type]
+    def prior_penalty(candidates):
+        return TrialFit(candidates, None, None, [], 0.0, 1).prior_penalty  # type: ignore[arg-type]
 
-    assert [handicap([c]) for c in order] == [0.0, 10.0]
-    assert handicap(order) == 30.0
+    assert [prior_penalty([c]) for c in order] == [0.0, 10.0]
+    assert prior_penalty(order) == 30.0

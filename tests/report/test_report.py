@@ -109,7 +109,7 @@ def test_what_the_frames_held_back_say_is_told(
     ratio: tuple[float, float, float], witness: Literal["held", "fitted", "halves"], told: str
 ) -> None:
     (effect,) = discovered.disk().effects
-    assert told in words.borne_out(replace(effect, ratio=ratio, witness=witness))
+    assert told in words.confirmed_by(replace(effect, ratio=ratio, witness=witness))
 
 
 def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:

@@ -30,7 +30,7 @@ from film_for_tests import (
 )
 from udd.errors import UddError
 from udd.measurement import Measurement, read_measurement
-from udd.tracking import pictures_at, pixels, track, track_in_detail
+from udd.tracking import pictures_at, pixels, track, track_disk
 from udd.tracking.geometry.contact_point import pivot
 from udd.tracking.geometry.lens import Lens, calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Mark, Pose
@@ -442,7 +442,7 @@ def test_the_test_film_itself_is_drawn_to_scale() -> None:
     ],
 )
 def test_shared_films(name: str, length: float, angle: float, lost: float) -> None:
-    result = track_in_detail(SHARED / f"{name}.mp4", disk_radius=0.08)
+    result = track_disk(SHARED / f"{name}.mp4", disk_radius=0.08)
     m = result.measurement
     truth = np.genfromtxt(SHARED / f"{name}.truth.csv", delimiter=",", skip_header=1, usecols=(2, 3, 4))
     assert len(m) == len(truth)

@@ -14,7 +14,7 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import udd
 from udd.film import Defects
-from udd.tracking import track_in_detail
+from udd.tracking import track_disk
 from udd.tracking.geometry.pose import DiskAppearance, Mark
 from udd.tracking.passes.tracks import Tracks, lost_in
 from udd.tracking.passes.wobble import wobble
@@ -64,7 +64,7 @@ def test_too_few_marks_or_frames_say_nothing() -> None:
 def filmed(path: Path, degrees: float) -> udd.Measurement:
     run = udd.simulate(udd.Disk(0.039), np.arange(0, 5, 0.005), [1, 0.02, -0.02, 0.3], dense=True)
     film = udd.render(run, path, size=(276, 350), defects=Defects(wobble=math.radians(degrees)))
-    return track_in_detail(film.path, refine=True).measurement
+    return track_disk(film.path, refine=True).measurement
 
 
 def test_a_films_wobble_is_told_with_its_uncertainty(tmp_path: Path) -> None:

@@ -29,7 +29,8 @@ def is_a(value: object, hint: Any) -> bool:
             is_a(k, inner[0]) and is_a(x, inner[1]) for k, x in value.items()
         )
     if hint in (float, int):  # a whole number may stand for a float, a truth value for neither
-        return isinstance(value, (int, float) if hint is float else int) and not isinstance(value, bool)
+        whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
+        return whole or (hint is float and isinstance(value, float))
     return isinstance(value, NoneType if hint is None else hint)
 
 

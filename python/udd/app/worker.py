@@ -114,7 +114,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
     """The motion in a film, shown while it is tracked."""
     import cv2
 
-    from udd.tracking import Film, TrackedFrame, TrackError, track_in_detail
+    from udd.tracking import Film, TrackedFrame, TrackError, track_disk
 
     film = Film(file)
     if math.prod(film.size) > limits.PIXELS:
@@ -147,7 +147,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
             frame["centre"] = [factor * c for c in seen.centre]
         tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
 
-    return track_in_detail(file, disk_radius=radius, watch=watch).measurement
+    return track_disk(file, disk_radius=radius, watch=watch).measurement
 
 
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from udd.simulation.trajectory import initial_state, tolerances
 from .section_runs import SectionRunner
 
 
-def runner_of(
+def section_runner(
     model: Model,
     rows: Floats,
     section: str | None,

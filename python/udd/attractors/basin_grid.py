@@ -19,7 +19,7 @@ from udd.models.state_scaling import Floats, coordinates_of
 from udd.simulation.batch import RUN_OPTIONS, RunOptions
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 
-from .arguments import increasing, parameter_rows, runner_of, start_states
+from .arguments import increasing, parameter_rows, section_runner, start_states
 from .attractor import KINDS, Attractor
 from .basin_sampling import InitialStates
 from .basin_statistics import basin_fractions, uncertainty
@@ -120,10 +120,10 @@ def basins(
 
     Notes
     -----
-    Periodic orbits are known by their section points, aperiodic attractors by visiting the same places,
-    equilibria by their rates. No long transient shall pass for an attractor: what nearly comes back is
-    followed until it does, and aperiodic motions are followed twice as far, and on and on as long as some of
-    them end elsewhere. Where that does not stop within `max_extension`, they are "undecided".
+    Periodic orbits are identified by their section points, aperiodic attractors by overlapping point sets,
+    equilibria by their rates. A slow transient is integrated until it converges. Aperiodic motions are
+    integrated for twice the time, and again as long as some of them leave; those that still do so at
+    `max_extension` are "undecided".
 
     The fractions' errors are those of a sample on a grid: binomial where neighbours have nothing in common,
     smaller where the basins are large. With f ~ distance^alpha, the basins' boundary has the dimension of the
@@ -150,7 +150,7 @@ def basins(
     extend = whole("max_extension", max_extension, 1)
     axes, starts = _starts(model, grid, state0)
     rows = parameter_rows(model, {}, 1)
-    runner = runner_of(model, rows, section, direction, chosen, t_max, transient + n)
+    runner = section_runner(model, rows, section, direction, chosen, t_max, transient + n)
     judge = MotionClassifier(model, None, coordinates_of(model, starts), tightness(runner.rtol))
     samples = InitialStates(runner, AttractorCatalogue(judge), starts, n, extend * (transient + n))
 

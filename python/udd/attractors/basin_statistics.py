@@ -62,7 +62,7 @@ def _groups(ends: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class UncertaintyExponent:
     """How the share of pairs that end differently grows with their distance.
 
     Attributes
@@ -84,7 +84,7 @@ class Uncertainty:
     fitted: NDArray[np.bool_]
 
 
-def uncertainty(ends: NDArray[np.int32]) -> Uncertainty:
+def uncertainty(ends: NDArray[np.int32]) -> UncertaintyExponent:
     """The uncertainty exponent of the basins on a grid; `ends` as in :func:`basin_fractions`.
 
     Notes
@@ -109,7 +109,7 @@ def uncertainty(ends: NDArray[np.int32]) -> Uncertainty:
     again = again[np.isfinite(again)]
     told = np.isfinite(exponent) and len(again) > _REPEATS // 2
     error = float(np.hypot(again.std(ddof=1), misfit)) if told else float("nan")
-    return Uncertainty(stride, fraction, exponent, error, fitted)
+    return UncertaintyExponent(stride, fraction, exponent, error, fitted)
 
 
 def _per_block(ends: NDArray[np.int32], stride: int) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from udd.models import Model
 from udd.models.state_scaling import Floats, coordinates_of
 from udd.simulation.batch import RUN_OPTIONS, RunOptions
 
-from .arguments import parameter_rows, parameter_values, runner_of, start_states
+from .arguments import parameter_rows, parameter_values, section_runner, start_states
 from .classification import Classification, MotionClassifier, again, decided, follow, put
 from .dataset import (
     Variables,
@@ -33,7 +33,7 @@ from .kinds import MOTIONS, kinds_of
 from .labelling import DiagramLabels, tell
 from .matching import intervals
 from .section_runs import INTERRUPTED, UNDECIDED, parts
-from .sweep_order import PATHS, kick, nothing, walk
+from .sweep_order import PATHS, nothing, perturbation, run_in_order
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -180,7 +180,7 @@ def bifurcation(
     places = np.arange(np.prod(shape)).reshape(shape)
     of_job = np.broadcast_to(axis, shape).ravel()
     rows = parameter_rows(model, {parameter: of_job}, places.size)
-    runner = runner_of(model, rows, section, direction, chosen, t_max, transient + n)
+    runner = section_runner(model, rows, section, direction, chosen, t_max, transient + n)
     judge = MotionClassifier(model, parameter, coordinates_of(middle, begin), tightness(runner.rtol))
     found = nothing(places.size, n, begin.shape[1])
     verdicts = Classification.none(places.size)
@@ -195,8 +195,8 @@ def bifurcation(
 
     shown = sys.stderr.isatty() if chosen["progress"] is None else chosen["progress"]
     with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
-        added = kick(judge.coordinates.size, nudge)
-        stopped = walk(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
+        added = perturbation(judge.coordinates.size, nudge)
+        stopped = run_in_order(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
     told, kinds = DiagramLabels.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
     try:
         if attractors and (partial or not stopped):
@@ -225,7 +225,7 @@ def bifurcation(
     }
     data["outcome"] = (dims, found.outcome.astype(np.int8).reshape(shape), of_outcomes())
     if attractors:
-        data |= _of_attractors(model, parameter, axis, shape, verdicts, told, kinds)
+        data |= _of_attractors(model, parameter, shape, verdicts, told, kinds)
         if path == "both":
             data |= _of_hysteresis(model, parameter, axis, told)
     coords: Variables = {
@@ -250,7 +250,6 @@ def bifurcation(
 def _of_attractors(
     model: Model,
     parameter: str,
-    axis: Floats,
     shape: tuple[int, ...],
     verdicts: Classification,
     told: DiagramLabels,

@@ -30,13 +30,13 @@ def nothing(jobs: int, n: int, dim: int) -> Crossings:
     )
 
 
-def kick(size: Floats, nudge: float) -> Floats:
+def perturbation(size: Floats, nudge: float) -> Floats:
     """What is added to a state that is carried over; `size` is that of the components."""
     result: Floats = nudge * np.where(np.isfinite(size), size, 0.0) * np.resize(_KICK, len(size))
     return result
 
 
-def walk(
+def run_in_order(
     work: Callable[[NDArray[np.intp], Floats], None],
     found: Crossings,
     begin: Floats,

@@ -254,7 +254,7 @@ class _Plane:
         if isinstance(self.curve, PeriodicOrbitCurve):
             self.curve.fix_phase(self.place.u)
         frequency = float("nan")
-        if self.name == "torus":
+        if self.name == "complex_pair":
             frequency = frequency_of(self.curve, self.place.u, test_functions_at(self.curve, self.place))
         return p * self.unit, solution_at(self.curve, self.place.u), frequency
 

@@ -19,11 +19,11 @@ __all__ = ["FUNCTIONS", "TestFunctions", "test_functions_at"]
 #: Which of the functions below is zero, by the kind of bifurcation.
 FUNCTIONS = {
     "fold": "fold",
-    "branch point": "plus",
-    "symmetry breaking": "minus",
-    "period doubling": "minus",
-    "Hopf": "torus",
-    "Neimark-Sacker": "torus",
+    "branch point": "unit_multiplier",
+    "symmetry breaking": "period_doubling",
+    "period doubling": "period_doubling",
+    "Hopf": "complex_pair",
+    "Neimark-Sacker": "complex_pair",
     "Krein collision": "collision",
 }
 
@@ -36,11 +36,11 @@ class TestFunctions:
     ----------
     fold : float
         The tangent's component along the parameter.
-    plus : float
+    unit_multiplier : float
         Zero where a multiplier is +1, or an eigenvalue 0: folds and branch points.
-    minus : float
+    period_doubling : float
         Zero where a multiplier is -1; NaN for equilibria.
-    torus : float
+    complex_pair : float
         Zero where two multipliers have the product 1, or two eigenvalues the sum 0: Neimark-Sacker and Hopf
         bifurcations where they are a complex pair.
     surfaces : ndarray
@@ -53,9 +53,9 @@ class TestFunctions:
     """
 
     fold: float
-    plus: float
-    minus: float
-    torus: float
+    unit_multiplier: float
+    period_doubling: float
+    complex_pair: float
     surfaces: Floats
     values: np.ndarray
     collision: float = float("nan")
@@ -66,7 +66,7 @@ class TestFunctions:
         turning = self.values[self.values.imag > 0]
         if not len(turning):
             return 0j
-        away = np.abs(turning.real) if np.isnan(self.minus) else np.abs(np.abs(turning) - 1.0)
+        away = np.abs(turning.real) if np.isnan(self.period_doubling) else np.abs(np.abs(turning) - 1.0)
         return complex(turning[np.argmin(away)])
 
 
@@ -78,8 +78,10 @@ def test_functions_at(curve: EquilibriumCurve | PeriodicOrbitCurve, place: Curve
         matrix = here.by_state * curve.flow.clock
         values = np.linalg.eigvals(here.by_state).astype(complex)
         pairs = [a + b for a, b in combinations(values * curve.flow.clock, 2)]
-        torus = float(np.prod(pairs).real) if pairs else float("nan")
-        return TestFunctions(fold, float(np.linalg.det(matrix)), float("nan"), torus, here.surfaces, values)
+        complex_pair = float(np.prod(pairs).real) if pairs else float("nan")
+        return TestFunctions(
+            fold, float(np.linalg.det(matrix)), float("nan"), complex_pair, here.surfaces, values
+        )
     found = multipliers_at(curve, place.u)
     values = found.values
     if isinstance(curve, FamilyCurve) and found.decided:
@@ -90,9 +92,9 @@ def test_functions_at(curve: EquilibriumCurve | PeriodicOrbitCurve, place: Curve
     both = list(combinations(range(len(values)), 2))
     one, other = np.array(both, dtype=np.intp).reshape(-1, 2).T
     logs, phases = found.log[one] + found.log[other], found.phases[one] * found.phases[other]
-    torus = _less(logs, phases, 1.0) if both else float("nan")
-    plus, minus = (_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
-    return TestFunctions(fold, plus, minus, torus, np.zeros(0), values)
+    complex_pair = _less(logs, phases, 1.0) if both else float("nan")
+    unit_multiplier, period_doubling = (_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
+    return TestFunctions(fold, unit_multiplier, period_doubling, complex_pair, np.zeros(0), values)
 
 
 def _of_family(curve: FamilyCurve, place: CurvePoint, found: Multipliers) -> TestFunctions:
@@ -105,8 +107,16 @@ def _of_family(curve: FamilyCurve, place: CurvePoint, found: Multipliers) -> Tes
     log, phases = found.log[others], found.phases[others]
     first = place.tangent[: curve.flow.dim]
     fold = float(curve.slope(place.u) @ first) * np.sqrt(curve.pieces)
-    plus, minus = (_less(log, phases, unit) for unit in (1.0, -1.0))
-    return TestFunctions(fold, plus, minus, float("nan"), np.zeros(0), values, _discriminant(values[others]))
+    unit_multiplier, period_doubling = (_less(log, phases, unit) for unit in (1.0, -1.0))
+    return TestFunctions(
+        fold,
+        unit_multiplier,
+        period_doubling,
+        float("nan"),
+        np.zeros(0),
+        values,
+        _discriminant(values[others]),
+    )
 
 
 def _discriminant(values: np.ndarray) -> float:

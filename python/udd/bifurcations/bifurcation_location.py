@@ -28,7 +28,7 @@ _SURE = 2.0  # and how far beyond the largest scatter the error may lie
 def changes(before: TestFunctions, after: TestFunctions) -> list[str]:
     """Which functions change their signs."""
     names = []
-    for name in ("fold", "plus", "minus", "torus", "collision"):
+    for name in ("fold", "unit_multiplier", "period_doubling", "complex_pair", "collision"):
         a, b = getattr(before, name), getattr(after, name)
         if a * b < 0.0:
             names.append(name)
@@ -45,14 +45,18 @@ def bifurcations_between(
     changed = changes(before, after)
     found = []
     for name in changed:
-        if name == "plus" and "fold" in changed:
+        if name == "unit_multiplier" and "fold" in changed:
             continue
-        if name == "fold" and np.isnan([before.plus, after.plus]).any():
+        if name == "fold" and np.isnan([before.unit_multiplier, after.unit_multiplier]).any():
             continue  # not decided: towards a connection the parameter stands still, but for rounding
-        if name == "fold" and "plus" not in changed and max(abs(before.fold), abs(after.fold)) < _STILL:
+        if (
+            name == "fold"
+            and "unit_multiplier" not in changed
+            and max(abs(before.fold), abs(after.fold)) < _STILL
+        ):
             continue
         try:
-            if name == "fold" and "plus" not in changed:
+            if name == "fold" and "unit_multiplier" not in changed:
                 sigma, place = turning(curve, a, step, before, after)
                 found.append(("end", sigma, place, test_functions_at(curve, place)))
                 continue
@@ -64,11 +68,11 @@ def bifurcations_between(
             continue
         if name == "fold":
             kind = "fold"
-        elif name == "plus":
+        elif name == "unit_multiplier":
             # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
             turns = abs(here.fold) <= _STILL and not isinstance(curve, FamilyCurve)
             kind = "fold" if turns else "branch point"
-        elif name == "minus":
+        elif name == "period_doubling":
             symmetric = isinstance(curve, PeriodicOrbitCurve) and curve.symmetric
             kind = "symmetry breaking" if symmetric else "period doubling"
         elif name == "collision":
@@ -200,7 +204,7 @@ def _scatter(
         u = newton_corrector(curve, a.u + distance * a.tangent, a.tangent)
         signs = test_functions_at(curve, CurvePoint(u, tangent_at(curve, u, a.tangent)))
         turning = abs(signs.pair.imag)
-        period = 2.0 * np.pi / turning if name == "torus" and turning else np.nan
+        period = 2.0 * np.pi / turning if name == "complex_pair" and turning else np.nan
         seen.append((float(getattr(signs, name)), curve.value(u), period))
     table, powers = np.array(seen), np.vander(near, 3)
     fitted = np.linalg.lstsq(powers, np.nan_to_num(table), rcond=None)[0]

@@ -76,7 +76,7 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
         if isinstance(curve, EquilibriumCurve):
             corner = corner_ahead(curve, here, step)
             if corner is not None:
-                here, signs, arclength = _round(curve, corner, way, limits, arclength, here)
+                here, signs, arclength = _round_corner(curve, corner, way, limits, arclength, here)
                 step = min(step, limits.step)
                 if way.end:
                     return way
@@ -87,12 +87,12 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
         except (CorrectorFailed, IntegrationError) as error:
             way.end = f"lost: {error}"
             return way
-        _pass(curve, here, gone, signs, after, way, limits, arclength)
+        _locate_bifurcations(curve, here, gone, signs, after, way, limits, arclength)
         if way.end:
             return way
         value = curve.value(there.u)
         if not limits.low <= value <= limits.high:
-            way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
+            way.end = f"{curve.name} = {_end_at_bound(curve, here, gone, way, arclength, limits):.6g}"
             return way
         arclength += gone
         if isinstance(curve, PeriodicOrbitCurve):
@@ -109,12 +109,12 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
         if isinstance(curve, PeriodicOrbitCurve) and (near := _connection(way)) is not None:
             way.end = f"a connection near {near:.13g}: the period grows without bound"
             return way
-        if len(way.places) > 8 and _back(way.places[0], here, curve, step):
+        if len(way.places) > 8 and _closes(way.places[0], here, step):
             way.end = "the branch is closed"
             return way
 
 
-def _pass(
+def _locate_bifurcations(
     curve: AnyCurve,
     here: CurvePoint,
     gone: float,
@@ -129,15 +129,15 @@ def _pass(
         if kind == "end":
             # The parameter turns where no multiplier passes 1: the branch meets itself there.
             way.places.append((curve, place, signs, arclength + sigma))
-            way.end = _birth(curve, place, here)
+            way.end = _branch_origin(curve, place, here)
         else:
             errors = _errors(curve, here, sigma, place, gone, kind)
-            _note(curve, place, signs, kind, errors, way, limits, arclength + sigma)
+            _record_point(curve, place, signs, kind, errors, way, limits, arclength + sigma)
         if way.end:
             return
 
 
-def _note(
+def _record_point(
     curve: AnyCurve,
     place: CurvePoint,
     signs: TestFunctions,
@@ -164,7 +164,7 @@ def _errors(
         return float("nan"), float("nan")
 
 
-def _birth(curve: AnyCurve, place: CurvePoint, before: CurvePoint) -> str:
+def _branch_origin(curve: AnyCurve, place: CurvePoint, before: CurvePoint) -> str:
     """What it is that the branch begins or ends with."""
     value = curve.value(place.u)
     if isinstance(curve, EquilibriumCurve):
@@ -177,7 +177,7 @@ def _birth(curve: AnyCurve, place: CurvePoint, before: CurvePoint) -> str:
     return f"{kind or 'a branch point'} near {value:.5g}"
 
 
-def _cut(
+def _end_at_bound(
     curve: AnyCurve,
     here: CurvePoint,
     gone: float,
@@ -243,9 +243,7 @@ def _connection(way: BranchTrace) -> float | None:
     return values[-1] if still and growing else None
 
 
-def _back(
-    first: tuple[AnyCurve, CurvePoint, TestFunctions, float], here: CurvePoint, curve: AnyCurve, step: float
-) -> bool:
+def _closes(first: tuple[AnyCurve, CurvePoint, TestFunctions, float], here: CurvePoint, step: float) -> bool:
     """Whether the branch has come back to where it began."""
     start = first[1]
     if len(start.u) != len(here.u):
@@ -253,7 +251,7 @@ def _back(
     return bool(np.linalg.norm(start.u - here.u) < 0.5 * step and start.tangent @ here.tangent > 0.9)
 
 
-def _round(
+def _round_corner(
     curve: EquilibriumCurve,
     corner: tuple[CurvePoint, CurvePoint],
     way: BranchTrace,
@@ -269,15 +267,15 @@ def _round(
     at = test_functions_at(curve, CurvePoint(arriving.u - _ASIDE * arriving.tangent, arriving.tangent))
     after = test_functions_at(curve, CurvePoint(leaving.u + _ASIDE * leaving.tangent, leaving.tangent))
     if gone > _ASIDE:
-        _pass(curve, here, gone - _ASIDE, before, at, way, limits, arclength)
+        _locate_bifurcations(curve, here, gone - _ASIDE, before, at, way, limits, arclength)
         if way.end:
             return here, before, arclength
     arclength += gone
     value = curve.value(arriving.u)
     if not limits.low <= value <= limits.high:
-        way.end = f"{curve.name} = {_cut(curve, here, gone, way, arclength, limits):.6g}"
+        way.end = f"{curve.name} = {_end_at_bound(curve, here, gone, way, arclength, limits):.6g}"
         return here, before, arclength
     kind = "nonsmooth fold" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "border collision"
     errors = float(rounding_of(value)), float("nan")
-    _note(curve, arriving, at, kind, errors, way, limits, arclength)
+    _record_point(curve, arriving, at, kind, errors, way, limits, arclength)
     return leaving, after, arclength

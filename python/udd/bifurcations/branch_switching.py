@@ -95,7 +95,7 @@ def _nothing_between(
     if point.kind == "branch point":
         return True
     # At birth no multiplier is negative: they are squares, or exponentials of eigenvalues.
-    if after.minus < 0.0:
+    if after.period_doubling < 0.0:
         return False
     # The parameter moves with the square of the amplitude.
     first, last = (curve.value(place.u) - begins for place in (half, whole))

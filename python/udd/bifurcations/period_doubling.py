@@ -77,7 +77,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
             raise CorrectorFailed("the branch does not lead there")
         square = part * expected
         u = at(square, u)
-    value = found[square][1].minus
+    value = found[square][1].period_doubling
     # From the birth to the doubling the multiplier falls from 1 to -1: half of it and 1, nearly along a line.
     other = square * (1.0 + float(np.clip(value, -0.3, 0.3)))
     for _ in range(_MOST):
@@ -86,7 +86,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         if abs(other - square) <= _EXACT * square:
             break
         u = at(other, u)
-        before, value = value, found[other][1].minus
+        before, value = value, found[other][1].period_doubling
         if abs(before) < _NOISE and abs(value) >= 0.5 * abs(before):
             break  # as near as rounding lets it come
         if not np.isfinite(value) or value == before:

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     save(args.out, found, lambda ax: draw(found, ax, component=args.component))
     stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
     data = {**summary_of(found), "complete": not stopped, "files": args.out}
-    return CommandResult(_text(found, data), data, 130 if stopped else 0)
+    return CommandResult(_text(data), data, 130 if stopped else 0)
 
 
 def summary_of(found: xr.Dataset) -> dict[str, Any]:
@@ -119,7 +119,7 @@ def _stretches(one: xr.Dataset, parameter: str) -> list[dict[str, Any]]:
     return rows
 
 
-def _text(found: xr.Dataset, data: dict[str, Any]) -> str:
+def _text(data: dict[str, Any]) -> str:
     name, shape = data["parameter"], data["shape"]
     ends = ", ".join(f"{count} {end.replace('_', ' ')}" for end, count in data["outcomes"].items())
     lines = [

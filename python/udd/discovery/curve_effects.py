@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from udd import effects
-from udd.discovery.nonparametric.confounding import distinct
+from udd.discovery.nonparametric.confounding import identifiable_part
 from udd.discovery.nonparametric.curve_scan import Curve, refined, rescored
 from udd.discovery.symbolic.expressions import softened, write
 from udd.discovery.symbolic.formulas import Formula
@@ -116,7 +116,7 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     price = gain - curve.evidence
     if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
         price = max(price, curve.df * math.log(fit.observations) / 2)
-    return CurveFit(current, distinct(curve, current), price)
+    return CurveFit(current, identifiable_part(curve, current), price)
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:

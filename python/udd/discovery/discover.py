@@ -58,28 +58,34 @@ def discover(
     budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Discovery:
-    """Find the effect that a model lacks.
+    """Forward stepwise selection of missing effects, by score tests and held-out data.
 
-    The model is fitted to the first 60 % of the record. Every effect of the library is scored around that
-    fit; the best are fitted in full. An effect is added only if so large a fall of chi2 has a chance below
-    0.1 % over all candidates together (in those 60 % for white noise, and in all data with the misfits' own
-    colour), its amplitudes are physical, and the last 40 % bear it out: with all parameters held they are
-    explained better, either beyond doubt (the 95 % interval of the costs' ratio excludes 1) or such that chi2
-    falls further by more than chance would once they are fitted too; where they hold too little of the motion
-    that shows it, chi2 must so fall further with each half of the record, in alternate stretches, than with
-    the other half alone. At no horizon may forecasts get worse. All coefficients are refitted and the search
-    goes on; effects that do not pass alone are tried in twos and threes; after a first effect a curve that
-    gains far more than the whole library comes before it. Two effects at once compete with one, and with
-    formulas. Between forms that explain the first part about as well all data decide, and what each foretells
-    of the rest; those that the data cannot tell apart are named. What a slow drift of the sensor's zero
-    explains about as well is no effect; what forces that push at random, like those of a support that moves,
-    explain about as well is not identified (but of a disk, whose film shows such). Records of more than 8000
-    frames are averaged in blocks as far as their motion and noise allow. Where no effect passes but the model
-    does not explain the data (chi2 per degree of freedom above 2.5, or free runs that miss by the size of the
-    motion), an effect is present that these data do not name; what comes nearest is listed with its held-out
-    error, but not added. Nor is what passes all this while free runs over the last 40 % do not get better
-    beyond doubt, where they are not as good as noise allows already: that fits the first part, and is not
-    confirmed.
+    *Candidates.* The model is fitted to the first 60 % of the record. A score test (Rao) ranks all effects of
+    the library around that fit, and penalised splines of every coordinate. The best are fitted in full.
+    Effects that fail alone are tried in twos and threes.
+
+    *Acceptance.* An effect is added if it passes these tests:
+
+    - The fall of chi2 is significant at 0.1 % over all candidates (Bonferroni), in the first 60 % and in all
+      data. In the latter the colour of the residuals counts.
+    - Its amplitudes are physical.
+    - The last 40 % confirm it. With all parameters fixed their cost falls (95 % interval of the ratio below
+      1), or chi2 falls further by more than chance once they are fitted too. Where these frames carry too
+      little information, each half of the record must confirm it beside the other.
+    - Forecasts get worse at no horizon.
+    - No slow drift of the sensor's zero explains as much.
+
+    *Choice.* Of forms that explain the first part equally well, that one is chosen which explains all data
+    and predicts the rest best. The others are named as alternatives. After an addition all coefficients are
+    refitted, and the search goes on.
+
+    *Verdict.* An effect is not identified if random forces explain as much, such as those of a moving support
+    (a disk's film excludes them). It is not confirmed if free runs over the last 40 % do not get
+    significantly better, unless they are at the noise floor already. If nothing passes, but chi2 per degree
+    of freedom exceeds 2.5 or free runs lose the motion, the model lacks an effect that these data do not
+    name. The nearest candidates are listed with their held-out errors.
+
+    Records of more than 8000 frames are averaged in blocks as far as their motion and noise allow.
 
     Parameters
     ----------
@@ -187,8 +193,8 @@ def discover(
         verdict = "search not finished" if stopped else "nothing missing"
     return Discovery(
         verdict=verdict,
-        baseline=(baseline if found else final).put_away(),
-        fit=final.put_away(),
+        baseline=(baseline if found else final).without_cache(),
+        fit=final.without_cache(),
         effects=found,
         alternatives=others,
         error_before=before,
@@ -198,7 +204,7 @@ def discover(
         curves=[one.curves for one in end.rounds],
         comparisons=[one.comparisons for one in end.rounds],
         split=float(record.clock[np.flatnonzero(~train)[0]]),
-        trained=end.part.put_away(),
+        trained=end.part.without_cache(),
         rejected=rejected,
         thinned=thin if any(own.every > 1 for own in thin) else [],
         budget=clock.budget if stopped else None,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Forms part where their fits differ by as many units of log-likelihood, as in the search.
-PARTED = 10.0
+SEPARATED = 10.0
 _STARTS = 6  # places of the record that a further film may start from, tried in turn
 _SHORTEST = 0.5  # of the film's length: a disk that leaves sooner makes no film
 
@@ -59,7 +59,7 @@ class NextExperiment:
     @property
     def parts(self) -> list[str]:
         """Titles of the alternatives that part from what was chosen."""
-        return [title for title, nats in self.each.items() if nats >= PARTED]
+        return [title for title, nats in self.each.items() if nats >= SEPARATED]
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -141,10 +141,10 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
     """The designs in words: those that part most forms first."""
     result = []
     for design, each in designs:
-        parts = [nats for nats in each.values() if nats >= PARTED]
+        parts = [nats for nats in each.values() if nats >= SEPARATED]
         if parts:
-            apart = ", ".join(f"{t} by {n:.0f} nats" for t, n in each.items() if n >= PARTED)
-            left = ", ".join(t for t, n in each.items() if n < PARTED)
+            apart = ", ".join(f"{t} by {n:.0f} nats" for t, n in each.items() if n >= SEPARATED)
+            left = ", ".join(t for t, n in each.items() if n < SEPARATED)
             text = f"film {design}: what was found is then expected to part from {apart}"
             text += f"; not from {left}" if left else ""
             result.append(NextExperiment(design, min(parts), each, text))
@@ -154,7 +154,9 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
         return [NextExperiment("", 0.0, {}, "no film that could be made here keeps the disk for long enough")]
     design, each = max(designs, key=lambda d: max(d[1].values()))
     most = max(each.values())
-    text = f"no feasible film would part them: {design} would tell most, {most:.1f} nats of the {PARTED:.0f}"
+    text = (
+        f"no feasible film would part them: {design} would tell most, {most:.1f} nats of the {SEPARATED:.0f}"
+    )
     return [NextExperiment("", most, each, f"{text} that it takes")]
 
 

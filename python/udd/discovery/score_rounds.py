@@ -107,7 +107,7 @@ def states_first(curves: list[Curve]) -> list[Curve]:
     and Z do.
     """
 
-    def handicap(own: Coordinate) -> float:
+    def prior_penalty(own: Coordinate) -> float:
         return (
             2 * EVIDENCE_MARGIN
             if own.name == "t"
@@ -116,4 +116,4 @@ def states_first(curves: list[Curve]) -> list[Curve]:
             else 0.0
         )
 
-    return sorted(curves, key=lambda c: -c.evidence + handicap(c.coordinates[0]))
+    return sorted(curves, key=lambda c: -c.evidence + prior_penalty(c.coordinates[0]))

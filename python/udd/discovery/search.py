@@ -502,8 +502,8 @@ class Search:
         unit = first.inflation(before)
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
         # knows comes before a formula, and a formula before a curve, that fit about as well.
-        trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.handicap, 3))
-        paid = {id(t): t.criterion(unit) + (t.handicap if t.is_curve else 0.0) for t in trials}
+        trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.prior_penalty, 3))
+        paid = {id(t): t.criterion(unit) + (t.prior_penalty if t.is_curve else 0.0) for t in trials}
         near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
         costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
@@ -525,7 +525,7 @@ class Search:
                     ratio=judged.ratio,
                     witness=judged.witness,
                     alternatives=others,
-                    price=trial.price + trial.handicap,
+                    price=trial.price + trial.prior_penalty,
                 )
                 return step, SearchState(trial.fit, judged.whole, errors)
         return None
@@ -559,7 +559,7 @@ class Search:
         of all data is, but for a constant, the cost of predicting each stretch from those before it.
         """
         if len(near) < 2:
-            return {id(t): t.criterion(unit) + t.handicap for t in near if t.needed}, {}
+            return {id(t): t.criterion(unit) + t.prior_penalty for t in near if t.needed}, {}
 
         def again(trial: TrialFit) -> TrialFit | None:
             try:
@@ -574,7 +574,7 @@ class Search:
         for trial, whole in wholes:
             try:
                 # What no library has is not chosen for fitting what the noise is not sure to show.
-                paid = trial.price + trial.handicap * (most / unit if trial.curve else 1.0)
+                paid = trial.price + trial.prior_penalty * (most / unit if trial.curve else 1.0)
                 result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
             except FitError:
                 continue
@@ -638,7 +638,7 @@ class Search:
         result: dict[tuple[str, str, str | None], Alternative] = {}
 
         def cost(trial: TrialFit) -> float:  # a formula may be it as well as what was chosen
-            return costs[id(trial)] - trial.handicap
+            return costs[id(trial)] - trial.prior_penalty
 
         best = cost(chosen)
         for trial in (t for t in trials if id(t) in costs):

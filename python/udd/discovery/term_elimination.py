@@ -85,11 +85,12 @@ def prune(
     alpha: float = ALPHA,
     progress: Callable[[str], None] | None = None,
 ) -> Pruned:
-    """Find the parameters of a model that the data need; hold the others at zero.
+    """Backward elimination of a model's terms, with exchanges.
 
-    All free parameters are fitted together. Those that matter least are held at zero and the rest fitted
-    again, as long as that is for the better; once from a tight fit and once from a loose one. Then those that
-    were left out are put back in turn, to see whether another can go instead.
+    All free parameters are fitted together. The term that matters least is fixed at zero and the rest are
+    refitted, as long as the criterion falls. This is done from a fit with a small model error and from one
+    with a large one; the better end is kept. Then each term that was removed is put back in turn, to see
+    whether another can be removed instead.
 
     Parameters
     ----------

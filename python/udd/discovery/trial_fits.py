@@ -86,7 +86,7 @@ class TrialFit:
         return self.compared.chi2 / unit + self.price
 
     @property
-    def handicap(self) -> float:
+    def prior_penalty(self) -> float:
         """By how much chi2 must be better than that of an effect of the library.
 
         Of several at once as much as a further one has to bring beyond its price.

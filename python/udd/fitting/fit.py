@@ -110,7 +110,7 @@ def fit(
     (found,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
-    return found.put_away().doubted()
+    return found.without_cache().doubted()
 
 
 def fit_record(

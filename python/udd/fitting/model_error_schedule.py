@@ -37,11 +37,11 @@ def reduce_model_error(
     best: Fit | None = None,
     steps: int = STEPS,
 ) -> Fit:
-    """Solve for ever smaller errors of the model, as far as it goes: a wrong model gets stuck.
+    """Homotopy in the model-error variance: solve, reduce it, solve again from there.
 
-    Or as far as is likely: where the model's real error is larger than the assumed one the evidence falls.
-    `best` is a fit that was held more loosely, and stands where nothing tighter does. At each level so many
-    `steps` are taken at most.
+    It ends at the level where the minimiser no longer converges, which a wrong model reaches early, or, if
+    the problem asks for the likeliest level, where the evidence falls. `best` is a fit at a larger model
+    error; it is returned if no tighter one converges. `steps` bounds the iterations at each level.
     """
     levels = list(schedule)
     if best is None:
@@ -49,9 +49,9 @@ def reduce_model_error(
             raise FitError("the fit has no level to solve at")
         best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps)
         point = best.point
-    far = _leapt(best, point, levels) if problem.likeliest else None
+    far = _skip_levels(best, point, levels) if problem.likeliest else None
     if far:
-        best = _eased(far, levels)
+        best = _increase_model_error(far, levels)
     for diffusion in () if far else levels:
         result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, steps)
         if not _stands(result, best):
@@ -65,7 +65,7 @@ def provisional_fit(
 ) -> Fit:
     """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
     result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)), iterations)
-    return remembering(result) if problem.likeliest and result.converged else result
+    return with_noise_correlation(result) if problem.likeliest and result.converged else result
 
 
 def _nearly(fitted: Fit, steps: int) -> Fit:
@@ -97,7 +97,7 @@ def _stands(tighter: Fit, looser: Fit) -> bool:
     return tighter.converged and not less_likely
 
 
-def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit | None:
+def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit | None:
     """The fit at the last level, over a few others: a right model gets from one to the next in few steps.
 
     None where it does not; what it came to on the way is then no good start.
@@ -113,7 +113,7 @@ def _leapt(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit 
     return best if levels else None
 
 
-def _eased(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
+def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     """The fit held more loosely again, level by level, as long as that is likelier."""
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
         problem = fitted.problem.with_model_error(diffusion)
@@ -135,7 +135,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     return fitted
 
 
-def remembering(fitted: Fit) -> Fit:
+def with_noise_correlation(fitted: Fit) -> Fit:
     """The same with noise that remembers itself, where the record makes that likelier.
 
     Frames whose noise goes together are worth less than independent ones: without this the model would be
@@ -154,10 +154,10 @@ def remembering(fitted: Fit) -> Fit:
 
 
 def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
-    """The tightest fit, of those that led to this one, whose scatter is below a limit; else the loosest.
+    """Increase the model-error variance until chi2 per degree of freedom is below a limit.
 
-    A wrong model that is held tightly bends everything to obey it; where it is held less tightly it shows
-    what is missing.
+    With a small model error a wrong model distorts states and parameters. With a larger one its residuals
+    show what is missing. If no level is below the limit, the fit has the largest model error.
     """
     problem, result = fitted.problem, fitted
     for diffusion in reversed(problem.schedule[: fitted.level]):
@@ -178,7 +178,7 @@ def at_level(fitted: Fit, level: int) -> Fit:
 def eased(fitted: Fit) -> Fit:
     """The same model, held as loosely as is likeliest, from where a fit ended."""
     problem = replace(fitted.problem, likeliest=True)
-    return _eased(replace(fitted, problem=problem), problem.schedule)
+    return _increase_model_error(replace(fitted, problem=problem), problem.schedule)
 
 
 def smoothed_states(fitted: Fit, record: Record, level: int) -> Fit:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
-from udd._util.keywords import renamed
+from udd._util.keywords import renamed, renamed_attribute
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
 
@@ -213,7 +213,9 @@ class Fit:
         fault = np.array(self.model.profile.sensor.faults)
         return float(np.square(fault / sd, where=self.record.observed, out=np.zeros(sd.shape)).sum())
 
-    def put_away(self) -> Fit:
+    put_away = renamed_attribute("put_away", "without_cache")
+
+    def without_cache(self) -> Fit:
         """The same without what its solve left for those who ask for more: a kilobyte and a half a frame."""
         return replace(self, point=self.point.bare())
 

@@ -258,7 +258,7 @@ def reasons(discovery: Discovery) -> tuple[Part, ...]:
             "<strong>{}</strong>: χ² fell by {:.0f} when it was added; the probability of that by chance, "
             "all "
         ).format(pretty(effect.title), effect.chi2) + Markup("candidates counted, is {}. {}").format(
-            chance, wording.borne_out(effect)
+            chance, wording.confirmed_by(effect)
         )
         made.append(Paragraph(text))
     return tuple(made)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup, escape
 
 from udd.discovery.thresholds import SAME as IDENTICAL
-from udd.discovery.validation.held_out_errors import at_the_floor as floor_reached
+from udd.discovery.validation.held_out_errors import reaches_noise_floor as floor_reached
 from udd.effects.user_defined import is_spline as is_spline
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _verdict(discovery: Discovery) -> str:
         return "The model lacks something; what, was not found so far."
     if not discovery.effects and discovery.verdict != "nothing missing":
         return "The model lacks something, but no effect of the library explains what."
-    if discovery.verdict == "nothing missing" and not at_the_floor(discovery):
+    if discovery.verdict == "nothing missing" and not reaches_noise_floor(discovery):
         return (
             "Nothing that the library holds is missing beyond doubt; yet the known model does not explain "
             "this motion down to the noise of the measurement."
@@ -144,7 +144,7 @@ def rejected(discovery: Discovery) -> list[str]:
     return sentences
 
 
-def at_the_floor(discovery: Discovery) -> bool:
+def reaches_noise_floor(discovery: Discovery) -> bool:
     """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
     e = discovery.error_before
     return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
@@ -270,7 +270,7 @@ def probability(p: float) -> str:
     return f"{min(p, 1.0):.2g}"
 
 
-def borne_out(effect: AddedEffect) -> str:
+def confirmed_by(effect: AddedEffect) -> str:
     """What the frames that no fit saw say of an effect."""
     value, low, high = effect.ratio
     told = (

@@ -11,7 +11,7 @@ from udd.video.webcam import Recording, record
 from .options import TrackOptions
 from .overlay import overlay
 from .page import page
-from .pipeline import Tracking, pictures_at, pictures_between, track, track_in_detail
+from .pipeline import Tracking, pictures_at, pictures_between, track, track_disk
 from .tracked_frame import TrackedFrame
 
 __all__ = [
@@ -30,6 +30,6 @@ __all__ = [
     "pixels",
     "record",
     "track",
-    "track_in_detail",
+    "track_disk",
     "write_config",
 ]

@@ -190,7 +190,7 @@ def run_tracker(
     return _track_marks(film, options, progress, watch)
 
 
-def track_in_detail(
+def track_disk(
     video: str | os.PathLike[str],
     *,
     progress: bool = False,

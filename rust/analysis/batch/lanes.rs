@@ -26,7 +26,7 @@ pub struct LaneBatch<'a, F: Family<D>, S: Scalar, const D: usize, E, K> {
     /// The job in each lane.
     jobs: Vec<Option<usize>>,
     /// How many there are.
-    under_way: usize,
+    active: usize,
     /// Where each lane's run ends.
     pub end: S::Real,
 }
@@ -50,7 +50,7 @@ where
         let t = S::Real::constant(like.t);
         let method = method(values.clone());
         let driver = Integrator::by(method, family.build(&values), t, like.x, None, norm).with_wall();
-        Self { isa, family, values, driver, jobs: vec![None; S::Real::LANES], under_way: 0, end: t }
+        Self { isa, family, values, driver, jobs: vec![None; S::Real::LANES], active: 0, end: t }
     }
 
     /// Starts a job in a lane.
@@ -70,7 +70,7 @@ where
         let only = S::Mask::from_lanes(|i| i == lane);
         self.driver.start(only, S::Real::constant(start.t), start.x, None);
         self.end.set_lane(lane, start.end);
-        self.under_way += usize::from(self.jobs[lane].is_none());
+        self.active += usize::from(self.jobs[lane].is_none());
         self.jobs[lane] = Some(job);
     }
 
@@ -79,7 +79,7 @@ where
     pub fn unload(&mut self, lane: usize) -> Option<usize> {
         self.end.set_lane(lane, self.driver.t().lane(lane));
         let job = self.jobs[lane].take();
-        self.under_way -= usize::from(job.is_some());
+        self.active -= usize::from(job.is_some());
         job
     }
 
@@ -97,7 +97,7 @@ where
     /// Whether all lanes are empty.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
-        self.under_way == 0
+        self.active == 0
     }
 
     /// Tries a step in every lane.

@@ -17,7 +17,7 @@ from udd.models import Model
 from udd.models.profile import Coordinate
 
 from .bsplines import Spline, along, product, rough_product
-from .penalized_curves import Absorbed, chance, smooth
+from .penalized_curves import Confounding, chance, smooth
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ class Curve:
     places : tuple of ndarray
         Where the record visits the coordinates, every frame's first place.
     score : Score
-    absorbed : Absorbed or None
+    absorbed : Confounding or None
         What of it is agreed upon, where `covariance` is what remains then.
     """
 
@@ -75,7 +75,7 @@ class Curve:
     directions: int
     places: tuple[Array, ...]
     score: Score
-    absorbed: Absorbed | None = None
+    absorbed: Confounding | None = None
 
     @property
     def title(self) -> str:

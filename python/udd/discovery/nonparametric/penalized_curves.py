@@ -67,7 +67,7 @@ class PenalizedFit:
 
 
 @dataclass(frozen=True)
-class Absorbed:
+class Confounding:
     """What the free parameters of a fit do as well as a curve would.
 
     A constant that moves the wheels is the drive's speed, a torque proportional to Omega is friction: how
@@ -174,11 +174,11 @@ def _typical(information: Array) -> float:
 
 
 def chance(score: Score, roughness: Array) -> tuple[float, float, int]:
-    """Probability that a curve looks as good as this one where there is none.
+    """Score test of a penalised curve: the p-value of the largest fall of chi2 in few smooth directions.
 
-    The gradient's smoothest directions are independent and normal there, so that the fall of chi2 that the
-    first few bring is chi2-distributed, exactly; of a few numbers of directions the least likely counts,
-    times how many were looked at.
+    Without an effect the components of the gradient in the Demmler-Reinsch basis are independent and normal.
+    The fall of chi2 in the first k directions is then exactly chi2-distributed. A few values of k are tested;
+    the smallest p-value counts, times their number (Bonferroni).
 
     Returns
     -------

@@ -143,11 +143,12 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
 
 
 def strongest_ripple(fit: Fit) -> tuple[Scored | None, int]:
-    """The strongest drive ripple of all that the record can tell apart, and how many those are.
+    """Periodogram of score tests: the strongest drive ripple, and the number of frequencies tested.
 
-    They lie half a line apart. One that lies between two lines shows in both, with two fifths of its
-    strength: only beside the strongest lines all are looked at. Of a user's own model, the strongest wave in
-    any equation; nothing for a pendulum.
+    The frequencies are half a line (1 / duration) apart. First every second one is scored. A ripple between
+    two lines still has two fifths of its strength in both, so that the frequencies between are only scored
+    beside the strongest lines. For a user's own model it is the strongest harmonic force in any equation; a
+    pendulum has none.
     """
     if isinstance(fit.model, FormulaModel):
         found = _scan_waves(fit, fit.model)

@@ -35,9 +35,9 @@ def terms(model: FormulaModel) -> list[Candidate]:
     degree, and each times its own size; of each angle and of every two angles' difference sine and cosine,
     also times each of the others; of every angle the rate, where that is no state itself. An equation that
     only says that one state is the rate of another gets none. Of a mechanical model, where a state is another
-    one's rate, those come first by a handicap that are forces as machines have them: inputs, springs, drags,
-    gravity. Where it has a mass matrix, all are forces along its coordinates, and those of machines act
-    between two of them too.
+    one's rate, forces as machines have them (inputs, springs, drags, gravity) are preferred by a prior
+    penalty on the others. Where it has a mass matrix, all are forces along its coordinates, and those of
+    machines act between two of them too.
     """
     plain = [(text, _name(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}

@@ -13,12 +13,12 @@ from udd._util.parallel import parallel_map
 from udd.discovery.thresholds import ALPHA, Confirmation
 from udd.fitting import Fit, Record, at_level, frame_costs, smoothed_states, within
 
-from .held_out_errors import Ratio, cost_improvement, stretches
+from .held_out_errors import Ratio, block_numbers, cost_improvement
 
 Array = NDArray[np.float64]
 
 #: The fall of chi2 that is expected of frames which show an effect; of so much chance hides one in twenty.
-_TELLING = 24.0
+_INFORMATIVE_CHI2 = 24.0
 _STRETCH = 3.0  # s; long beside what it takes to find a stretch's own start
 
 #: Fits of the same data, without an effect and with it.
@@ -28,12 +28,13 @@ Pair = tuple[Fit, Fit]
 def confirmed_by(
     part: Pair, whole: Pair, rest: Record, names: Sequence[str], unit: float
 ) -> tuple[Ratio, Confirmation | None]:
-    """Whether data that were not fitted want an effect too, and how much less they cost with it.
+    """Test an effect on held-out data: by their cost, by a further fall of chi2, or by halves of the record.
 
-    They do where they cost less beyond doubt, all parameters held; or where chi2 falls further once they are
-    fitted too, which tells more than that cost, in which the parameters' errors count. Where they could not
-    show the effect, because only the first part moves the disk that way, chi2 must fall further with each
-    half of the record, in alternate stretches, than with the other half alone.
+    An effect is confirmed by the first of three tests that it passes. With all parameters fixed, the held-out
+    frames cost significantly less. Or chi2 falls significantly further when these frames are fitted too; this
+    test is stronger, because the parameters' errors do not count. Or, if the held-out frames carry too little
+    information on the effect, each half of the record (alternate blocks) lowers chi2 further than the other
+    half alone.
 
     Parameters
     ----------
@@ -57,10 +58,10 @@ def confirmed_by(
     ratio = held_out_ratio(*part, rest, unit)
     if ratio[2] < 1.0:
         return ratio, "held"
-    if ratio[0] < 1.0 and _falls_further(part, whole):
+    if ratio[0] < 1.0 and _held_out_chi2_falls(part, whole):
         return ratio, "fitted"
-    silent = names and _expected(part[1], whole, names) < _TELLING
-    return ratio, "halves" if silent and _crosswise(whole, unit) else None
+    silent = names and _expected(part[1], whole, names) < _INFORMATIVE_CHI2
+    return ratio, "halves" if silent and _split_half_test(whole, unit) else None
 
 
 def same_level(one: Fit, other: Fit) -> Pair:
@@ -76,7 +77,7 @@ def held_out_ratio(before: Fit, after: Fit, rest: Record, unit: float) -> Ratio:
     return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), rest, unit=unit)
 
 
-def _falls_further(part: Pair, whole: Pair) -> bool:
+def _held_out_chi2_falls(part: Pair, whole: Pair) -> bool:
     """Whether chi2 falls further once the remaining frames are fitted too."""
     before, after = whole
     one, other = (at_level(fit, after.level) for fit in part)
@@ -105,10 +106,10 @@ def _inverse(covariance: Array) -> Array:
     return result
 
 
-def _crosswise(whole: Pair, unit: float) -> bool:
+def _split_half_test(whole: Pair, unit: float) -> bool:
     """Whether either half of the record, in alternate stretches, wants the effect beside the other."""
-    even = stretches(whole[0].record, _STRETCH * unit) % 2 == 0
+    even = block_numbers(whole[0].record, _STRETCH * unit) % 2 == 0
     return all(
-        _falls_further(same_level(*parallel_map(partial(within, frames=half), whole)), whole)
+        _held_out_chi2_falls(same_level(*parallel_map(partial(within, frames=half), whole)), whole)
         for half in (even, ~even)
     )

@@ -114,7 +114,7 @@ def held_out_errors(
     starts = windows[:, 1]
     times = record.t[ends]
     seen = record.seen[ends]
-    there = _there(record)[ends]
+    there = _fully_observed(record)[ends]
     found = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
     samples = np.where(there, _distance(fit, record, found, seen), np.nan)
 
@@ -138,7 +138,7 @@ def held_out_errors(
     )
 
 
-def stretches(record: Record, length: float) -> NDArray[np.int64]:
+def block_numbers(record: Record, length: float) -> NDArray[np.int64]:
     """The number of the stretch of `length` s that each frame lies in, of each measurement its own."""
     own = ((record.t - record.t.min()) // length).astype(np.int64)
     result: NDArray[np.int64] = own + record.film * (int(own.max()) + 1)
@@ -147,11 +147,11 @@ def stretches(record: Record, length: float) -> NDArray[np.int64]:
 
 def _blocks(record: Record, held_out: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
     """Stretches to resample; shorter ones where the frames held out would be too few stretches for it."""
-    result = stretches(record, length)
+    result = block_numbers(record, length)
     if len(np.unique(result[held_out])) >= _FEWEST:
         return result
     spans = [np.ptp(record.t[held_out & (record.film == film)]) for film in range(len(record.origins))]
-    return stretches(record, float(max(spans)) / _SHORT)
+    return block_numbers(record, float(max(spans)) / _SHORT)
 
 
 def comparison_horizon(errors: Errors) -> float:
@@ -183,7 +183,7 @@ def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0,
     their forecasts are still equally good.
     """
     costs = np.column_stack([after, before])
-    return _ratio(stretches(record, _COST_BLOCK * unit), costs, _sum, seed)
+    return _ratio(block_numbers(record, _COST_BLOCK * unit), costs, _sum, seed)
 
 
 def confirmed(before: Errors, ratio: Ratio) -> bool:
@@ -195,10 +195,10 @@ def confirmed(before: Errors, ratio: Ratio) -> bool:
     _value, low, high = ratio
     if not np.isfinite(high) or low > 1.0:
         return False
-    return high < 1.0 or (before.unit != "rad" and at_the_floor(before, comparison_horizon(before)))
+    return high < 1.0 or (before.unit != "rad" and reaches_noise_floor(before, comparison_horizon(before)))
 
 
-def at_the_floor(errors: Errors, horizon: float) -> bool:
+def reaches_noise_floor(errors: Errors, horizon: float) -> bool:
     """Whether errors are no larger than noise makes them, give or take a half."""
     median, low, _high, floor = errors.at(horizon)
     return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
@@ -213,7 +213,7 @@ def lacks_more(fit: Fit, errors: Errors) -> bool:
     if fit.scatter > UNEXPLAINED:
         return True
     written = fit.model.profile.written
-    return written and not at_the_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
+    return written and not reaches_noise_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
 
 
 def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_]) -> bool:
@@ -227,7 +227,7 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
         error, _low, _high, floor = errors.at(comparison_horizon(errors))
     size = 1.0
     if errors.unit != "spread":
-        places = record.seen[held_out & _there(record)][:, : 2 if errors.unit == "m" else 1]
+        places = record.seen[held_out & _fully_observed(record)][:, : 2 if errors.unit == "m" else 1]
         size = float(np.sqrt(places.var(axis=0).sum()))
     return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
 
@@ -290,7 +290,7 @@ def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_]) -> Array:
             fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
         )[0]
         errors[own] = _distance(fit, record, found, record.seen[own])
-    result: Array = np.where(_there(record), errors, np.nan)[held_out]
+    result: Array = np.where(_fully_observed(record), errors, np.nan)[held_out]
     return result
 
 
@@ -331,7 +331,7 @@ def _floor(
     starts = length * np.arange(n)
     _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
     runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
-    there = _there(record)[ends]
+    there = _fully_observed(record)[ends]
     errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
     result: Array = np.nanmedian(errors, axis=0)
     return result
@@ -353,7 +353,7 @@ def _shown(fit: Fit, record: Record) -> Array | float:
     return result
 
 
-def _there(record: Record) -> NDArray[np.bool_]:
+def _fully_observed(record: Record) -> NDArray[np.bool_]:
     """The frames in which everything was seen that the record sees at all, (n,)."""
     result: NDArray[np.bool_] = np.asarray(record.observed[:, record.observed.any(axis=0)].all(axis=1))
     return result

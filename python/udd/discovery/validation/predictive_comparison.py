@@ -25,11 +25,11 @@ _FEWEST = 20  # frames that a form is fitted to
 
 
 class Foretelling:
-    """What forms foretell of what follows each of several first parts of a record.
+    """Prequential (predictive) comparison of forms over several splits of a record.
 
-    Each form is fitted to each first part alone and then held. Where forms differ by how they carry on, as
-    drags do once a motion has died down, one split may favour either by chance; over several this averages
-    out.
+    Each form is fitted to the first part of each split, then its parameters are fixed, and the cost of the
+    rest is counted. A single split may favour one form by chance, as where drags differ only once a motion
+    has died down. The sum over several splits averages this out.
 
     Parameters
     ----------

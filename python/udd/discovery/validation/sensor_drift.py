@@ -53,13 +53,12 @@ FORETELLS = 0.5
 
 
 def as_random(known: Fit, found: Fit) -> Fit | None:
-    """The likeliest fit of what was found, where forces that push at random explain the data about as well.
+    """Compare a found law with random forces alone, by the evidence (marginal likelihood).
 
-    So does a support that moves: what it feeds into a swing that hardly loses energy lasts for many turns,
-    and looks like a law. A right law needs no such forces beside it: what was found is then likeliest where
-    it is held tightly. One that needs them still has to explain more beside them than the known model does,
-    by the evidence of fits that are each held as tightly as is likeliest. Not of a disk, whose camera sees
-    all marks move.
+    A moving support feeds random forces into a swing. If the swing hardly loses energy their trace lasts for
+    many turns and resembles a law. A right law needs no random forces: its evidence is largest at the
+    smallest model error. If a found law needs a larger one, its evidence must exceed that of the known model,
+    each at its likeliest model error. A disk is not tested: its camera sees all marks move.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ def estimates(
     """
     out = dict(known.estimates)
     fixed = not options.calibrate.layout
-    for k, (place, sigma) in enumerate(zip(known.look.places, places_sigma(tracks, known), strict=True), 1):
+    for k, (place, sigma) in enumerate(zip(known.look.places, places_sigma(tracks), strict=True), 1):
         at = place / camera.scale
         error = 0.0 if fixed else float(sigma / camera.scale)
         out[f"mark {k}"] = Estimate([float(at.real), float(-at.imag)], error, "given" if fixed else "found")
@@ -158,7 +158,7 @@ def estimates(
     return out
 
 
-def places_sigma(tracks: Tracks, known: TrackerState) -> NDArray[np.float64]:
+def places_sigma(tracks: Tracks) -> NDArray[np.float64]:
     """Standard error of each mark's place [pixels]: how its mean misfit differs between parts of the film."""
     left, angle = tracks.residuals, tracks.angle
     turned = (left[..., 0] + 1j * left[..., 1]) * np.exp(-1j * angle)[:, None]

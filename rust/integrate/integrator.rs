@@ -145,14 +145,15 @@ where
     /// The same by a method made beforehand.
     pub fn by(method: K, system: M, t: S::Real, x: [S; D], h: Option<S::Real>, norm: &E) -> Self {
         let run = Run::new(&system, t, x);
-        let mut driver = Self { system, method, norm: *norm, controller: PiController::new(K::ORDER), run };
+        let mut integrator =
+            Self { system, method, norm: *norm, controller: PiController::new(K::ORDER), run };
         // Packets are only short with their own instructions.
         if const { S::Real::LANES > 1 } {
-            S::Real::work(Isa::Baseline, Begin { driver: &mut driver, t, x, h });
+            S::Real::work(Isa::Baseline, Begin { integrator: &mut integrator, t, x, h });
         } else {
-            driver.start(S::mask(true), t, x, h);
+            integrator.start(S::mask(true), t, x, h);
         }
-        driver
+        integrator
     }
 
     /// Ends runs on the model's wall, where it has one.
@@ -380,7 +381,7 @@ where
             }
         }
         run.commit(M::SMOOTH, &trial, progress.moved, (end, last));
-        self.method.accept(progress.moved);
+        self.method.begin_next(progress.moved);
         progress
     }
 
@@ -525,7 +526,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         let fresh = is_zero(self.size).not();
         let unflipped = self.flips.less(S::Real::one());
         self.commit(false, &trial, moved, (end, last.and(clear)));
-        method.accept(moved);
+        method.begin_next(moved);
         progress.moved = moved;
 
         if leaving.any() {
@@ -669,7 +670,7 @@ struct FirstStep<'a, S: Scalar> {
 
 /// The start in all lanes.
 struct Begin<'a, M, S: Scalar, const D: usize, E, K> {
-    driver: &'a mut Integrator<M, S, D, E, K>,
+    integrator: &'a mut Integrator<M, S, D, E, K>,
     t: S::Real,
     x: [S; D],
     h: Option<S::Real>,
@@ -686,7 +687,7 @@ where
 
     #[inline(always)]
     fn run<V: InstructionSet>(self) {
-        self.driver.start(S::mask(true), self.t, self.x, self.h);
+        self.integrator.start(S::mask(true), self.t, self.x, self.h);
     }
 }
 
