@@ -50,6 +50,8 @@ from .fitting import Fit as Fit
 from .fitting import fit as fit
 from .fitting.forecast import Forecast as Forecast
 from .fitting.forecast import forecast as forecast
+from .fitting.simulation_extrapolation import InputBias as InputBias
+from .fitting.simulation_extrapolation import input_bias as input_bias
 from .measurement import InputSignal as InputSignal
 from .measurement import Measurement as Measurement
 from .measurement import read_measurement as read_measurement

@@ -39,6 +39,7 @@ from udd.effects import Effect
 from udd.errors import ModelError, UddError
 from udd.fitting import Fit, diagnostics
 from udd.fitting.estimator_input import FilmParameters
+from udd.fitting.input_noise import NoisyInput
 from udd.fitting.noise import Noise
 from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
@@ -58,6 +59,7 @@ _TYPES: dict[str, type] = {
     for cls in (
         *(Fit, Problem, Point, Record, Noise, Free, InputSignal, Measurement, Thinned),
         *(diagnostics.Diagnostics, diagnostics.ModelError, diagnostics.Reading, diagnostics.RunawayParameter),
+        NoisyInput,
         *(Discovery, AddedEffect, Alternative, RejectedEffect, Candidate, Scored, Errors),
         *(Curve, Spline, Score, Confounding),
     )

@@ -8,9 +8,10 @@ use super::bordered::zeros;
 use super::link_propagation::{Law, variable};
 use super::link_response::Transition;
 use super::parameter_jacobian::{
-    ExtraColumns, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, rates, tagged,
+    ExtraColumns, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, tagged,
 };
 use super::row_matrix::RowMatrix;
+use super::sensor::{Moment, rates, seen};
 use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Sensor, Unknowns};
 use crate::analysis::batch::parallel::in_parts;
 use crate::model::Family;
@@ -184,30 +185,35 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
         let (state, t) = (&point.states[i], record.t[i] * point.sets[film].pace());
         let (x, t): ([Wide; D], Wide) = (variable(state), Wide::constant(t));
         let rate = rates(&law.system, t, &x);
-        // The parameters of the model are seen through the rate, by a camera that looks at it.
-        let seen = sensor.observe(&view.plain, &x, &rate);
-        fill(rows, p, &seen, D, &view.model);
-        sight.misfit = self.of.misfit(i, &vector!(f64, M; m => seen[m].re));
+        // The parameters of the model are seen through the rate, by a camera that looks at it, or by formulas.
+        let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
+        let expected = seen(sensor, &law.system, &view.plain, &at);
+        fill(rows, p, &expected, D, &view.model);
+        sight.misfit = self.of.misfit(i, &vector!(f64, M; m => expected[m].re));
         for m in 0..M {
             for k in 0..D {
-                sight.h[(m, k)] = seen[m].d[k];
+                sight.h[(m, k)] = expected[m].d[k];
             }
         }
         let x = vector!(Wide, D; k => Wide::constant(state[k]));
         let rate = vector!(Wide, D; k => Wide::constant(rate[k].re));
+        let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
         for (camera, columns) in &view.tagged {
-            fill(rows, p, &sensor.observe(camera, &x, &rate), 0, columns);
+            fill(rows, p, &sensor.observe(camera, &at), 0, columns);
         }
         if !view.clock.is_empty() {
             // The model's time is (1 + c) times the record's, c the clock's value.
             let mut clocked = t;
             clocked.d[0] = record.t[i];
             let rate = rates(&law.system, clocked, &x);
-            fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &view.clock);
+            let at = Moment { t: clocked, rate: &rate, ..at };
+            fill(rows, p, &seen(sensor, &law.system, &view.plain, &at), 0, &view.clock);
         }
         for ExtraColumns { columns, laws } in self.beyond {
-            let rate = rates(&laws[film].system, t, &x);
-            fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &columns[film]);
+            let law = &laws[film];
+            let rate = rates(&law.system, t, &x);
+            let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
+            fill(rows, p, &seen(sensor, &law.system, &view.plain, &at), 0, &columns[film]);
         }
     }
 }

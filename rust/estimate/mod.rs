@@ -35,7 +35,7 @@ pub use parameter_jacobian::ParameterJacobian;
 pub use record::{FilmParameters, FreeParameter, Record, Role, Unknowns};
 pub use row_matrix::RowMatrix;
 pub use score::{Candidate, Score};
-pub use sensor::{AngleSensor, Direct, DiskCamera, Sensor};
+pub use sensor::{AngleSensor, DiskCamera, FormulaSensor, Moment, Sensor, seen};
 pub use window_filter::Filtered;
 
 use crate::integrate::{Failure, Tolerance};

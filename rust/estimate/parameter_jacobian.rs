@@ -5,7 +5,8 @@ use nalgebra::SVector;
 use super::link_propagation::{Law, TransitionRun, variable};
 use super::link_response::{QuadraturePoints, Transition};
 use super::row_matrix::RowMatrix;
-use super::{EstimateError, Estimator, FreeParameter, Role, Sensor, Unknowns};
+use super::sensor::{Moment, rates};
+use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Role, Sensor, Unknowns};
 use crate::analysis::batch::parallel::in_parts;
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
@@ -228,7 +229,7 @@ where
             let x = &point.states[i];
             let rate = systems[film].rates(t, x, &sides_of(&systems[film], t, x));
             // The parameters of the model are seen through the rate, by a camera that looks at it.
-            let by_rate = self.seen_by_rate(&set.camera, x, &rate);
+            let by_rate = self.seen_by_rate(set, t, x, &rate);
             if by_rate.as_flattened().iter().all(|&v| v == 0.0) {
                 return;
             }
@@ -292,10 +293,11 @@ where
     }
 
     /// The derivatives of what is seen by the state's rate.
-    fn seen_by_rate(&self, camera: &[f64], x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
-        let camera: Vec<Dual<f64, D>> = constants(camera);
+    fn seen_by_rate(&self, set: &FilmParameters, t: f64, x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
         let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
-        let seen = self.sensor.observe(&camera, &x, &variable(rate));
+        let (camera, parameters) = (constants(&set.camera), constants(&set.model));
+        let at = Moment { t: Dual::constant(t), x: &x, rate: &variable(rate), parameters: &parameters };
+        let seen = self.sensor.observe::<Dual<f64, D>>(&camera, &at);
         let mut slopes = [[0.0; D]; M];
         for m in 0..M {
             slopes[m] = seen[m].d;
@@ -353,10 +355,5 @@ fn actors<F: Family<D>, const D: usize>(
 }
 
 pub(super) fn rates_of<const D: usize>(system: &impl System<f64, D>, t: f64, x: &[f64; D]) -> [f64; D] {
-    system.rates(t, x, &sides_of(system, t, x))
-}
-
-#[inline(always)]
-pub(super) fn rates<const D: usize>(system: &impl System<Wide, D>, t: Wide, x: &[Wide; D]) -> [Wide; D] {
     system.rates(t, x, &sides_of(system, t, x))
 }

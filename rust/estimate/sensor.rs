@@ -1,17 +1,80 @@
 //! How a state is seen.
 
+use crate::model::{Observation, System, sides_of};
 use crate::scalar::Scalar;
+use crate::unroll::vector;
+
+/// A state as a sensor meets it: when, how it changes, and the parameters of its law.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a, S, const D: usize> {
+    pub t: S,
+    pub x: &'a [S; D],
+    pub rate: &'a [S; D],
+    pub parameters: &'a [S],
+}
 
 /// How `M` channels see a state of `D` numbers.
 pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
     /// The camera's parameters with their units.
     const PARAMETERS: &'static [(&'static str, &'static str)];
 
+    /// How many of the channels there are; what would be seen by any further one plays no part.
+    fn channels(&self) -> usize {
+        M
+    }
+
     /// Whether a channel is an angle: what was seen of it counts modulo a turn.
     fn is_angle(&self, channel: usize) -> bool;
 
-    /// What is seen of state `x`, which changes at the given rate.
-    fn observe<S: Scalar>(&self, camera: &[S], x: &[S; D], rate: &[S; D]) -> [S; M];
+    /// The model's parameter that says by how much a channel is late.
+    fn delay(&self, _channel: usize) -> Option<usize> {
+        None
+    }
+
+    /// What is seen of a state.
+    fn observe<S: Scalar>(&self, camera: &[S], at: &Moment<'_, S, D>) -> [S; M];
+}
+
+/// What a sensor sees; of channels that are late, what it was then.
+#[inline(always)]
+pub fn seen<S, C, const D: usize, const M: usize>(
+    sensor: &C,
+    system: &impl System<S, D>,
+    camera: &[S],
+    at: &Moment<'_, S, D>,
+) -> [S; M]
+where
+    S: Scalar,
+    C: Sensor<D, M>,
+{
+    let mut all = sensor.observe(camera, at);
+    for m in 0..M {
+        let Some(delay) = sensor.delay(m) else { continue };
+        let by = at.parameters[delay];
+        let (t, x) = (at.t - by, earlier(system, at, by));
+        all[m] = sensor.observe(camera, &Moment { t, x: &x, rate: &rates(system, t, &x), ..*at })[m];
+    }
+    all
+}
+
+/// The state a short while before, by one step of the classical Runge-Kutta method.
+#[inline(never)]
+fn earlier<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &Moment<'_, S, D>, by: S) -> [S; D] {
+    let slope = |part: f64, slope: &[S; D]| {
+        let moved = vector!(S, D; n => at.x[n] - by.scale(part) * slope[n]);
+        rates(system, at.t - by.scale(part), &moved)
+    };
+    let first = at.rate;
+    let second = slope(0.5, first);
+    let third = slope(0.5, &second);
+    let last = slope(1.0, &third);
+    let mean = vector!(S, D; n => (first[n] + (second[n] + third[n]).scale(2.0) + last[n]).scale(1.0 / 6.0));
+    vector!(S, D; n => at.x[n] - by * mean[n])
+}
+
+#[inline(always)]
+pub(super) fn rates<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: &[S; D]) -> [S; D] {
+    system.rates(t, x, &sides_of(system, t, x))
 }
 
 /// The distance at which `lens` is told, m.
@@ -55,7 +118,7 @@ impl Sensor<4, 3> for DiskCamera {
     }
 
     #[inline(always)]
-    fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 4], rate: &[S; 4]) -> [S; 3] {
+    fn observe<S: Scalar>(&self, camera: &[S], &Moment { x, rate, .. }: &Moment<'_, S, 4>) -> [S; 3] {
         let &[y0, z0, tilt, scale, right, up, lag, row, shutter, lens, middle_y, middle_z] =
             camera.first_chunk().expect("twelve camera parameters");
         let late = -(row * x[2]);
@@ -96,30 +159,45 @@ impl Sensor<2, 1> for AngleSensor {
     }
 
     #[inline(always)]
-    fn observe<S: Scalar>(&self, camera: &[S], x: &[S; 2], _rate: &[S; 2]) -> [S; 1] {
+    fn observe<S: Scalar>(&self, camera: &[S], &Moment { x, .. }: &Moment<'_, S, 2>) -> [S; 1] {
         let &[theta0, aside, above] = camera.first_chunk().expect("three camera parameters");
         let (sin, cos) = x[1].sin_cos();
         [x[1] + theta0 - aside * cos + above * sin]
     }
 }
 
-/// A sensor that sees the components of the state as they are; those that it does not see have no
-/// information.
-#[derive(Clone, Copy, Debug)]
-pub struct Direct<const D: usize> {
-    /// The components that are angles.
+/// Sensors of a user's own model: formulas of state, rates, parameters and time, or the state's components as they
+/// are. Channels beyond the last formula see nothing, and those that a record lacks have no information.
+#[derive(Clone, Debug)]
+pub struct FormulaSensor<const D: usize> {
+    pub observation: Observation,
+    /// The components that are angles, where they are seen as they are.
     pub angles: [bool; D],
 }
 
-impl<const D: usize> Sensor<D, D> for Direct<D> {
+impl<const D: usize> Sensor<D, D> for FormulaSensor<D> {
     const PARAMETERS: &'static [(&'static str, &'static str)] = &[];
 
+    fn channels(&self) -> usize {
+        if self.observation.is_empty() { D } else { self.observation.len() }
+    }
+
     fn is_angle(&self, channel: usize) -> bool {
-        self.angles[channel]
+        match self.observation.is_empty() {
+            true => self.angles[channel],
+            false => self.observation.is_angle(channel),
+        }
+    }
+
+    fn delay(&self, channel: usize) -> Option<usize> {
+        self.observation.delay(channel)
     }
 
     #[inline(always)]
-    fn observe<S: Scalar>(&self, _camera: &[S], x: &[S; D], _rate: &[S; D]) -> [S; D] {
-        *x
+    fn observe<S: Scalar>(&self, _camera: &[S], at: &Moment<'_, S, D>) -> [S; D] {
+        match self.observation.is_empty() {
+            true => *at.x,
+            false => self.observation.values(at.t, at.x, at.rate, at.parameters),
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::SMatrix;
 
+use super::sensor::{Moment, seen};
 use super::{EstimateError, Estimator, FilmParameters, Options, Sensor, Unknowns};
 use crate::analysis::CancelFlag;
 use crate::analysis::batch::parallel::try_map;
@@ -65,16 +66,17 @@ where
             let ((film, t, x), times) = (starts[i], &times[i]);
             let (system, set) = (&systems[film], &sets[film]);
             let (mut t, mut x) = (t * set.pace(), x);
-            let mut seen = Vec::with_capacity(times.len());
+            let mut expected = Vec::with_capacity(times.len());
             for &next in times {
                 let next = next * set.pace();
                 x = propagate(system, t, next, x, &self.tolerance)
                     .map_err(|source| EstimateError::Integration { t, source })?;
                 t = next;
                 let rate = system.rates(t, &x, &sides_of(system, t, &x));
-                seen.push(self.sensor.observe(&set.camera, &x, &rate));
+                let at = Moment { t, x: &x, rate: &rate, parameters: &set.model };
+                expected.push(seen(&self.sensor, system, &set.camera, &at));
             }
-            Ok(seen)
+            Ok(expected)
         })
     }
 }

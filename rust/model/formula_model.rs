@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Family, Inputs, Parameter, Piece, Sides, Signals, System, parameter};
+use super::{Family, Inputs, Observation, Parameter, Piece, Sides, Signals, System, parameter};
 use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
 use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::vector;
@@ -179,6 +179,7 @@ pub struct FormulaFamily<const D: usize> {
     /// The inputs of each record, and the number of that which counts where none is named.
     records: Arc<[Signals]>,
     record: usize,
+    observation: Observation,
 }
 
 impl<const D: usize> FormulaFamily<D> {
@@ -216,7 +217,19 @@ impl<const D: usize> FormulaFamily<D> {
         let states = states.iter().map(|name| (name.clone(), false)).collect();
         let (equations, kinks) = (Arc::new(equations), Arc::new(kinks));
         let (parameters, inputs, records) = (parameters.to_vec(), inputs.len(), Arc::default());
-        Ok(Self { equations, kinks, deep, parameters, states, inputs, records, record: 0 })
+        let observation = Observation::default();
+        Ok(Self { equations, kinks, deep, parameters, states, inputs, records, record: 0, observation })
+    }
+
+    /// With what sensors see of it.
+    pub fn with_observation(mut self, observation: Observation) -> Self {
+        self.observation = observation;
+        self
+    }
+
+    /// What sensors see of it.
+    pub fn observation(&self) -> &Observation {
+        &self.observation
     }
 
     /// With what was measured of its inputs, record by record, and the number of that which counts by itself.
@@ -254,6 +267,7 @@ impl<const D: usize> FormulaFamily<D> {
             inputs: self.inputs,
             records: self.records.clone(),
             record: self.record,
+            observation: self.observation.clone(),
         }
     }
 

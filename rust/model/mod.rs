@@ -13,6 +13,7 @@ mod either;
 mod formula_model;
 mod inputs;
 mod lugre;
+mod observation;
 mod pendulum;
 pub mod stick_slip;
 
@@ -24,6 +25,7 @@ pub use either::Either;
 pub use formula_model::{FormulaFamily, MAX_INPUTS, Own};
 pub use inputs::{COEFFICIENTS as PIECE_COEFFICIENTS, Inputs, Piece, Signal, Signals};
 pub use lugre::WithLuGre;
+pub use observation::Observation;
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick_slip::Sticking;
 

@@ -11,8 +11,8 @@ use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
 use crate::analysis::CancelFlag;
 use crate::estimate::{
-    AngleSensor, CachedLinearisation, Candidate, Cost, Direct, DiskCamera, EstimateError, Estimator,
-    FilmParameters, FreeParameter, Options, ParameterJacobian, Record, Role, RowMatrix, Score, Sensor,
+    AngleSensor, CachedLinearisation, Candidate, Cost, DiskCamera, EstimateError, Estimator, FilmParameters,
+    FormulaSensor, FreeParameter, Options, ParameterJacobian, Record, Role, RowMatrix, Score, Sensor,
     Unknowns,
 };
 use crate::integrate::Tolerance;
@@ -178,24 +178,25 @@ pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
     Ok(of! {
         AnyModel::Four(Either::First(family), values) => (family, values), (family, &values, DiskCamera);
         AnyModel::Two(Either::First(family), values) => (family, values), (family, &values, AngleSensor);
-        AnyModel::One(family, values) => (family, values), seen_as_it_is(family, &values);
-        AnyModel::Two(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
-        AnyModel::Three(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
-        AnyModel::Four(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::One(family, values) => (family, values), with_sensor(family, &values);
+        AnyModel::Two(Either::Second(family), values) => (family, values), with_sensor(family, &values);
+        AnyModel::Three(Either::Second(family), values) => (family, values), with_sensor(family, &values);
+        AnyModel::Four(Either::Second(family), values) => (family, values), with_sensor(family, &values);
     })
 }
 
 /// A user's own model with what sees its states.
-fn seen_as_it_is<const D: usize>(
+fn with_sensor<const D: usize>(
     family: FormulaFamily<D>,
     values: &[f64],
-) -> (FormulaFamily<D>, &[f64], Direct<D>) {
+) -> (FormulaFamily<D>, &[f64], FormulaSensor<D>) {
     let states = family.states();
     let mut angles = [false; D];
     for n in 0..D {
         angles[n] = states[n].1;
     }
-    (family, values, Direct { angles })
+    let observation = family.observation().clone();
+    (family, values, FormulaSensor { observation, angles })
 }
 
 /// The same for one family and one sensor.
@@ -208,15 +209,17 @@ where
     F: Family<D> + 'static,
     C: Sensor<D, M> + 'static,
 {
-    asked.check((D, M), (values.len(), C::PARAMETERS.len()))?;
+    let m = sensor.channels();
+    asked.check((D, m), (values.len(), C::PARAMETERS.len()))?;
     let mut record = Record::default();
     if let Some(data) = asked.data {
         (record.t, record.linked, record.film) = (data.t.clone(), data.linked.clone(), data.film.clone());
-        record.memory.copy_from_slice(&data.autocorrelation);
-        for i in 0..data.t.len() {
-            record.seen.push(SVector::from_column_slice(&data.seen.numbers[M * i..M * (i + 1)]));
-            let information = &data.information.numbers[M * M * i..M * M * (i + 1)];
-            record.information.push(SMatrix::from_row_slice(information));
+        record.memory[..m].copy_from_slice(&data.autocorrelation);
+        // Channels that there are not have no information.
+        for (seen, information) in data.seen.numbers.chunks(m).zip(data.information.numbers.chunks(m * m)) {
+            record.seen.push(SVector::from_fn(|i, _| seen.get(i).copied().unwrap_or(0.0)));
+            let there = |i, j| if i < m && j < m { information[m * i + j] } else { 0.0 };
+            record.information.push(SMatrix::from_fn(there));
         }
     }
     let mut diffusion = [1.0; D];
@@ -238,20 +241,21 @@ where
 {
     fn size(&self) -> Size {
         let (frames, free) = (self.estimator.record.t.len(), self.estimator.free.len());
-        Size { frames, free, states: D, channels: M }
+        Size { frames, free, states: D, channels: self.estimator.sensor.channels() }
     }
 
     fn solve(self: Box<Self>, options: &Options, stop: &CancelFlag) -> Result<Solved, EstimateError> {
         let Self { estimator, point, .. } = *self;
+        let m = estimator.sensor.channels();
         let s = estimator.solve(point, options, stop)?;
         Ok(Solved {
             states: s.point.states.as_flattened().to_vec(),
             sets: s.point.sets.clone(),
             covariance: s.covariance.as_slice().to_vec(),
-            state_covariance: numbers(&s.state_covariance),
-            misfit: numbers(&s.misfit),
-            seen_variance: numbers(&s.seen_variance),
-            defect: numbers(&s.defect[..estimator.record.t.len() - 1]),
+            state_covariance: numbers(&s.state_covariance, D),
+            misfit: numbers(&s.misfit, m),
+            seen_variance: numbers(&s.seen_variance, m),
+            defect: numbers(&s.defect[..estimator.record.t.len() - 1], D),
             cost: s.cost,
             evidence: s.evidence,
             converged: s.converged,
@@ -290,7 +294,7 @@ where
                 responses.push(place.response);
             }
         }
-        Ok([t, states, numbers(&responses)])
+        Ok([t, states, numbers(&responses, D)])
     }
 
     fn filter(&self, windows: &[(usize, usize)], stop: &CancelFlag) -> Result<[Vec<f64>; 3], EstimateError> {
@@ -300,12 +304,17 @@ where
             last.extend_from_slice(&end.last);
             covariance.push(end.covariance);
         }
-        Ok([first, last, numbers(&covariance)])
+        Ok([first, last, numbers(&covariance, D)])
     }
 
     fn innovations(&self, vague: &[f64]) -> Result<Vec<f64>, EstimateError> {
         let vague = vague.first_chunk().expect("one per state");
-        Ok(self.estimator.innovations(&self.point, vague)?.into_flattened())
+        let m = self.estimator.sensor.channels();
+        let mut all = Vec::new();
+        for own in self.estimator.innovations(&self.point, vague)? {
+            all.extend_from_slice(&own[..m]);
+        }
+        Ok(all)
     }
 
     fn predict(&self, film: &[usize], t0: &[f64], times: &[Vec<f64>]) -> Result<Vec<f64>, EstimateError> {
@@ -313,9 +322,10 @@ where
         for i in 0..times.len() {
             starts.push((film[i], t0[i], self.point.states[i]));
         }
+        let m = self.estimator.sensor.channels();
         let mut all = Vec::new();
-        for seen in self.estimator.predict(&self.point.sets, &starts, times)? {
-            all.extend_from_slice(seen.as_flattened());
+        for own in self.estimator.predict(&self.point.sets, &starts, times)?.iter().flatten() {
+            all.extend_from_slice(&own[..m]);
         }
         Ok(all)
     }
@@ -329,11 +339,11 @@ fn added(values: &[f64], own: usize, indices: &[usize]) -> PyResult<(Vec<f64>, V
     Ok((values[own..].to_vec(), indices.iter().map(|&index| Role::Model(index)).collect()))
 }
 
-/// The numbers of small matrices in C order.
-fn numbers<const A: usize, const B: usize>(blocks: &[SMatrix<f64, A, B>]) -> Vec<f64> {
-    let mut all = Vec::with_capacity(A * B * blocks.len());
+/// The numbers of small matrices' first rows in C order.
+fn numbers<const A: usize, const B: usize>(blocks: &[SMatrix<f64, A, B>], rows: usize) -> Vec<f64> {
+    let mut all = Vec::with_capacity(rows * B * blocks.len());
     for block in blocks {
-        for i in 0..A {
+        for i in 0..rows {
             for j in 0..B {
                 all.push(block[(i, j)]);
             }

@@ -8,11 +8,12 @@ use pyo3::prelude::*;
 
 use super::errors::ModelError;
 use crate::analysis::batch::rows::tape;
-use crate::formula::is_reserved;
+use crate::estimate::{FormulaSensor, Moment, seen};
+use crate::formula::{Names, is_reserved};
 use crate::model::effects::{Body, Formula, FrictionModel, Kind, Slot, Source};
 use crate::model::{
-    DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, MAX_INPUTS, Momentum, PendulumFamily,
-    Signal, Signals, System, WithLuGre, sides_of,
+    DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, MAX_INPUTS, Momentum, Observation,
+    PendulumFamily, Signal, Signals, System, WithLuGre, sides_of,
 };
 
 /// Any model with its parameter values, in the order of its family's parameters.
@@ -269,7 +270,11 @@ struct FormulaModelSpec<'py> {
     records: Vec<Vec<InputSignal<'py>>>,
     /// The number of the record that counts where none is named.
     record: usize,
+    observe: Vec<ChannelSpec>,
 }
+
+/// What a sensor sees: its channel's name, the formula, the parameter by how much it is late, and whether it is an angle.
+type ChannelSpec = (String, String, Option<String>, bool);
 
 /// As `udd.InputSignal`.
 #[derive(FromPyObject)]
@@ -292,7 +297,8 @@ impl InputSignal<'_> {
 }
 
 fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
-    let FormulaModelSpec { states, equations, parameters, angles, inputs, delays, records, record } = spec;
+    let FormulaModelSpec { states, equations, parameters, angles, inputs, delays, records, record, observe } =
+        spec;
     let all = || states.iter().chain(parameters).chain(inputs);
     for (i, name) in all().enumerate() {
         let what = match i {
@@ -328,12 +334,14 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
         let own = record.iter().zip(&delays).map(|(signal, &delay)| signal.read(delay));
         signals.push(Signals::new(own.collect::<PyResult<_>>()?));
     }
+    let observation = observation(observe, Names { states, parameters, inputs: &[], rates: true })?;
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     macro_rules! parsed {
         ($($d:literal $Kind:ident |$family:ident| $held:expr),+) => {
             match states.len() {
                 $($d => FormulaFamily::<$d>::parse(states, &texts, parameters, inputs).map(|family| {
-                    let $family = family.with_angles(angles).with_records(signals, *record);
+                    let $family =
+                        family.with_angles(angles).with_records(signals, *record).with_observation(observation);
                     AnyModel::$Kind($held, values)
                 }),)+
                 n => return Err(ModelError::new_err(format!("a model has 1 to 6 states, not {n}"))),
@@ -349,6 +357,25 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
         6 Six |own| own
     )
     .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
+}
+
+/// What sensors see of a user's own model.
+fn observation(channels: &[ChannelSpec], names: Names<'_>) -> PyResult<Observation> {
+    if channels.len() > names.states.len() {
+        let message = format!(
+            "a model has at most as many sensors as states, {}, not {}",
+            names.states.len(),
+            channels.len()
+        );
+        return Err(ModelError::new_err(message));
+    }
+    let mut texts = Vec::with_capacity(channels.len());
+    for (_, formula, delay, angle) in channels {
+        let delay = delay.as_ref().and_then(|name| names.parameters.iter().position(|own| own == name));
+        texts.push((formula.as_str(), delay, *angle));
+    }
+    Observation::parse(&texts, names)
+        .map_err(|(n, mistake)| ModelError::new_err(format!("what {} sees {mistake}", channels[n].0)))
 }
 
 /// Refuses effects that this body cannot have.
@@ -496,9 +523,43 @@ fn rates<'py>(
     Ok(PyArray1::from_vec(model.py(), out))
 }
 
+/// What sensors see of a user's own model, frame by frame.
+#[pyfunction]
+fn observed<'py>(
+    model: &Bound<'py, PyAny>,
+    t: PyReadonlyArray1<'py, f64>,
+    states: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn all<const D: usize>(family: &FormulaFamily<D>, values: &[f64], t: &[f64], flat: &[f64]) -> Vec<f64> {
+        let (system, observation) = (family.build(values), family.observation().clone());
+        let channels = if observation.is_empty() { D } else { observation.len() };
+        let sensor = FormulaSensor { observation, angles: [false; D] };
+        let mut out = Vec::with_capacity(t.len() * channels);
+        for (&t, x) in t.iter().zip(flat.as_chunks::<D>().0) {
+            let rate = system.rates(t, x, &sides_of(&system, t, x));
+            let at = Moment { t, x, rate: &rate, parameters: values };
+            out.extend_from_slice(&seen(&sensor, &system, &[], &at)[..channels]);
+        }
+        out
+    }
+    let parsed = AnyModel::from_python(model)?;
+    let (t, states) = (t.as_slice()?, states.as_slice()?);
+    let out = match &parsed {
+        AnyModel::One(family, values) => all(family, values, t, states),
+        AnyModel::Two(Either::Second(family), values) => all(family, values, t, states),
+        AnyModel::Three(Either::Second(family), values) => all(family, values, t, states),
+        AnyModel::Four(Either::Second(family), values) => all(family, values, t, states),
+        AnyModel::Five(Either::Second(family), values) => all(family, values, t, states),
+        AnyModel::Six(family, values) => all(family, values, t, states),
+        _ => return Err(ModelError::new_err("a udd.Model is needed")),
+    };
+    Ok(PyArray1::from_vec(model.py(), out))
+}
+
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(formula_bodies, module)?)?;
     module.add_function(wrap_pyfunction!(has_series, module)?)?;
     module.add_function(wrap_pyfunction!(model_parameters, module)?)?;
+    module.add_function(wrap_pyfunction!(observed, module)?)?;
     module.add_function(wrap_pyfunction!(rates, module)?)
 }

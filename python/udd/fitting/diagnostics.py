@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from udd import _core
 
+from .input_noise import NoisyInput, noisy_inputs
 from .parameters import Free
 from .sensor import is_film, lattice, moving
 
@@ -129,6 +130,8 @@ class Diagnostics:
         Time from which a film shows its disk at rest, which is left out, s.
     filmed : bool
         Whether it is a film, whose own faults leave a right model's innovations coloured.
+    inputs : list of NoisyInput
+        The inputs whose samples scatter.
     """
 
     missed: list[ModelError]
@@ -139,6 +142,7 @@ class Diagnostics:
     sensor: list[Reading]
     rests: float | None = None
     filmed: bool = False
+    inputs: list[NoisyInput] = field(default_factory=list)
 
     @property
     def coloured(self) -> list[str]:
@@ -182,6 +186,7 @@ class Diagnostics:
                 f"{self.white[least]:.1g} in {least})"
             )
         said += [f"warning: {one.text}" for one in self.ran_off]
+        said += [one.text for one in self.inputs]
         if self.sensor:
             said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
         if self.rests is not None:
@@ -204,6 +209,7 @@ class Diagnostics:
             "white": dict(self.white),
             "ran_off": [vars(one) for one in self.ran_off],
             "noise": [vars(one) for one in self.sensor],
+            "noisy_inputs": [vars(one) for one in self.inputs],
             "errors_times": self.factor,
         }
 
@@ -217,7 +223,15 @@ def doubts(fit: Fit) -> Diagnostics:
     # standard errors as the square root of the number of independent ones that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if not tight else 1.0
     return Diagnostics(
-        _missed(fit), tight, white, ran_off(fit), factor, readings(fit), _rests(fit), is_film(fit.measurement)
+        _missed(fit),
+        tight,
+        white,
+        ran_off(fit),
+        factor,
+        readings(fit),
+        _rests(fit),
+        is_film(fit.measurement),
+        noisy_inputs(fit.measurements, fit.model.inputs),
     )
 
 

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models.formula_model import FormulaModel
 
+from .observation_inverse import inverted
 from .sensor import roughness
 
 Array = NDArray[np.float64]
@@ -22,6 +24,7 @@ _LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
 _OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
 #: Samples of an input that may be missing at a measurement's ends, where the nearest one holds.
 _LATE = 2.0
+_SAMPLED = 50  # frames that tell how noise enters the states
 
 
 def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
@@ -68,12 +71,15 @@ def guessed(
     seen: Mapping[str, Array],
     linked: NDArray[np.bool_],
     state0: Mapping[str, float] | None = None,
+    noise: Mapping[str, float] | None = None,
 ) -> Array:
     """A first guess of all states: as seen, or the rate of one that is seen, or else zero.
 
     Of hidden states that a start is given of, their own equations are followed from there, driven by what was
-    seen.
+    seen. What sensors saw is inverted first, each weighed by its `noise`.
     """
+    if model.observe:
+        seen = _behind(model, t, dict(seen), dict(noise or dict.fromkeys(seen, 1.0)), state0 or {})
     rates = {text.strip(): name for name, text in model.equations.items() if name in seen}
     columns = []
     for name in model.state_names:
@@ -81,11 +87,32 @@ def guessed(
             columns.append(seen[name])
         elif name in rates:
             columns.append(slope(t, seen[rates[name]], linked))
+        elif (rate := model.equations[name].strip()) in seen:
+            columns.append(_integral(t, seen[rate], (state0 or {}).get(name)))
         else:
             columns.append(np.zeros(len(t)))
     states = np.column_stack(columns)
     given = {name: value for name, value in (state0 or {}).items() if name not in seen}
     return _followed(model, t, states, given) if given else states
+
+
+def _behind(
+    model: FormulaModel,
+    t: Array,
+    seen: dict[str, Array],
+    noise: dict[str, float],
+    state0: Mapping[str, float],
+) -> dict[str, Array]:
+    """The states that sensors show, each frame by itself."""
+    start = np.array([state0.get(name, 0.0) for name in model.state_names])
+    found = inverted(model, t, seen, noise, start)
+    return {name: found.states[:, k] for k, name in enumerate(model.state_names) if found.shown[k]}
+
+
+def _integral(t: Array, rate: Array, start: float | None) -> Array:
+    """A state whose rate alone is seen: from its start, or about zero."""
+    result: Array = cumulative_trapezoid(rate, t, initial=0.0)
+    return result - result.mean() if start is None else result + start
 
 
 def _followed(model: FormulaModel, t: Array, states: Array, start: Mapping[str, float]) -> Array:
@@ -149,8 +176,8 @@ def levels_of(
     model : FormulaModel
     t, states : ndarray (n,), (n, d)
         A first guess.
-    sigma : ndarray (n, d)
-        The noise of what was seen; infinite where it was not.
+    sigma : ndarray (n, c)
+        The noise of what was seen, of each of the model's channels; infinite where it was not.
     linked : ndarray of bool (n - 1,)
     """
     dt = np.diff(t)[linked]
@@ -160,8 +187,25 @@ def levels_of(
     rates = np.median(np.abs(model.rates(t, states)), axis=0) * step
     change = np.where(change > 0, change, rates)
     change = np.where(change > 0, change, float(change.max()) or 1.0)
-    seen = np.isfinite(sigma).any(axis=0)
-    noise = np.median(np.where(seen, sigma, 0.0), axis=0)
+    noise = _state_noise(model, t, states, sigma)
+    seen = np.isfinite(noise)
     # Held by less than its noise a state that is seen would follow every frame.
     loosest = np.where(seen, np.clip(_OF_NOISE * noise, _OF_CHANGE * change, change), _UNSEEN * change)
     return tuple(tuple((level * loosest / np.sqrt(step)).tolist()) for level in _LEVELS)
+
+
+def _state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> Array:
+    """The noise of each state as sensors show it, (d,); infinite of those that they do not show."""
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(sigma).any(axis=0))
+    typical = np.full(len(seen), np.inf)
+    for k in np.flatnonzero(seen):
+        typical[k] = np.median(sigma[np.isfinite(sigma[:, k]), k])
+    if not model.observe:
+        return typical
+    frames = np.linspace(0, len(t) - 1, _SAMPLED).astype(int)
+    names = [name for name, there in zip(model.channels, seen, strict=True) if there]
+    values = dict(zip(names, model.observed(t[frames], states[frames])[:, seen].T, strict=True))
+    noise = dict(zip(names, typical[seen].tolist(), strict=True))
+    found = inverted(model, t[frames], values, noise, states[0])
+    spread = np.sqrt(np.median((found.slopes**2 @ typical[seen] ** 2), axis=0))
+    return np.where(found.shown, spread, np.inf)

@@ -13,6 +13,7 @@ from udd import _core
 from udd._util.keywords import renamed, renamed_attribute
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
+from udd.models.formula_model import FormulaModel
 
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .noise import Noise, colour
@@ -164,8 +165,8 @@ class Fit:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What `misfit` is of: the measurement's columns, or all states of a user's own model."""
-        return self.model.state_names if self.model.profile.written else self.measurement.names
+        """What `misfit` is of: the measurement's columns, or all that a user's own model shows."""
+        return self.model.channels if isinstance(self.model, FormulaModel) else self.measurement.names
 
     @property
     def blurring(self) -> Array:

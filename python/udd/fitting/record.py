@@ -126,9 +126,9 @@ def record_of(
 ) -> Record:
     """Lay a measurement out for the estimator, or several one after the other.
 
-    The channels are the measurement's columns; for a model of the user's own they are the model's states, of
-    which the measurement may see but some; `state0` holds starts of the others, for all measurements or one
-    table each.
+    The channels are the measurement's columns; for a model of the user's own they are the model's sensors or
+    states, of which the measurement may see but some; `state0` holds starts of the others, for all
+    measurements or one table each.
 
     Raises
     ------
@@ -147,9 +147,10 @@ def record_of(
         (model,) = model
     own = model if isinstance(model, FormulaModel) else None
     start = None if state0 is None else checked_start(own, state0)
-    if own and not set(measurement.names) <= set(own.state_names):
-        given, wanted = ", ".join(measurement.names), ", ".join(own.state_names)
-        raise FitError(f"the measurement has columns {given}, but the model's states are {wanted}")
+    if own and not set(measurement.names) <= set(own.channels):
+        given, wanted = ", ".join(measurement.names), ", ".join(own.channels)
+        what = "sensors" if own.observe else "states"
+        raise FitError(f"the measurement has columns {given}, but the model's {what} are {wanted}")
     if not own and profile_of(measurement.kind).written:
         given = ", ".join(measurement.names)
         raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
@@ -165,45 +166,71 @@ def record_of(
     t, row, linked = _fill(times, np.flatnonzero(seen), step, longest)
 
     columns = measurement.names
-    names = own.state_names if own else columns
+    names = own.channels if own else columns
     places = np.array([names.index(name) for name in columns])
     there = np.flatnonzero(row >= 0)
     full = np.zeros((len(t), len(names)))
-    full[np.ix_(there, places)] = values[row[there]]
+    read = values[row[there]]
+    present = np.isfinite(read)
+    full[np.ix_(there, places)] = np.nan_to_num(read)
     sigma = np.full((len(t), len(names)), np.inf)
     rho = np.tile(np.eye(len(names)), (len(t), 1, 1))
     if measurement.sigma is None:
-        known_sigma = _noise_of(measurement, values[row[there]])
-        sigma[np.ix_(there, places)] = known_sigma
+        sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, read), np.inf)
     else:
-        own_sigma = measurement.sigma[row[there]]
+        own_sigma = np.where(present, measurement.sigma[row[there]], np.inf)
         sigma[np.ix_(there, places)] = own_sigma
-        covariance = measurement.covariance()[row[there]]
-        rho[np.ix_(there, places, places)] = covariance / (own_sigma[:, :, None] * own_sigma[:, None, :])
-    known = values[row[there]].copy()
-    angles = [columns.index(name) for name in own.angles if name in columns] if own else [len(columns) - 1]
+        if measurement.rho is not None:
+            covariance, stated = measurement.covariance()[row[there]], measurement.sigma[row[there]]
+            both = present[:, :, None] & present[:, None, :]
+            correlation = covariance / (stated[:, :, None] * stated[:, None, :])
+            rho[np.ix_(there, places, places)] = np.where(both, correlation, np.eye(len(columns)))
+    known = read.copy()
+    angles = [columns.index(name) for name in own.turning if name in columns] if own else [len(columns) - 1]
     for k in angles:
-        if np.ptp(known[:, k]) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
-            known[:, k] = np.unwrap(known[:, k])
-    guess = np.column_stack([np.interp(t, t[there], column) for column in known.T])
-    odd = odd_frames(guess, np.median(sigma[np.ix_(there, places)], axis=0), linked)
+        shown = known[present[:, k], k]
+        if np.ptp(shown) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
+            known[present[:, k], k] = np.unwrap(shown)
+    guess = np.column_stack([_joined_up(t, t[there], column) for column in known.T])
+    typical = np.array([np.median(one[np.isfinite(one)]) for one in sigma[:, places].T])
+    odd = odd_frames(guess, typical, linked)
     for channel in guess.T:
         channel[odd] = _between(odd, channel)
     film = np.zeros(len(t), dtype=np.int64)
     if own:
-        states = guessed(own, t, dict(zip(columns, guess.T, strict=True)), linked, start)
+        noise = dict(zip(columns, typical.tolist(), strict=True))
+        states = guessed(own, t, dict(zip(columns, guess.T, strict=True)), linked, start, noise)
     else:
         states = _states(t, guess, linked)
     return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
 
 
+def _joined_up(t: Array, there: Array, column: Array) -> Array:
+    """A column between the rows that have it: by straight lines over rows that lack all, else by a curve."""
+    present = np.isfinite(column)
+    if present.all():
+        result: Array = np.interp(t, there, column)
+        return result
+    inside = np.clip(t, there[present][0], there[present][-1])
+    result = Akima1DInterpolator(there[present], column[present])(inside)
+    return result
+
+
 def _noise_of(measurement: Measurement, values: Array) -> Array:
-    """What is taken for the noise where a measurement does not say, of each column or of each frame too."""
+    """What is taken for the noise where a measurement does not say, of each column or of each frame too.
+
+    Of a user's own model columns may have gaps: sensors have rates of their own.
+    """
     if profile_of(measurement.kind).written:
-        typical = typical_noise(values)
-        if not any(lattice(column) for column in values.T):
+        columns = [column[np.isfinite(column)] for column in values.T]
+        typical = np.array([typical_noise(column[:, None])[0] for column in columns])
+        if not any(lattice(column) for column in columns):
             return typical
-        return np.maximum(typical, np.column_stack([frame_noise(column) for column in values.T]))
+        steps = np.full(values.shape, np.inf)
+        for own, column in zip(steps.T, values.T, strict=True):
+            own[np.isfinite(column)] = frame_noise(column[np.isfinite(column)])
+        result: Array = np.maximum(typical, steps)
+        return result
     if profile_of(measurement.kind).sensor.zero is not None and is_encoder(measurement):
         return frame_noise(values[:, 0])[:, None]
     return np.array(profile_of(measurement.kind).sensor.sigma)

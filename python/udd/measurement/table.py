@@ -153,8 +153,15 @@ class Measurement:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Usable rows, shape (n,): every coordinate is there and the flag is empty or a mere remark."""
-        return np.asarray(np.isfinite(self.values).all(axis=1) & usable(self.flag))
+        """Usable rows, shape (n,): what was measured is there and the flag is empty or a mere remark.
+
+        Of a disk and a pendulum every coordinate must be there; of a user's own model any will do, since
+        sensors may have rates of their own.
+        """
+        there = np.isfinite(self.values)
+        return np.asarray(
+            (there.any(axis=1) if self.kind == "own" else there.all(axis=1)) & usable(self.flag)
+        )
 
     @property
     def duration(self) -> float:
@@ -330,7 +337,7 @@ def check(m: Measurement, where: Any) -> None:
                 raise MeasurementError(
                     f"{where(i)}: sigma_{name} is {sigma[i]!s}, it must be positive and finite"
                 )
-            if (i := first(m.seen & np.isnan(sigma))) is not None:
+            if (i := first(m.seen & np.isfinite(m.values[:, k]) & np.isnan(sigma))) is not None:
                 raise MeasurementError(f"{where(i)}: {name} has a value but sigma_{name} is missing")
     if m.rho is not None:
         if (i := first((np.abs(m.rho) >= 1).any(axis=1))) is not None:

@@ -64,7 +64,12 @@ class Model:
         was measured of them comes with the run or the record: ``udd.simulate(..., inputs=...)``,
         ``udd.Measurement(..., inputs=...)``.
     delays : mapping of str to str, optional
-        Inputs that the model feels later, each with the parameter that is the delay [s].
+        Inputs that the model feels later, and sensors that are late, each with the parameter that is the
+        delay [s].
+    observe : mapping of str to formula, optional
+        What sensors see (the output equation): for each column of a measurement a formula of the states,
+        their rates (``w'``), the parameters and ``t``, such as ``{"volts": "gain*theta + zero"}``; at most as
+        many as states. Without it the columns are states.
 
     Raises
     ------
@@ -121,6 +126,7 @@ class Model:
         mass: Sequence[Sequence[Expression]] | None = None,
         inputs: Iterable[str] = (),
         delays: Mapping[str, str] | None = None,
+        observe: Mapping[str, Expression] | None = None,
     ) -> FormulaModel:
         """A user's own model is one of a subclass, like those that are built in."""
         from .formula_model import FormulaModel
@@ -270,6 +276,13 @@ class Model:
         >>> udd.DLE(1.0).rates(0.0, [1.0, 1.0, 0.5])
         array([0. , 0.5, 0. ])
         """
+        times, states, shape = self._broadcast(t, state)
+        return _core.rates(self, times, states).reshape(*shape, len(self.state_names))
+
+    def _broadcast(
+        self, t: ArrayLike, state: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, ...]]:
+        """Times and states in a row, and the shape that they had together."""
         times, states = array("t", t), array("state", state)
         dim = len(self.state_names)
         if states.ndim == 0 or states.shape[-1] != dim:
@@ -281,8 +294,7 @@ class Model:
         except ValueError:
             raise ModelError(f"times {times.shape} and states {states.shape} do not fit together") from None
         flat_t = np.broadcast_to(times, shape).ravel()
-        flat_x = np.broadcast_to(states, (*shape, dim)).ravel()
-        return _core.rates(self, flat_t, flat_x).reshape(*shape, dim)
+        return flat_t, np.broadcast_to(states, (*shape, dim)).ravel(), shape
 
     def replace(self, **changes: Any) -> Self:
         """The model with other arguments of its constructor or other parameters.

@@ -38,6 +38,7 @@ class FormulaText(NamedTuple):
     delays: list[str | None]
     records: list[list[InputSignal]]
     record: int
+    observe: list[tuple[str, str, str | None, bool]]
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -62,7 +63,11 @@ class FormulaModel(Model):
     inputs : tuple of str
         The measured inputs.
     delays : tuple of (str, str)
-        Inputs that are felt later, each with the parameter that says by how much.
+        Inputs that are felt later and sensors that are late, each with the parameter that says by how much.
+    observe : tuple of (str, str)
+        The sensors' names and what they see; empty where the states are seen as they are.
+    turning : tuple of str
+        Those of :attr:`channels` that are angles: a turn of an angle is a turn of what is seen.
     records : tuple of mapping of str to InputSignal
         What was measured of the inputs, record by record; empty until :meth:`with_inputs`.
     record : int
@@ -80,6 +85,7 @@ class FormulaModel(Model):
         "mass",
         "inputs",
         "delays",
+        "observe",
     )
 
     state_names: tuple[str, ...]  # type: ignore[misc]
@@ -90,6 +96,8 @@ class FormulaModel(Model):
     mass: tuple[tuple[str, ...], ...]
     inputs: tuple[str, ...]  # type: ignore[misc]
     delays: tuple[tuple[str, str], ...]
+    observe: tuple[tuple[str, str], ...]
+    turning: tuple[str, ...] = field(compare=False)
     records: tuple[Mapping[str, InputSignal], ...] = field(compare=False)
     record: int = field(compare=False)
 
@@ -108,6 +116,7 @@ class FormulaModel(Model):
         mass: Sequence[Sequence[Expression]] | None = None,
         inputs: Iterable[str] = (),
         delays: Mapping[str, str] | None = None,
+        observe: Mapping[str, Expression] | None = None,
     ) -> None:
         names = _names("states", states)
         if not 1 <= len(names) <= _MOST_STATES:
@@ -119,24 +128,30 @@ class FormulaModel(Model):
         for name in given:
             if not name.isidentifier():
                 raise ModelError(f"a parameter's name must be a single word, not {name!r}")
-        turning = _names("angles", angles)
-        for name in turning:
+        driven, sensors = _names("inputs", inputs), _sensors(observe)
+        turns = _names("angles", angles)
+        for name in turns:
             if name not in names:
                 raise ModelError(f"the angle {name!r} is no state; there are {', '.join(names)}")
-        driven = _names("inputs", inputs)
+        if twice := next((name for name in sensors if name in driven), None):
+            raise ModelError(f"a sensor has the name of the input {twice}")
         self._set(
             state_names=names,
             texts=_equations(names, equations),
             values=values,
-            angles=turning,
+            angles=turns,
             effects=(),
             mass=(),
             inputs=driven,
-            delays=_delays(driven, given, delays),
+            delays=_delays(driven, tuple(sensors), given, delays),
+            observe=tuple(sensors.items()),
+            turning=() if sensors else turns,
             records=(),
             record=0,
         )
         _core.model_parameters(self)  # which parses the equations
+        if sensors and turns:
+            self._set(turning=_turning(self))
         if mass:
             self._set(mass=_mass_matrix(self, mass))
         added = self._effects(effects)
@@ -163,6 +178,43 @@ class FormulaModel(Model):
     def equations(self) -> dict[str, str]:
         """Each state's rate as it was given, as text, without the effects that were added."""
         return dict(zip(self.state_names, self.texts, strict=True))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """What a measurement may hold: the sensors, or all states where none were given."""
+        return tuple(dict(self.observe)) or self.state_names
+
+    def observed(self, t: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
+        """What the sensors see of states (the output equation).
+
+        Parameters
+        ----------
+        t : array_like, shape (...)
+            Times; broadcast against the states.
+        states : array_like, shape (..., dim)
+
+        Returns
+        -------
+        ndarray, shape (..., c)
+            One column for each of :attr:`channels`. What is seen late is what the law makes of the state that
+            long before.
+
+        Raises
+        ------
+        ModelError
+            Numbers that are not finite, or shapes that do not fit.
+
+        Examples
+        --------
+        >>> import udd
+        >>> swing = udd.Model(
+        ...     ["theta", "w"], ["w", "-sin(theta)"], {"gain": 2.0}, observe={"volts": "gain*theta"}
+        ... )
+        >>> swing.observed(0.0, [0.3, 1.0])
+        array([0.6])
+        """
+        times, rows, shape = self._broadcast(t, states)
+        return _core.observed(self, times, rows).reshape(*shape, len(self.channels))
 
     @property
     def kinematic(self) -> tuple[str, ...]:
@@ -286,6 +338,7 @@ class FormulaModel(Model):
             delays=[delays.get(name) for name in self.inputs],
             records=[[record[name] for name in self.inputs] for record in self.records],
             record=self.record,
+            observe=[(name, text, delays.get(name), name in self.turning) for name, text in self.observe],
         )
 
     def _entered(self, slot: str) -> dict[str, str]:
@@ -399,6 +452,7 @@ class FormulaModel(Model):
             "mass": self.mass,
             "inputs": self.inputs,
             "delays": dict(self.delays),
+            "observe": dict(self.observe),
         }
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
@@ -464,7 +518,8 @@ class FormulaModel(Model):
         mass = f", mass={[list(row) for row in self.mass]!r}" if self.mass else ""
         inputs = f", inputs={list(self.inputs)!r}" if self.inputs else ""
         delays = f", delays={dict(self.delays)!r}" if self.delays else ""
-        more = f"{angles}{mass}{inputs}{delays}"
+        observe = f", observe={dict(self.observe)!r}" if self.observe else ""
+        more = f"{angles}{mass}{inputs}{delays}{observe}"
         text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{more})"
         return f"{text}.with_effects({list(self.effects)!r})" if self.effects else text
 
@@ -513,16 +568,47 @@ def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> 
     return mass
 
 
+def _sensors(observe: Mapping[str, Expression] | None) -> dict[str, str]:
+    """The sensors' formulas as text, by name."""
+    if not isinstance(observe, Mapping | None):
+        raise ModelError(f"observe must be a table of sensors and formulas, not {observe!r}")
+    given = {str(name): one for name, one in (observe or {}).items()}
+    for name in given:
+        if not name.isidentifier() or name == "t":
+            raise ModelError(f"a sensor's name must be a single word other than t, not {name!r}")
+    return {name: text_of(f"what {name} sees", one) for name, one in given.items()}
+
+
+def _turning(model: FormulaModel) -> tuple[str, ...]:
+    """The sensors for which a turn of an angle is a turn, whatever the parameters' values."""
+    values = {name: 1.1 * value + 0.0123 for name, value in model.values}
+    model = model._with(delays=()).with_parameters(values)
+    if model.inputs:
+        still = InputSignal([0.0, 1.0], [0.0, 0.0])
+        model = model.with_inputs(dict.fromkeys(model.inputs, still))
+    start = np.sin(np.arange(1.0, len(model.state_names) + 1))
+    found = set()
+    for name in model.angles:
+        turned = start + 2 * np.pi * (np.array(model.state_names) == name)
+        moved = np.abs(model.observed(0.0, turned) - model.observed(0.0, start))
+        found |= {model.channels[k] for k in np.flatnonzero(np.abs(moved - 2 * np.pi) < 1e-9)}
+    return tuple(name for name in model.channels if name in found)
+
+
 def _delays(
-    inputs: tuple[str, ...], parameters: Mapping[str, float], delays: Mapping[str, str] | None
+    inputs: tuple[str, ...],
+    sensors: tuple[str, ...],
+    parameters: Mapping[str, float],
+    delays: Mapping[str, str] | None,
 ) -> tuple[tuple[str, str], ...]:
-    """The inputs that are felt later, each with its parameter."""
+    """The inputs and sensors that are late, each with its parameter."""
     if not isinstance(delays, Mapping | None):
-        raise ModelError(f"delays must be a table of inputs and parameters, not {delays!r}")
+        raise ModelError(f"delays must be a table of inputs or sensors and parameters, not {delays!r}")
     for name, parameter in (delays or {}).items():
-        if name not in inputs:
+        if name not in inputs and name not in sensors:
+            more = f" and the sensors {', '.join(sensors)}" if sensors else ""
             raise ModelError(
-                f"there is a delay of {name!r}, but the inputs are {', '.join(inputs) or 'none'}"
+                f"there is a delay of {name!r}, but the inputs are {', '.join(inputs) or 'none'}{more}"
             )
         if parameter not in parameters:
             known = ", ".join(parameters) or "none"

@@ -23,6 +23,7 @@ def mechanism(
     angles: Iterable[str] = (),
     inputs: Iterable[str] = (),
     delays: Mapping[str, str] | None = None,
+    observe: Mapping[str, Expression] | None = None,
 ) -> FormulaModel:
     """Make a model of a mechanism from its equations of motion ``M(q) q'' = f(q, q', u, t)``.
 
@@ -37,7 +38,7 @@ def mechanism(
         The mass matrix M, symmetric.
     forces : sequence of formula, shape (n,)
         The generalised forces f, those of gravity and those of Coriolis among them.
-    parameters, angles, inputs, delays
+    parameters, angles, inputs, delays, observe
         As for :class:`udd.Model`.
 
     Returns
@@ -85,6 +86,7 @@ def mechanism(
         mass=rows,
         inputs=inputs,
         delays=delays,
+        observe=observe,
     )
 
 

@@ -37,7 +37,11 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         if model.mass:
             own["mass"] = [list(row) for row in model.mass]
         if model.inputs:
-            own |= {"inputs": list(model.inputs), "delays": dict(model.delays)}
+            own["inputs"] = list(model.inputs)
+        if model.delays:
+            own["delays"] = dict(model.delays)
+        if model.observe:
+            own["observe"] = dict(model.observe)
         return own
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}

@@ -177,7 +177,10 @@ def measured(discovery: Discovery) -> str:
     sd = np.median(fit.noise.sd(fit.record, fit.states[:, 0]), axis=0)
     seen = [(name, s) for name, s in zip(fit.channels, sd, strict=True) if np.isfinite(s)]
     noise = ", ".join(f"{s:.2g} in {name}" for name, s in seen)
+    assert isinstance(fit.model, FormulaModel)
     hidden = [name for name in fit.channels if name not in m.names]
+    if fit.model.observe:
+        hidden = [f"{name} = {text}" for name, text in fit.model.observe if name not in m.names]
     what = f"{', '.join(m.names)} in {len(m)} frames over {m.duration:.4g} s"
     rest = f" Not seen: {', '.join(hidden)}." if hidden else ""
     return f"{what}; noise as the record shows it: {noise}.{rest}"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from udd.errors import FitError
 from udd.fitting import UNEXPLAINED, Fit, Record, filtered, predicted
 from udd.fitting.sensor import reads
+from udd.models.formula_model import FormulaModel
 
 Array = NDArray[np.float64]
 #: A ratio and its 95 % interval.
@@ -113,8 +114,8 @@ def held_out_errors(
     firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
-    seen = record.seen[ends]
-    there = _fully_observed(record)[ends]
+    seen = np.where(record.observed[ends], record.seen[ends], np.nan)
+    there = _comparable(fit, record)[ends]
     found = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
     samples = np.where(there, _distance(fit, record, found, seen), np.nan)
 
@@ -227,7 +228,8 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
         error, _low, _high, floor = errors.at(comparison_horizon(errors))
     size = 1.0
     if errors.unit != "spread":
-        places = record.seen[held_out & _fully_observed(record)][:, : 2 if errors.unit == "m" else 1]
+        complete = held_out & record.observed.all(axis=1)
+        places = record.seen[complete][:, : 2 if errors.unit == "m" else 1]
         size = float(np.sqrt(places.var(axis=0).sum()))
     return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
 
@@ -289,8 +291,8 @@ def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_]) -> Array:
         found = predicted(
             fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
         )[0]
-        errors[own] = _distance(fit, record, found, record.seen[own])
-    result: Array = np.where(_fully_observed(record), errors, np.nan)[held_out]
+        errors[own] = _distance(fit, record, found, np.where(record.observed[own], record.seen[own], np.nan))
+    result: Array = np.where(_comparable(fit, record), errors, np.nan)[held_out]
     return result
 
 
@@ -331,7 +333,7 @@ def _floor(
     starts = length * np.arange(n)
     _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
     runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
-    there = _fully_observed(record)[ends]
+    there = _comparable(fit, record)[ends]
     errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
     result: Array = np.nanmedian(errors, axis=0)
     return result
@@ -353,9 +355,12 @@ def _shown(fit: Fit, record: Record) -> Array | float:
     return result
 
 
-def _fully_observed(record: Record) -> NDArray[np.bool_]:
-    """The frames in which everything was seen that the record sees at all, (n,)."""
-    result: NDArray[np.bool_] = np.asarray(record.observed[:, record.observed.any(axis=0)].all(axis=1))
+def _comparable(fit: Fit, record: Record) -> NDArray[np.bool_]:
+    """The frames in which two motions can be compared, (n,): of a user's own model any sensor will do."""
+    seen = record.observed[:, record.observed.any(axis=0)]
+    result: NDArray[np.bool_] = np.asarray(
+        seen.any(axis=1) if fit.model.profile.written else seen.all(axis=1)
+    )
     return result
 
 
@@ -372,10 +377,11 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
     squares = []
     for k in np.flatnonzero(record.observed.any(axis=0)):
         spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
-        angle = fit.model.state_names[k] in fit.model.angles
+        angle = isinstance(fit.model, FormulaModel) and fit.channels[k] in fit.model.turning
         own = _turned(difference[..., k]) if angle else difference[..., k]
         squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
-    result = np.sqrt(np.mean(squares, axis=0))
+    known = np.count_nonzero(np.isfinite(squares), axis=0)
+    result = np.sqrt(np.nansum(squares, axis=0) / np.where(known, known, np.nan))
     return result
 
 

@@ -1,0 +1,75 @@
+"""A first guess of states from what sensors saw: the output equation inverted, frame by frame."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.models.formula_model import FormulaModel
+
+Array = NDArray[np.float64]
+
+_STEP = 1e-5  # of a difference quotient
+_FIRST, _NEXT = 30, 3  # Gauss-Newton steps of the first frame, and of those after it
+_RESOLVED = 0.9  # diagonal of the resolution matrix from which on a state is told by the sensors
+_SINGULAR = 1e-3  # relative singular value below which a combination of states is not seen
+_FARTHEST = 1.0  # rad or unit: the longest step
+
+
+class Inverted(NamedTuple):
+    """States as sensors show them.
+
+    Attributes
+    ----------
+    states : ndarray (n, d)
+        Zero, or as they started, where nothing shows them.
+    shown : ndarray of bool (d,)
+        Which states the sensors of one frame show.
+    slopes : ndarray (n, d, c)
+        By what each state changes with each sensor.
+    """
+
+    states: Array
+    shown: NDArray[np.bool_]
+    slopes: Array
+
+
+def inverted(
+    model: FormulaModel, t: Array, seen: dict[str, Array], noise: dict[str, float], start: Array
+) -> Inverted:
+    """Invert the output equation by Gauss-Newton steps of least length, each frame from the one before.
+
+    Parameters
+    ----------
+    model : FormulaModel
+    t : ndarray (n,)
+    seen : dict of str to ndarray (n,)
+        What some of the sensors saw, without gaps.
+    noise : dict of str to float
+        Their noise, which weighs them.
+    start : ndarray (d,)
+        Where the first frame starts.
+    """
+    model = model._with(delays=tuple(pair for pair in model.delays if pair[0] in model.inputs))
+    columns = [model.channels.index(name) for name in seen]
+    values = np.column_stack(list(seen.values()))
+    weights = 1.0 / np.array([noise[name] for name in seen])
+    n, d = len(t), len(start)
+    steps = _STEP * np.vstack([np.eye(d), -np.eye(d)])
+    states, slopes = np.empty((n, d)), np.empty((n, d, len(columns)))
+    resolution = np.empty((n, d))
+    now = start.astype(np.float64)
+    for k in range(n):
+        for _ in range(_NEXT if k else _FIRST):
+            around = model.observed(t[k], now + np.vstack([np.zeros(d), steps]))[:, columns]
+            jacobian = (around[1 : d + 1] - around[d + 1 :]).T / (2.0 * _STEP) * weights[:, None]
+            inverse = np.linalg.pinv(jacobian, rcond=_SINGULAR)
+            change = inverse @ (weights * (values[k] - around[0]))
+            now = now + change * min(1.0, _FARTHEST / max(float(np.abs(change).max()), 1e-300))
+            if np.abs(change).max() < 1e-9:
+                break
+        states[k], slopes[k] = now, inverse * weights
+        resolution[k] = np.diag(inverse @ jacobian)
+    return Inverted(states, np.median(resolution, axis=0) > _RESOLVED, slopes)

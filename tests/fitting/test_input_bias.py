@@ -1,0 +1,52 @@
+"""Bias by an input's noise, and the warning of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+from udd.errors import FitError
+
+T = np.arange(0.0, 15.0, 0.02)
+ARM = udd.Model(
+    ["q", "v"], ["v", "-k*sin(q) - c*v + g*u"], {"k": 9.0, "c": 0.2, "g": 2.0}, angles=["q"], inputs=["u"]
+)
+
+
+def record(seed: int, noise: float) -> udd.Measurement:
+    rng = np.random.default_rng(seed)
+    drive = np.sin(1.3 * T + rng.uniform(0, 6)) + 0.5 * np.sin(3.7 * T + rng.uniform(0, 6))
+    run = udd.simulate(ARM, T, [0.3, 0.0], inputs={"u": drive}, method="auto")
+    seen = run.q + 1e-3 * rng.normal(size=len(T))
+    return udd.Measurement(T, {"q": seen}, inputs={"u": drive + noise * rng.normal(size=len(T))})
+
+
+def test_extrapolation_takes_the_bias_of_the_gain_away() -> None:
+    off = ARM.with_parameters({"k": 8.0, "c": 0.4, "g": 1.5})
+    plain, corrected = [], []
+    for seed in range(12):
+        found = udd.fit(record(seed, 0.3), off)
+        plain.append(found.parameters["g"])
+        corrected.append(udd.input_bias(found).corrected["g"])
+    # Of twelve records the plain gain is too small beyond doubt; the corrected one's mean is the truth.
+    error = np.std(plain, ddof=1) / np.sqrt(12)
+    assert np.mean(plain) < 2.0 - 4.0 * error
+    assert abs(np.mean(corrected) - 2.0) < 3.0 * np.std(corrected, ddof=1) / np.sqrt(12)
+    assert abs(np.mean(corrected) - 2.0) < 0.5 * abs(np.mean(plain) - 2.0)
+
+
+def test_an_input_that_scatters_is_told() -> None:
+    noisy, clean = udd.fit(record(0, 0.3), ARM), udd.fit(record(0, 0.0), ARM)
+    (told,) = noisy.doubts.inputs
+    assert told.name == "u" and abs(told.noise / 0.3 - 1.0) < 0.2
+    assert "warning: the input u scatters by 0.2" in noisy.summary()
+    assert not clean.doubts.inputs
+
+
+def test_a_model_without_inputs_has_no_such_bias() -> None:
+    t = np.arange(0.0, 5.0, 0.02)
+    swing = udd.Model(["q", "v"], ["v", "-k*q"], {"k": 4.0})
+    fit = udd.fit(udd.Measurement(t, {"q": np.cos(2 * t) + 1e-3 * np.sin(77 * t)}), swing)
+    with pytest.raises(FitError, match="the model has no inputs whose noise could bias it"):
+        udd.input_bias(fit)
