@@ -1,4 +1,4 @@
-"""Fits of models that are seen through sensors: gains, offsets, delays, rates, steps and clocks of their own."""
+"""Fits of models that are seen through sensors: gains, offsets, delays, and rates of their own."""
 
 from __future__ import annotations
 

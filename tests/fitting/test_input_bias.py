@@ -42,6 +42,11 @@ def test_an_input_that_scatters_is_told() -> None:
     assert told.name == "u" and abs(told.noise / 0.3 - 1.0) < 0.2
     assert "warning: the input u scatters by 0.2" in noisy.summary()
     assert not clean.doubts.inputs
+    # That noise is no sign of a missing effect: it makes g sigma/sqrt(2) = 0.42 of v' or some more.
+    assert not noisy.doubts.missing and noisy.doubts.factor == 1.0
+    assert "the inputs' noise makes 0.5" in noisy.summary()
+    for name in ("k", "c"):
+        assert abs(noisy.parameters[name] - ARM.parameters[name]) < 4.0 * noisy.errors[name]
 
 
 def test_a_model_without_inputs_has_no_such_bias() -> None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd import _core
+from udd.models.formula_model import FormulaModel
 
-from .input_noise import NoisyInput, noisy_inputs
+from .input_noise import NoisyInput, noisy_inputs, rates_by_noise
 from .parameters import Free
 from .sensor import is_film, lattice, moving
 
@@ -24,6 +25,7 @@ _COLOURED = 1e-8
 #: last itself.
 _NEARLY = 1
 _OFF = 3.0  # standard deviations from what was stated
+_BY_INPUT = 3.5  # times what the inputs' noise makes that the model's error may be: levels are as far apart
 _LEAST = 30  # frames of which innovations tell anything
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
@@ -132,6 +134,8 @@ class Diagnostics:
         Whether it is a film, whose own faults leave a right model's innovations coloured.
     inputs : list of NoisyInput
         The inputs whose samples scatter.
+    by_inputs : list of float
+        What their noise makes of the rates that are missed, r.m.s. over a frame, if it makes all of that.
     """
 
     missed: list[ModelError]
@@ -143,6 +147,7 @@ class Diagnostics:
     rests: float | None = None
     filmed: bool = False
     inputs: list[NoisyInput] = field(default_factory=list)
+    by_inputs: list[float] = field(default_factory=list)
 
     @property
     def coloured(self) -> list[str]:
@@ -153,15 +158,18 @@ class Diagnostics:
     def missing(self) -> bool:
         """Whether the model lacks something.
 
-        Of a film colour alone does not tell: its faults, like those of a lens, make some.
+        Of a film colour alone does not tell: its faults, like those of a lens, make some. So does an input's
+        noise, which goes on in the motion.
         """
-        return not self.tight or (bool(self.coloured) and not self.filmed)
+        return not self.tight or (bool(self.coloured) and not self.filmed and not self.by_inputs)
 
     @property
     def verdict(self) -> str:
         """In a sentence."""
         if self.missing:
             return "something is missing: run udd discover"
+        if self.by_inputs:
+            return "nothing shows that something is missing beside the noise of what drives it"
         if self.coloured:
             return "what is left is not white, by a fault of the film or something small: run udd discover"
         return "nothing shows that something is missing"
@@ -172,7 +180,10 @@ class Diagnostics:
         said = [self.verdict]
         rates = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.missed)
         right = ", ".join(f"{m.right:.2g} {m.unit}".rstrip() for m in self.missed)
-        if not self.tight:
+        if self.by_inputs:
+            made = ", ".join(f"{one:.2g}" for one in self.by_inputs)
+            said.append(f"the model misses {rates}, r.m.s. over a frame; the inputs' noise makes {made}")
+        elif not self.tight:
             said.append(
                 f"the model misses {rates}, r.m.s. over a frame; a right one would miss less than {right}"
             )
@@ -217,13 +228,16 @@ class Diagnostics:
 def doubts(fit: Fit) -> Diagnostics:
     """What a fit shows of its own faults."""
     last = len(fit.problem.schedule) - 1
+    noisy = noisy_inputs(fit.measurements, fit.model.inputs)
+    missed, white = _missed(fit), _white(fit)
     tight = fit.level >= last - _NEARLY
-    white = _white(fit)
+    by_inputs = [] if tight else _by_inputs(fit, missed, noisy)
+    tight = tight or bool(by_inputs)
     # An error of the model that goes with a parameter's own effect, always one way, moves it by as many
     # standard errors as the square root of the number of independent ones that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if not tight else 1.0
     return Diagnostics(
-        _missed(fit),
+        missed,
         tight,
         white,
         ran_off(fit),
@@ -231,7 +245,8 @@ def doubts(fit: Fit) -> Diagnostics:
         readings(fit),
         _rests(fit),
         is_film(fit.measurement),
-        noisy_inputs(fit.measurements, fit.model.inputs),
+        noisy,
+        by_inputs,
     )
 
 
@@ -266,6 +281,18 @@ def rate_of(state: str) -> str:
     return {"Omega": "angular accelerations", "Y": "velocities of Y", "Z": "velocities of Z"}.get(
         state, f"{state}'"
     )
+
+
+def _by_inputs(fit: Fit, missed: list[ModelError], noisy: list[NoisyInput]) -> list[float]:
+    """What the inputs' noise makes of the rates that are missed; empty where that is not all of it."""
+    model = fit.model
+    if not noisy or not isinstance(model, FormulaModel):
+        return []
+    own = fit.record.film == 0
+    made = rates_by_noise(model, fit.record.t[own], fit.states[own], noisy)
+    found = [float(made[model.state_names.index(one.state)]) for one in missed]
+    enough = all(one.needed <= _BY_INPUT * by for one, by in zip(missed, found, strict=True))
+    return found if enough else []
 
 
 def _missed(fit: Fit) -> list[ModelError]:
