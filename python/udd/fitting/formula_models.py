@@ -93,7 +93,26 @@ def guessed(
             columns.append(np.zeros(len(t)))
     states = np.column_stack(columns)
     given = {name: value for name, value in (state0 or {}).items() if name not in seen}
+    if not given:
+        given = _off_the_edge(model, t, states, seen)
     return _followed(model, t, states, given) if given else states
+
+
+def _off_the_edge(
+    model: FormulaModel, t: Array, states: Array, seen: Mapping[str, Array]
+) -> dict[str, float]:
+    """Starts of hidden states where their law does not go on beyond zero, as that of a tank's level does not.
+
+    They are as large as what is seen.
+    """
+    size = float(np.median(np.abs(np.concatenate([np.asarray(one) for one in seen.values()]))))
+    hidden = [k for k, name in enumerate(model.state_names) if name not in seen and not states[:, k].any()]
+    result = {}
+    for k in hidden:
+        aside = states[0] - 1e-3 * size * (np.arange(states.shape[1]) == k)
+        if not np.isfinite(model.rates(t[0], aside)).all():
+            result[model.state_names[k]] = size
+    return result
 
 
 def _behind(

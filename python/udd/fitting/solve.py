@@ -12,6 +12,7 @@ from udd import _core
 from udd.errors import FitError, ModelError
 from udd.measurement import Measurement
 from udd.models import Model
+from udd.models.formula_model import FormulaModel
 
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .problem import Fit, Point, Problem
@@ -93,6 +94,18 @@ def _said(error: ValueError, problem: Problem) -> str:
             if len(together) > 1
             else f"the data say nothing of {together[0]}; give it a prior, or hold it"
         )
+    model = problem.models[0]
+    if "do not determine the state" in str(error) and isinstance(model, FormulaModel):
+        shown = problem.record.observed.any(axis=0).tolist()
+        seen = {name for name, there in zip(model.channels, shown, strict=True) if there}
+        hidden = [name for name in model.state_names if name not in seen]
+        asked = ", ".join(f"'{name}': ..." for name in hidden)
+        if hidden:
+            is_not = "is" if len(hidden) == 1 else "are"
+            return (
+                f"the fit failed: {error}; {', '.join(hidden)} {is_not} not seen: "
+                f"say where the motion starts, state0={{{asked}}}"
+            )
     return f"the fit failed: {error}"
 
 
