@@ -60,7 +60,9 @@ from .models import DLE as DLE
 from .models import Disk as Disk
 from .models import Model as Model
 from .models import Pendulum as Pendulum
+from .models import driven_disk as driven_disk
 from .models import mechanism as mechanism
+from .models import moved_pendulum as moved_pendulum
 from .models import pendulum_chain as pendulum_chain
 from .result_file import load as load
 from .result_file import save as save

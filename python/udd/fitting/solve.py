@@ -96,8 +96,8 @@ def _said(error: ValueError, problem: Problem) -> str:
         )
     model = problem.models[0]
     if "do not determine the state" in str(error) and isinstance(model, FormulaModel):
-        shown = problem.record.observed.any(axis=0).tolist()
-        seen = {name for name, there in zip(model.channels, shown, strict=True) if there}
+        sigma = dict(zip(model.channels, problem.record.sigma.T, strict=True))
+        seen = {name for name, own in sigma.items() if np.isfinite(own).any()}
         hidden = [name for name in model.state_names if name not in seen]
         asked = ", ".join(f"'{name}': ..." for name in hidden)
         if hidden:

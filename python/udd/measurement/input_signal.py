@@ -82,6 +82,27 @@ class InputSignal:
         """The same signal later by so much [s]."""
         return InputSignal(self.t + by, self.values, self.hold)
 
+    def rate(self) -> InputSignal:
+        """Its derivative [per s]: of straight lines held steps, of a cubic spline one through its slopes.
+
+        Raises
+        ------
+        MeasurementError
+            A held input, which jumps.
+
+        Examples
+        --------
+        >>> import udd
+        >>> udd.InputSignal([0.0, 1.0, 2.0], [0.0, 3.0, 3.0]).rate()([0.5, 1.5])
+        array([3., 0.])
+        """
+        if self.hold == "zero":
+            raise MeasurementError("an input that is held jumps and has no rate: join its samples first")
+        slopes = self.pieces[:, 1]
+        last = np.diff(self.t[-2:])[0] ** np.arange(4)
+        end = float(np.arange(1, 4) * self.pieces[-1, 1:] @ last[:3])
+        return InputSignal(self.t, np.append(slopes, end), "zero" if self.hold == "linear" else "cubic")
+
     def lacks(self, start: float, end: float, slack: float, whose: str) -> str:
         """What it lacks of a span of time, but for so much at its ends, in words; empty where nothing."""
         first, last = self.span

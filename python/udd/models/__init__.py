@@ -6,6 +6,7 @@ from .base import Model, require_model
 from .compiled import beyond_the_edge
 from .disk import Disk
 from .dle import DLE
+from .driven import driven_disk, moved_pendulum
 from .mechanisms import mechanism, pendulum_chain
 from .pendulum import Pendulum
 from .registry import profile_of
@@ -16,7 +17,9 @@ __all__ = [
     "Model",
     "Pendulum",
     "beyond_the_edge",
+    "driven_disk",
     "mechanism",
+    "moved_pendulum",
     "pendulum_chain",
     "profile_of",
     "require_model",
