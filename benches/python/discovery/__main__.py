@@ -8,7 +8,8 @@ on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.
 10 times each), "nulls" (no effect: all the camera's defects together, and each alone and strong), "sensors"
 (no effect: a disk, a pendulum and a cart, whose sensors have steps, are slow, hum, drift, are read 1000 times
 a second, or whose support moves), "films" (no effect, by way of a film and the tracker), "machines"
-(simulated twins of real pendulums, sliders and the like, each under three sets of options). The limit is the
+(simulated twins of real pendulums, sliders and the like, each under three sets of options), "driven"
+(machines with a measured input, their sensors quantised and slow; also without an effect). The limit is the
 amplitude at which chi2 is expected to fall by what it takes to be accepted. Drives, starts, devices, cameras,
 laws, shapes and sizes are drawn from the seed, which was fixed before the first run. The generator shares no
 code with udd.
@@ -27,13 +28,16 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # the jobs are what runs in parallel
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import driven_machines
+import machines
 import table
 from cases import BATCHES, cases
 from machined import MachineScore, machine_line, machine_report, machine_score
 from machines import machine_cases
 from scoring import Score, score
 
-MACHINES = "machines"
+#: Batches of machines: what is drawn, and how it is handed over.
+MACHINES = {"machines": (machines.KINDS, machines.OPTIONS), "driven": (driven_machines.KINDS, ("default",))}
 
 SEED = 20261204
 
@@ -44,7 +48,7 @@ def main() -> int:
         prog="discovery", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, MACHINES))}"
+        "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, *MACHINES))}"
     )
     parser.add_argument("--records", type=int, default=1, help="of each kind in each batch")
     parser.add_argument("--only", default="", help="words of which a case's title must hold one")
@@ -57,15 +61,15 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write every record's score there too")
     given = parser.parse_args()
     batches = given.batches.split(",")
-    unknown = set(batches) - {*BATCHES, MACHINES}
+    unknown = set(batches) - {*BATCHES, *MACHINES}
     if unknown:
         parser.error(
-            f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join((*BATCHES, MACHINES))}"
+            f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join((*BATCHES, *MACHINES))}"
         )
     words = [word for word in given.only.split(",") if word]
-    wanted = [case for batch in batches if batch != MACHINES for case in cases(batch, given.records)]
+    wanted = [case for batch in batches if batch not in MACHINES for case in cases(batch, given.records)]
     wanted = [case for case in wanted if not words or any(word in case.title for word in words)]
-    twins = list(machine_cases(given.records)) if MACHINES in batches else []
+    twins = [case for b in batches if b in MACHINES for case in machine_cases(given.records, *MACHINES[b])]
     twins = [case for case in twins if not words or any(word in case.label for word in words)]
 
     scores: list[Score] = []

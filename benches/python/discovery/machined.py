@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from typing import Any
 
+import driven_machines
+import machines
 import numpy as np
 from machines import MachineCase, drawn
 
@@ -19,6 +21,7 @@ import udd
 _MEANS = {
     "dry": r"coulomb|stribeck|dry_.*|tanh_.*",
     "viscous": r"[vw]_in_[vw]|.*viscous.*",
+    "offset": r"constant_in_v",
     "joints": r"viscous_friction_(along_a|between_a_and_b)",
     "quadratic": r"quadratic_drag|abs_v_v_in_v|v2_in_v",
     "cubic": r"cubic_drag|v3_in_v",
@@ -58,7 +61,7 @@ def machine_score(case: MachineCase, seed: int) -> MachineScore:
     """Draw the record, look for what its model lacks, compare with the truth."""
     result = MachineScore(case.title, case.number, case.options)
     try:
-        machine = drawn(case, seed)
+        machine = drawn(case, seed, machines.KINDS | driven_machines.KINDS)
         result.lacks = list(machine.lacks)
         measurement, options = machine.asked(case.options)
         begin = time.perf_counter()

@@ -7,7 +7,7 @@ and rests there as long as friction holds it. No code of udd's models is used bu
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -307,7 +307,9 @@ _PENDULUMS = {
     for lacks in (*_FRICTIONS, ())
     for encoder in (True, False)
 }
-KINDS: dict[str, tuple[Callable[..., Machine], tuple[str, ...], bool]] = _PENDULUMS | {
+#: What draws a machine, what it lacks, and whether an encoder reads it.
+Kind = tuple[Callable[..., Machine], tuple[str, ...], bool]
+KINDS: dict[str, Kind] = _PENDULUMS | {
     "slider: dry": (slider, ("dry",), False),
     "slider: dry + viscous": (slider, ("dry", "viscous"), False),
     "circuit: cubic spring": (circuit, ("cubic spring",), True),
@@ -339,15 +341,17 @@ class MachineCase:
         return f"{self.title}; {self.options}"
 
 
-def machine_cases(records: int) -> Iterator[MachineCase]:
+def machine_cases(
+    records: int, kinds: Iterable[str], options: Sequence[str] = OPTIONS
+) -> Iterator[MachineCase]:
     """`records` of each kind, under each of the options."""
     for number in range(records):
-        for title in KINDS:
-            yield from (MachineCase(title, number, options) for options in OPTIONS)
+        for title in kinds:
+            yield from (MachineCase(title, number, one) for one in options)
 
 
-def drawn(case: MachineCase, seed: int) -> Machine:
+def drawn(case: MachineCase, seed: int, kinds: Mapping[str, Kind] = KINDS) -> Machine:
     """The record of a case; the same for the same seed, whatever the options and what is known."""
-    make, lacks, encoder = KINDS[case.title]
+    make, lacks, encoder = kinds[case.title]
     title = case.title.removesuffix(" with mass").encode()
     return make(lacks, encoder, np.random.default_rng([seed, zlib.crc32(title), case.number]))

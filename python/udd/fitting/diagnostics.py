@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from udd import _core
 from udd.models.formula_model import FormulaModel
 
-from .input_noise import NoisyInput, noisy_inputs, rates_by_noise
+from .input_noise import NoisyInput, diffusion_by_noise, noisy_inputs
 from .parameters import Free
 from .sensor import is_film, lattice, moving
 
@@ -285,12 +285,12 @@ def rate_of(state: str) -> str:
 
 def _by_inputs(fit: Fit, missed: list[ModelError], noisy: list[NoisyInput]) -> list[float]:
     """What the inputs' noise makes of the rates that are missed; empty where that is not all of it."""
-    model = fit.model
-    if not noisy or not isinstance(model, FormulaModel):
+    models = [model for model in fit.models if isinstance(model, FormulaModel)]
+    if not noisy or not models:
         return []
-    own = fit.record.film == 0
-    made = rates_by_noise(model, fit.record.t[own], fit.states[own], noisy)
-    found = [float(made[model.state_names.index(one.state)]) for one in missed]
+    step = float(np.median(np.diff(fit.record.t)))
+    made = diffusion_by_noise(models, replace(fit.record, states=fit.states)) / np.sqrt(step)
+    found = [float(made[models[0].state_names.index(one.state)]) for one in missed]
     enough = all(one.needed <= _BY_INPUT * by for one, by in zip(missed, found, strict=True))
     return found if enough else []
 

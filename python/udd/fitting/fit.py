@@ -16,6 +16,7 @@ from udd.models.formula_model import FormulaModel
 
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
+from .input_noise import diffusion_by_noise
 from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
@@ -137,6 +138,10 @@ def fit_record(
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], FormulaModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
+        written = [own for own in models if isinstance(own, FormulaModel)]
+        if search and written[0].inputs:  # a fit finds out by itself how tightly the model is held
+            noise = diffusion_by_noise(written, record)
+            schedule = tuple(tuple(np.hypot(level, noise).tolist()) for level in schedule)
     else:
         schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)

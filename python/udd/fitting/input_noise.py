@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +12,17 @@ from numpy.typing import NDArray
 from udd.measurement import InputSignal, Measurement
 from udd.models.formula_model import FormulaModel
 
-from .sensor import roughness
+from .record import Record
 
-__all__ = ["NoisyInput", "noise_of", "noisy_inputs", "rates_by_noise"]
+__all__ = ["NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
 
 Array = NDArray[np.float64]
 
 #: Of an input's variance, from which on its noise is told: as much too small a factor of it may come out.
 _TOLD = 0.01
+_ORDERS = (4, 8)  # of the differences of samples
+_WHITE = 0.8  # of the noise by the lower order that the higher one must show
+_SHORTEST = 50  # samples
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,21 @@ class NoisyInput:
 
 
 def noise_of(signal: InputSignal) -> float:
-    """The noise of an input's samples, from the least of what differences of several orders show."""
-    return float(roughness(signal.values[:, None])[0])
+    """The noise of an input's samples; 0 where none is told from what the input does itself.
+
+    Differences of a high order show what is left near the highest frequency that the samples hold. Noise of
+    a sensor is white there: orders agree. A drive that reaches up to there is not, and they do not.
+    """
+    if len(signal) < _SHORTEST:
+        return 0.0
+    lower, higher = (_by_differences(signal.values, order) for order in _ORDERS)
+    return higher if higher > _WHITE * lower else 0.0
+
+
+def _by_differences(values: Array, order: int) -> float:
+    """The standard deviation of white noise that makes differences of this order as large as they are."""
+    size = np.median(np.abs(np.diff(values, order))) / 0.6745
+    return float(size / np.sqrt(math.comb(2 * order, order)))
 
 
 def noisy_inputs(measurements: tuple[Measurement, ...], names: tuple[str, ...]) -> list[NoisyInput]:
@@ -55,19 +73,21 @@ def noisy_inputs(measurements: tuple[Measurement, ...], names: tuple[str, ...]) 
     return found
 
 
-def rates_by_noise(model: FormulaModel, t: Array, states: Array, noisy: list[NoisyInput]) -> Array:
-    """What the noise of inputs makes of each state's rate, r.m.s. over a step of `t`, (d,).
+def diffusion_by_noise(models: Sequence[FormulaModel], record: Record) -> Array:
+    """What the noise of inputs adds to the states' model error, per square root of the unit of time, (d,).
 
     Errors of samples that are independent add up as a random walk does, to first order.
     """
-    plain = model.rates(t, states)
-    step = float(np.median(np.diff(t)))
-    squares = np.zeros(states.shape[1])
-    for one in noisy:
-        signal = model.records[model.record][one.name]
-        moved = InputSignal(signal.t, signal.values + one.noise, signal.hold)
-        signals = {**model.records[model.record], one.name: moved}
-        change = model.with_inputs(signals).rates(t, states) - plain
-        squares += np.mean(change**2, axis=0) * float(np.median(np.diff(signal.t))) / step
-    result: Array = np.sqrt(squares)
+    squares = np.zeros((len(models), record.states.shape[1]))
+    for film, model in enumerate(models):
+        own = record.film == film
+        t, states = record.t[own], record.states[own]
+        plain = model.rates(t, states)
+        for name in model.inputs:
+            signal = model.records[model.record][name]
+            moved = InputSignal(signal.t, signal.values + noise_of(signal), signal.hold)
+            noised = model.with_inputs({**model.records[model.record], name: moved})
+            step = float(np.median(np.diff(signal.t)))
+            squares[film] += np.mean((noised.rates(t, states) - plain) ** 2, axis=0) * step
+    result: Array = np.sqrt(squares.mean(axis=0))
     return result
