@@ -95,7 +95,17 @@ MODELS: list[Any] = [
         "parameters": {"k": 1.0},
         "angles": ["x"],
         "state0": {"v": 0.1},
-    }
+    },
+    {
+        "states": ["q", "v"],
+        "equations": {"q": "v", "v": "(torque - c*v)/J"},
+        "parameters": {"J": 1.0, "c": 0.1, "gain": 2.0, "late": 0.0},
+        "angles": ["q"],
+        "mass": [["J"]],
+        "inputs": ["torque"],
+        "observe": {"volts": "gain*q", "gyro": "v"},
+        "delays": {"torque": "late", "gyro": "late"},
+    },
 ]
 STARTS: list[Any] = [
     {
