@@ -18,6 +18,7 @@ from .output import is_terminal
 if TYPE_CHECKING:
     from udd.measurement import Measurement
     from udd.models import Model
+    from udd.models.formula_model import FormulaModel
 
 _FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".3gp"}
 _CUT = 0.01  # share of the promised frames that may be missing
@@ -138,14 +139,15 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
         if args.model is not None:
             there = columns_of(args.file, args.columns)
             model = own_model(args)
-            states = [name for name in model.state_names if name in there]
+            states = [name for name in model.channels if name in there]
             if not states:
+                what = "sensor" if model.observe else "state"
                 raise UddError(
-                    f"{args.file} has columns {', '.join(there)}, none of which is a state of {args.model}: "
-                    f"{', '.join(model.state_names)}"
+                    f"{args.file} has columns {', '.join(there)}, none of which is a {what} of {args.model}: "
+                    f"{', '.join(model.channels)}"
                 )
             if inputs is None:
-                inputs = [name for name in getattr(model, "inputs", ()) if name in there]
+                inputs = [name for name in model.inputs if name in there]
         measurement = read_measurement(
             args.file,
             args.columns,
@@ -215,15 +217,15 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
     return disk(args, W, 0.08 if R is None else R)
 
 
-def own_model(args: argparse.Namespace) -> Model:
+def own_model(args: argparse.Namespace) -> FormulaModel:
     """The user's own model, from its file."""
-    from udd.models.serialization import model_from_dict
+    from udd.models.serialization import formula_model_from_dict
 
     if args.pendulum is not None or args.W is not None:
         raise UddError("--model says everything of the model: --pendulum and --W do not apply")
     data = _own(args)
     data.pop("state0", None)
-    return model_from_dict({"kind": "formula"} | data)
+    return formula_model_from_dict(data)
 
 
 def start_of(args: argparse.Namespace) -> Any:

@@ -590,7 +590,8 @@ def _turning(model: FormulaModel) -> tuple[str, ...]:
     found = set()
     for name in model.angles:
         turned = start + 2 * np.pi * (np.array(model.state_names) == name)
-        moved = np.abs(model.observed(0.0, turned) - model.observed(0.0, start))
+        with np.errstate(all="ignore"):  # where a formula has no value it shows no turn either
+            moved = np.abs(model.observed(0.0, turned) - model.observed(0.0, start))
         found |= {model.channels[k] for k in np.flatnonzero(np.abs(moved - 2 * np.pi) < 1e-9)}
     return tuple(name for name in model.channels if name in found)
 

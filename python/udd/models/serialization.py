@@ -66,15 +66,7 @@ def model_from_dict(data: object) -> Model:
     given = table("the model", data)
     kind = given.pop("kind", None)
     if kind in (_FORMULA, FormulaModel.kind):
-        if isinstance(given.get("effects"), list):
-            given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
-        given = table("a model of your own", given, _OWN, needed=_OWN[:2])
-        try:
-            return FormulaModel(**given | {"parameters": dict(given.get("parameters", {}))})
-        except UddError:
-            raise
-        except (TypeError, ValueError) as error:
-            raise ModelError(f"the model cannot be read: {error}") from None
+        return formula_model_from_dict(given)
     if not isinstance(kind, str) or kind not in COMPILED:
         raise ModelError(f"the model's kind must be one of {', '.join((*COMPILED, _FORMULA))}, not {kind!r}")
     if "effects" in given:
@@ -84,6 +76,27 @@ def model_from_dict(data: object) -> Model:
     cls = COMPILED[kind]
     known = (*cls._plain, *cls._options)
     return cls(**table(f"a {kind}", given, known, needed=known[:1]))
+
+
+def formula_model_from_dict(data: object) -> FormulaModel:
+    """The user's own model that was written down, whatever is said of its kind.
+
+    Raises
+    ------
+    ModelError
+        An unknown argument, or one that is missing or unusable.
+    """
+    given = table("a model of your own", data)
+    given.pop("kind", None)
+    if isinstance(given.get("effects"), list):
+        given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
+    given = table("a model of your own", given, _OWN, needed=_OWN[:2])
+    try:
+        return FormulaModel(**given | {"parameters": dict(given.get("parameters", {}))})
+    except UddError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"the model cannot be read: {error}") from None
 
 
 def effect_to_dict(effect: Effect) -> dict[str, Any]:
