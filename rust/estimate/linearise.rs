@@ -8,7 +8,8 @@ use super::bordered::zeros;
 use super::link_propagation::{Law, variable};
 use super::link_response::Transition;
 use super::parameter_jacobian::{
-    ExtraColumns, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, rates, tagged,
+    FurtherDirections, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, rates,
+    tagged,
 };
 use super::row_matrix::RowMatrix;
 use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Sensor, Unknowns};
@@ -89,9 +90,9 @@ where
         let Linearisation { mut sights, flow, columns: ParameterJacobian { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
         let plain = self.plain_laws(point);
-        let flow = self.flow(point, &laws, &plain, flow)?;
+        let mut flow = self.flow(point, &laws, &plain, flow)?;
         let timed = self.timed(point, &plain);
-        self.own_state_rows(point, &flow, &plain, &timed, &mut state)?;
+        self.own_state_rows(point, &mut flow, &plain, &timed, &mut state)?;
         self.sights(point, &laws, &timed, &mut sights, &mut seen);
         Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } })
     }
@@ -168,7 +169,7 @@ struct Look<'a, F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     point: &'a Unknowns<D>,
     law: &'a Law<F::Built<Wide>, Wide>,
     view: &'a View,
-    beyond: &'a [ExtraColumns<F::Built<Wide>>],
+    beyond: &'a [FurtherDirections<F::Built<Wide>>],
     i: usize,
     sight: &'a mut ObservationResidual<D, M>,
     rows: &'a mut [f64],
@@ -182,14 +183,14 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
         let Self { of: Estimator { sensor, record, .. }, point, law, view, i, sight, rows, .. } = self;
         let (film, p) = (record.film[i], rows.len() / M);
         let (state, t) = (&point.states[i], record.t[i] * point.sets[film].pace());
-        let (x, t): ([Wide; D], Wide) = (variable(state), Wide::constant(t));
+        let (x, t): ([Wide; D], Wide) = (variable(state, 0), Wide::constant(t));
         let rate = rates(&law.system, t, &x);
         // The parameters of the model are seen through the rate, by a camera that looks at it.
         let seen = sensor.observe(&view.plain, &x, &rate);
         fill(rows, p, &seen, D, &view.model);
         sight.misfit = self.of.misfit(i, &vector!(f64, M; m => seen[m].re));
         for m in 0..M {
-            for k in 0..D {
+            for k in 0..D.min(WIDTH) {
                 sight.h[(m, k)] = seen[m].d[k];
             }
         }
@@ -205,9 +206,16 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
             let rate = rates(&law.system, clocked, &x);
             fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &view.clock);
         }
-        for ExtraColumns { columns, laws } in self.beyond {
+        for FurtherDirections { first, columns, laws } in self.beyond {
+            let x: [Wide; D] = variable(state, *first);
             let rate = rates(&laws[film].system, t, &x);
-            fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &columns[film]);
+            let seen = sensor.observe(&view.plain, &x, &rate);
+            for m in 0..M {
+                for k in *first..D.min(first + WIDTH) {
+                    sight.h[(m, k)] = seen[m].d[k - first];
+                }
+            }
+            fill(rows, p, &seen, D.saturating_sub(*first), &columns[film]);
         }
     }
 }
@@ -217,7 +225,7 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
 fn fill<const M: usize>(rows: &mut [f64], p: usize, seen: &[Wide; M], first: usize, columns: &[usize]) {
     for m in 0..M {
         // Those that find no room beside the state are told of elsewhere.
-        for k in 0..columns.len().min(WIDTH - first) {
+        for k in 0..columns.len().min(WIDTH.saturating_sub(first)) {
             rows[m * p + columns[k]] = seen[m].d[first + k];
         }
     }

@@ -44,15 +44,23 @@ pub struct Transition<const D: usize> {
     /// The derivatives of what the model makes: by this frame's state, then by those of the model's free
     /// parameters that find room.
     pub slopes: [[f64; WIDTH]; D],
+    /// The derivatives by those components of this frame's state that find no room there, one after the other.
+    pub further: Vec<[f64; D]>,
     /// The rate at the end.
     pub end_rate: SVector<f64, D>,
 }
 
 impl<const D: usize> Transition<D> {
+    /// The derivative of component `m` by component `k` of this frame's state.
+    #[inline(always)]
+    pub fn slope(&self, m: usize, k: usize) -> f64 {
+        if D <= WIDTH || k < WIDTH { self.slopes[m][k] } else { self.further[k - WIDTH][m] }
+    }
+
     /// The derivative by this frame's state.
     #[inline(always)]
     pub fn a(&self) -> SMatrix<f64, D, D> {
-        SMatrix::from_fn(|m, k| self.slopes[m][k])
+        SMatrix::from_fn(|m, k| self.slope(m, k))
     }
 }
 
@@ -61,7 +69,8 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// Every link, kept where `room` was; those of frames that are not linked are all zero.
+    /// Every link, kept where `room` was; those of frames that are not linked are all zero. What is
+    /// [further](Transition::further) is not worked out here.
     pub(super) fn flow(
         &self,
         point: &Unknowns<D>,
@@ -70,12 +79,13 @@ where
         room: Vec<Transition<D>>,
     ) -> Result<Vec<Transition<D>>, EstimateError> {
         let zero = zeros();
-        let none = Transition { defect: zero, slopes: [[0.0; WIDTH]; D], end_rate: zero };
+        let none =
+            Transition { defect: zero, slopes: [[0.0; WIDTH]; D], further: Vec::new(), end_rate: zero };
         let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
                    i: usize,
                    (film, start, end): Span,
                    link: &mut Transition<D>| {
-            let x = variable(&point.states[i]);
+            let x = variable(&point.states[i], 0);
             let (last, _) = follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
             let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
             let end_rate = rates_of(system, end, &there);
@@ -98,19 +108,26 @@ where
                    i: usize,
                    (_, start, end): Span,
                    found: &mut QuadraturePoints<D>| {
-            let x: [Wide; D] = variable(&point.states[i]);
-            let mut met = [x; PLACES_PER_LINK];
-            let (last, switched) =
-                follower.follow(TransitionRun { start, end, x, places: &PLACES, met: &mut met })?;
-            let a = by_state(&last);
-            found.switched = switched;
+            let (mut a, mut here, mut states) =
+                (zeros(), [zeros(); PLACES_PER_LINK], [[0.0; D]; PLACES_PER_LINK]);
+            for first in (0..D).step_by(WIDTH) {
+                let x: [Wide; D] = variable(&point.states[i], first);
+                let mut met = [x; PLACES_PER_LINK];
+                let (last, switched) =
+                    follower.follow(TransitionRun { start, end, x, places: &PLACES, met: &mut met })?;
+                found.switched = switched;
+                by_state(&last, first, &mut a);
+                for q in 0..PLACES_PER_LINK {
+                    by_state(&met[q], first, &mut here[q]);
+                    states[q] = vector!(f64, D; k => met[q][k].re);
+                }
+            }
             for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
-                let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
-                let response = a * here * (WEIGHTS[q] * (end - start));
-                let state = vector!(f64, D; k => met[q][k].re);
-                found.places[q] = QuadraturePoint { since, t: start + since, state, response };
+                let back = here[q].try_inverse().unwrap_or_else(zeros);
+                let response = a * back * (WEIGHTS[q] * (end - start));
+                found.places[q] = QuadraturePoint { since, t: start + since, state: states[q], response };
             }
             Ok(())
         };
@@ -118,13 +135,11 @@ where
     }
 }
 
-/// The derivatives of a state by the one it started from, as a matrix.
-fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
-    let mut matrix = zeros();
+/// The derivatives of a state by the one it started from, from its component `first` on.
+fn by_state<const D: usize>(x: &[Wide; D], first: usize, matrix: &mut SMatrix<f64, D, D>) {
     for m in 0..D {
-        for k in 0..D {
-            matrix[(m, k)] = x[m].d[k];
+        for k in first..D.min(first + WIDTH) {
+            matrix[(m, k)] = x[m].d[k - first];
         }
     }
-    matrix
 }

@@ -1,5 +1,8 @@
 //! The estimator whatever its family and its sensor: plain numbers in, plain numbers out. What is on Python's side
 //! of it is compiled once.
+//!
+//! Of own models with many states the estimator is compiled for a few numbers only: the others have idle states, which
+//! nobody sees, at their end. Here they are added to what comes in, and cut from what goes out.
 
 use std::sync::Arc;
 
@@ -7,6 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::jobs;
 use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
 use crate::analysis::CancelFlag;
@@ -156,21 +160,26 @@ pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     own: fn(AnyModel) -> Option<(F, Vec<f64>)>,
 }
 
+/// With idle states up to a number that the estimator is compiled for.
+fn filled(model: AnyModel) -> AnyModel {
+    match model {
+        AnyModel::Five(Either::Second(family), values) => AnyModel::Six(family.filled(), values),
+        other => other,
+    }
+}
+
 /// The problem that is asked of a model.
 pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
     macro_rules! of {
         ($($kind:pat => $told:expr, $problem:expr;)+) => {
-            match model {
+            match filled(model) {
                 $($kind => {
-                    let own = |model| match model {
+                    let own = |model| match filled(model) {
                         $kind => Some($told),
                         _ => None,
                     };
                     Box::new(problem($problem, own, asked)?) as Box<dyn Fitted>
                 })+
-                AnyModel::Five(Either::Second(_), _) | AnyModel::Six(..) => {
-                    return Err(PyValueError::new_err("a model that is fitted has at most 4 states"));
-                }
                 _ => return Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
             }
         };
@@ -182,6 +191,9 @@ pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
         AnyModel::Two(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
         AnyModel::Three(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
         AnyModel::Four(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::Six(family, values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::Eight(family, values) => (family, values), seen_as_it_is(family, &values);
+        AnyModel::Twelve(family, values) => (family, values), seen_as_it_is(family, &values);
     })
 }
 
@@ -190,10 +202,9 @@ fn seen_as_it_is<const D: usize>(
     family: FormulaFamily<D>,
     values: &[f64],
 ) -> (FormulaFamily<D>, &[f64], Direct<D>) {
-    let states = family.states();
     let mut angles = [false; D];
-    for n in 0..D {
-        angles[n] = states[n].1;
+    for (n, (_, angle)) in family.states().into_iter().enumerate() {
+        angles[n] = angle;
     }
     (family, values, Direct { angles })
 }
@@ -208,27 +219,41 @@ where
     F: Family<D> + 'static,
     C: Sensor<D, M> + 'static,
 {
-    asked.check((D, M), (values.len(), C::PARAMETERS.len()))?;
+    let idle = family.idle();
+    let (d, m) = (D - idle, M - idle);
+    asked.check((d, m), (values.len(), C::PARAMETERS.len()))?;
     let mut record = Record::default();
     if let Some(data) = asked.data {
         (record.t, record.linked, record.film) = (data.t.clone(), data.linked.clone(), data.film.clone());
-        record.memory.copy_from_slice(&data.autocorrelation);
-        for i in 0..data.t.len() {
-            record.seen.push(SVector::from_column_slice(&data.seen.numbers[M * i..M * (i + 1)]));
-            let information = &data.information.numbers[M * M * i..M * M * (i + 1)];
-            record.information.push(SMatrix::from_row_slice(information));
+        record.memory[..m].copy_from_slice(&data.autocorrelation);
+        record.seen = padded(&data.seen.numbers, m).into_iter().map(SVector::from).collect();
+        for information in data.information.numbers.chunks_exact(m * m) {
+            let number = |r, c| if r < m && c < m { information[m * r + c] } else { 0.0 };
+            record.information.push(SMatrix::from_fn(number));
         }
     }
     let mut diffusion = [1.0; D];
     if asked.data.is_some() {
-        diffusion.copy_from_slice(asked.diffusion);
+        diffusion[..d].copy_from_slice(asked.diffusion);
     }
-    let point = Unknowns { states: asked.states.numbers.as_chunks().0.to_vec(), sets: asked.sets };
+    let point = Unknowns { states: padded(&asked.states.numbers, d), sets: asked.sets };
     let tolerance = TOLERANCE;
     let mut estimator =
         Estimator { family, sensor, record, free: asked.free, diffusion, tolerance, known: None };
     estimator.known = asked.linear.and_then(|linear| linear.known(&estimator));
     Ok(Fit { estimator, point, own })
+}
+
+impl<F, C, const D: usize, const M: usize> Fit<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// The numbers of states and channels that are not idle.
+    fn live(&self) -> (usize, usize) {
+        let idle = self.estimator.family.idle();
+        (D - idle, M - idle)
+    }
 }
 
 impl<F, C, const D: usize, const M: usize> Fitted for Fit<F, C, D, M>
@@ -238,20 +263,22 @@ where
 {
     fn size(&self) -> Size {
         let (frames, free) = (self.estimator.record.t.len(), self.estimator.free.len());
-        Size { frames, free, states: D, channels: M }
+        let (states, channels) = self.live();
+        Size { frames, free, states, channels }
     }
 
     fn solve(self: Box<Self>, options: &Options, stop: &CancelFlag) -> Result<Solved, EstimateError> {
+        let (d, m) = self.live();
         let Self { estimator, point, .. } = *self;
         let s = estimator.solve(point, options, stop)?;
         Ok(Solved {
-            states: s.point.states.as_flattened().to_vec(),
+            states: rows(&s.point.states, d),
             sets: s.point.sets.clone(),
             covariance: s.covariance.as_slice().to_vec(),
-            state_covariance: numbers(&s.state_covariance),
-            misfit: numbers(&s.misfit),
-            seen_variance: numbers(&s.seen_variance),
-            defect: numbers(&s.defect[..estimator.record.t.len() - 1]),
+            state_covariance: numbers(&s.state_covariance, (d, d)),
+            misfit: numbers(&s.misfit, (m, 1)),
+            seen_variance: numbers(&s.seen_variance, (m, 1)),
+            defect: numbers(&s.defect[..estimator.record.t.len() - 1], (d, 1)),
             cost: s.cost,
             evidence: s.evidence,
             converged: s.converged,
@@ -277,35 +304,44 @@ where
     }
 
     fn score_groups(&self, state: RowMatrix, groups: &[usize]) -> Result<Vec<Score>, EstimateError> {
-        let seen = RowMatrix::zeros(self.estimator.record.t.len() * M, state.width());
+        let (seen, live) =
+            (RowMatrix::zeros(self.estimator.record.t.len() * M, state.width()), self.live().0);
+        let mut all = RowMatrix::zeros(state.count() / live * D, state.width());
+        for i in 0..state.count() {
+            all.row_mut(i / live * D + i % live).copy_from_slice(state.row(i));
+        }
+        let state = all;
         self.estimator.score_groups(&self.point, &ParameterJacobian { seen, state }, groups)
     }
 
     fn places(&self) -> Result<[Vec<f64>; 3], EstimateError> {
+        let d = self.live().0;
         let (mut t, mut states, mut responses) = (Vec::new(), Vec::new(), Vec::new());
         for link in self.estimator.places(&self.point)? {
             for place in &link.places {
                 t.push(place.t);
-                states.extend_from_slice(&place.state);
+                states.extend_from_slice(&place.state[..d]);
                 responses.push(place.response);
             }
         }
-        Ok([t, states, numbers(&responses)])
+        Ok([t, states, numbers(&responses, (d, d))])
     }
 
     fn filter(&self, windows: &[(usize, usize)], stop: &CancelFlag) -> Result<[Vec<f64>; 3], EstimateError> {
+        let d = self.live().0;
         let (mut first, mut last, mut covariance) = (Vec::new(), Vec::new(), Vec::new());
         for end in self.estimator.filter(&self.point, windows, &Options::default(), stop)? {
-            first.extend_from_slice(&end.first);
-            last.extend_from_slice(&end.last);
+            first.extend_from_slice(&end.first[..d]);
+            last.extend_from_slice(&end.last[..d]);
             covariance.push(end.covariance);
         }
-        Ok([first, last, numbers(&covariance)])
+        Ok([first, last, numbers(&covariance, (d, d))])
     }
 
     fn innovations(&self, vague: &[f64]) -> Result<Vec<f64>, EstimateError> {
-        let vague = vague.first_chunk().expect("one per state");
-        Ok(self.estimator.innovations(&self.point, vague)?.into_flattened())
+        let mut all = [1.0; D];
+        all[..vague.len()].copy_from_slice(vague);
+        Ok(rows(&self.estimator.innovations(&self.point, &all)?, self.live().1))
     }
 
     fn predict(&self, film: &[usize], t0: &[f64], times: &[Vec<f64>]) -> Result<Vec<f64>, EstimateError> {
@@ -315,7 +351,7 @@ where
         }
         let mut all = Vec::new();
         for seen in self.estimator.predict(&self.point.sets, &starts, times)? {
-            all.extend_from_slice(seen.as_flattened());
+            all.extend(rows(&seen, self.live().1));
         }
         Ok(all)
     }
@@ -329,12 +365,29 @@ fn added(values: &[f64], own: usize, indices: &[usize]) -> PyResult<(Vec<f64>, V
     Ok((values[own..].to_vec(), indices.iter().map(|&index| Role::Model(index)).collect()))
 }
 
-/// The numbers of small matrices in C order.
-fn numbers<const A: usize, const B: usize>(blocks: &[SMatrix<f64, A, B>]) -> Vec<f64> {
-    let mut all = Vec::with_capacity(A * B * blocks.len());
+/// Rows of so many numbers, filled up with zeros.
+fn padded<const D: usize>(numbers: &[f64], live: usize) -> Vec<[f64; D]> {
+    let mut all = vec![[0.0; D]; numbers.len() / live];
+    for (row, numbers) in all.iter_mut().zip(numbers.chunks_exact(live)) {
+        row[..live].copy_from_slice(numbers);
+    }
+    all
+}
+
+/// The first so many numbers of every row.
+fn rows<const D: usize>(rows: &[[f64; D]], live: usize) -> Vec<f64> {
+    jobs::live(rows.as_flattened().to_vec(), D, live)
+}
+
+/// The numbers of small matrices in C order, of the first so many rows and columns.
+fn numbers<const A: usize, const B: usize>(
+    blocks: &[SMatrix<f64, A, B>],
+    (height, width): (usize, usize),
+) -> Vec<f64> {
+    let mut all = Vec::with_capacity(height * width * blocks.len());
     for block in blocks {
-        for i in 0..A {
-            for j in 0..B {
+        for i in 0..height {
+            for j in 0..width {
                 all.push(block[(i, j)]);
             }
         }

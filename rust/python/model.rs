@@ -27,6 +27,10 @@ pub enum AnyModel {
     /// With LuGre friction, whose bristles are one more state.
     Five(Either<WithLuGre<DiskFamily>, FormulaFamily<5>>, Vec<f64>),
     Six(FormulaFamily<6>, Vec<f64>),
+    /// With 7 or 8 states, the last of which may be idle.
+    Eight(FormulaFamily<8>, Vec<f64>),
+    /// With 9 to 12, likewise.
+    Twelve(FormulaFamily<12>, Vec<f64>),
     /// Apart from the others of three states, whose laws are smooth.
     BristledPendulum(WithLuGre<PendulumFamily>, Vec<f64>),
 }
@@ -43,6 +47,8 @@ macro_rules! with_model {
             $crate::python::model::AnyModel::Four($family, $values) => $body,
             $crate::python::model::AnyModel::Five($family, $values) => $body,
             $crate::python::model::AnyModel::Six($family, $values) => $body,
+            $crate::python::model::AnyModel::Eight($family, $values) => $body,
+            $crate::python::model::AnyModel::Twelve($family, $values) => $body,
             $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
         }
     };
@@ -85,6 +91,14 @@ macro_rules! with_wide_model {
                 $body
             }
             $crate::python::model::AnyModel::Six($family, $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Eight($family, $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Twelve($family, $values) => {
                 let $alone = $family;
                 $body
             }
@@ -205,6 +219,8 @@ impl AnyModel {
             AnyModel::Four(Either::Second(family), _) => return family.states(),
             AnyModel::Five(Either::Second(family), _) => return family.states(),
             AnyModel::Six(family, _) => return family.states(),
+            AnyModel::Eight(family, _) => return family.states(),
+            AnyModel::Twelve(family, _) => return family.states(),
         };
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
     }
@@ -230,14 +246,20 @@ impl AnyModel {
         }
     }
 
-    /// Why it is for `udd.simulate` only.
+    /// Why it is not for what was asked.
     pub fn too_much(&self) -> PyErr {
+        if self.is_own() {
+            let states = self.states().len();
+            return ModelError::new_err(format!(
+                "sections, exponents, covariant vectors and cycles are for models with at most 6 states, not {states}"
+            ));
+        }
         ModelError::new_err("friction with the treatment lugre is for udd.simulate; here take set-valued")
     }
 
     /// Whether it is the user's own.
     pub fn is_own(&self) -> bool {
-        use AnyModel::{Five, Four, One, Six, Three, Two};
+        use AnyModel::{Eight, Five, Four, One, Six, Three, Twelve, Two};
         matches!(
             self,
             One(..)
@@ -246,6 +268,8 @@ impl AnyModel {
                 | Four(Either::Second(_), _)
                 | Five(Either::Second(_), _)
                 | Six(..)
+                | Eight(..)
+                | Twelve(..)
         )
     }
 
@@ -330,23 +354,25 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
     }
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     macro_rules! parsed {
-        ($($d:literal $Kind:ident |$family:ident| $held:expr),+) => {
+        ($($count:pat => $Kind:ident<$D:literal> |$family:ident| $held:expr),+) => {
             match states.len() {
-                $($d => FormulaFamily::<$d>::parse(states, &texts, parameters, inputs).map(|family| {
+                $($count => FormulaFamily::<$D>::parse(states, &texts, parameters, inputs).map(|family| {
                     let $family = family.with_angles(angles).with_records(signals, *record);
                     AnyModel::$Kind($held, values)
                 }),)+
-                n => return Err(ModelError::new_err(format!("a model has 1 to 6 states, not {n}"))),
+                n => return Err(ModelError::new_err(format!("a model has 1 to 12 states, not {n}"))),
             }
         };
     }
     parsed!(
-        1 One |own| own,
-        2 Two |own| Either::Second(own),
-        3 Three |own| Either::Second(own),
-        4 Four |own| Either::Second(own),
-        5 Five |own| Either::Second(own),
-        6 Six |own| own
+        1 => One<1> |own| own,
+        2 => Two<2> |own| Either::Second(own),
+        3 => Three<3> |own| Either::Second(own),
+        4 => Four<4> |own| Either::Second(own),
+        5 => Five<5> |own| Either::Second(own),
+        6 => Six<6> |own| own,
+        7 | 8 => Eight<8> |own| own,
+        9..=12 => Twelve<12> |own| own
     )
     .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
 }
@@ -479,14 +505,17 @@ fn rates<'py>(
         t: &[f64],
         flat: &[f64],
     ) -> PyResult<Vec<f64>> {
-        if flat.len() != t.len() * D {
-            let message = format!("{} states of {D} numbers are needed, not {} numbers", t.len(), flat.len());
+        let live = D - family.idle();
+        if flat.len() != t.len() * live {
+            let message =
+                format!("{} states of {live} numbers are needed, not {} numbers", t.len(), flat.len());
             return Err(ModelError::new_err(message));
         }
         let system = family.build(values);
         let mut out = Vec::with_capacity(flat.len());
-        for (&t, x) in t.iter().zip(flat.as_chunks::<D>().0) {
-            out.extend(system.rates(t, x, &sides_of(&system, t, x)));
+        for (&t, x) in t.iter().zip(flat.chunks_exact(live)) {
+            let x = state(x, family.idle())?;
+            out.extend_from_slice(&system.rates(t, &x, &sides_of(&system, t, &x))[..live]);
         }
         Ok(out)
     }
