@@ -98,7 +98,7 @@ where
     /// The inverse variance of the model's error over each link; that of idle states is of no account.
     pub fn precision(&self) -> Vec<SVector<f64, D>> {
         let t = &self.record.t;
-        let live = D - self.family.idle();
+        let live = self.live();
         let mut all: Vec<SVector<f64, D>> = vec![SVector::repeat(1.0); t.len().saturating_sub(1)];
         for i in 0..all.len() {
             for k in 0..live {

@@ -181,16 +181,16 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
     #[inline(always)]
     fn run<V: InstructionSet>(self) {
         let Self { of: Estimator { sensor, record, .. }, point, law, view, i, sight, rows, .. } = self;
-        let (film, p) = (record.film[i], rows.len() / M);
+        let (film, p, live) = (record.film[i], rows.len() / M, self.of.live());
         let (state, t) = (&point.states[i], record.t[i] * point.sets[film].pace());
-        let (x, t): ([Wide; D], Wide) = (variable(state, 0), Wide::constant(t));
+        let (x, t): ([Wide; D], Wide) = (variable(state, 0..live), Wide::constant(t));
         let rate = rates(&law.system, t, &x);
         // The parameters of the model are seen through the rate, by a camera that looks at it.
         let seen = sensor.observe(&view.plain, &x, &rate);
-        fill(rows, p, &seen, D, &view.model);
+        fill(rows, p, &seen, live, &view.model);
         sight.misfit = self.of.misfit(i, &vector!(f64, M; m => seen[m].re));
         for m in 0..M {
-            for k in 0..D.min(WIDTH) {
+            for k in 0..live.min(WIDTH) {
                 sight.h[(m, k)] = seen[m].d[k];
             }
         }
@@ -207,15 +207,15 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
             fill(rows, p, &sensor.observe(&view.plain, &x, &rate), 0, &view.clock);
         }
         for FurtherDirections { first, columns, laws } in self.beyond {
-            let x: [Wide; D] = variable(state, *first);
+            let x: [Wide; D] = variable(state, *first..live);
             let rate = rates(&laws[film].system, t, &x);
             let seen = sensor.observe(&view.plain, &x, &rate);
             for m in 0..M {
-                for k in *first..D.min(first + WIDTH) {
+                for k in *first..live.min(first + WIDTH) {
                     sight.h[(m, k)] = seen[m].d[k - first];
                 }
             }
-            fill(rows, p, &seen, D.saturating_sub(*first), &columns[film]);
+            fill(rows, p, &seen, live.saturating_sub(*first), &columns[film]);
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Links followed one after the other.
 
+use std::ops::Range;
+
 use super::{EstimateError, Estimator, Role, Sensor, Unknowns};
 use crate::analysis::batch::parallel::try_in_parts;
 use crate::integrate::{Failure, Integrator, Method, Taylor, Tolerance, order};
@@ -200,14 +202,12 @@ where
     }
 }
 
-/// A state whose numbers are differentiated by its components from number `first` on, as many as there are directions.
+/// A state whose numbers are differentiated by these of its components, as many as there are directions.
 #[inline(always)]
-pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D], first: usize) -> [Dual<f64, N>; D] {
-    vector!(Dual<f64, N>, D; k => {
-        let mut own = Dual::constant(x[k]);
-        if let Some(direction) = own.d.get_mut(k.wrapping_sub(first)) {
-            *direction = 1.0;
-        }
-        own
-    })
+pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D], by: Range<usize>) -> [Dual<f64, N>; D] {
+    let mut all = vector!(Dual<f64, N>, D; k => Dual::constant(x[k]));
+    for k in by.start..by.end.min(by.start + N) {
+        all[k].d[k - by.start] = 1.0;
+    }
+    all
 }

@@ -1,5 +1,7 @@
 //! The model's flow from each frame to the next, and how it responds to what is added on the way.
 
+use std::ops::Range;
+
 use nalgebra::{SMatrix, SVector};
 
 use super::bordered::zeros;
@@ -44,7 +46,8 @@ pub struct Transition<const D: usize> {
     /// The derivatives of what the model makes: by this frame's state, then by those of the model's free
     /// parameters that find room.
     pub slopes: [[f64; WIDTH]; D],
-    /// The derivatives by those components of this frame's state that find no room there, one after the other.
+    /// The derivatives by those components of this frame's state that find no room there, one after the other; those by
+    /// idle ones are zero.
     pub further: Vec<[f64; D]>,
     /// The rate at the end.
     pub end_rate: SVector<f64, D>,
@@ -78,14 +81,18 @@ where
         plain: &[Law<F::Built<f64>, f64>],
         room: Vec<Transition<D>>,
     ) -> Result<Vec<Transition<D>>, EstimateError> {
-        let zero = zeros();
-        let none =
-            Transition { defect: zero, slopes: [[0.0; WIDTH]; D], further: Vec::new(), end_rate: zero };
+        let (zero, live) = (zeros(), self.live());
+        let none = Transition {
+            defect: zero,
+            slopes: [[0.0; WIDTH]; D],
+            further: vec![[0.0; D]; D.saturating_sub(WIDTH)],
+            end_rate: zero,
+        };
         let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
                    i: usize,
                    (film, start, end): Span,
                    link: &mut Transition<D>| {
-            let x = variable(&point.states[i], 0);
+            let x = variable(&point.states[i], 0..live);
             let (last, _) = follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
             let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
             let end_rate = rates_of(system, end, &there);
@@ -101,24 +108,24 @@ where
 
     /// What acts on every link; all zero where frames are not linked.
     pub fn places(&self, point: &Unknowns<D>) -> Result<Vec<QuadraturePoints<D>>, EstimateError> {
-        let laws = self.own_laws(point);
+        let (laws, live) = (self.own_laws(point), self.live());
         let place = QuadraturePoint { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = QuadraturePoints { switched: false, places: [place; PLACES_PER_LINK] };
         let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
                    i: usize,
                    (_, start, end): Span,
                    found: &mut QuadraturePoints<D>| {
-            let (mut a, mut here, mut states) =
-                (zeros(), [zeros(); PLACES_PER_LINK], [[0.0; D]; PLACES_PER_LINK]);
-            for first in (0..D).step_by(WIDTH) {
-                let x: [Wide; D] = variable(&point.states[i], first);
+            let mut a = SMatrix::<f64, D, D>::identity();
+            let (mut here, mut states) = ([a; PLACES_PER_LINK], [[0.0; D]; PLACES_PER_LINK]);
+            for first in (0..live).step_by(WIDTH) {
+                let x: [Wide; D] = variable(&point.states[i], first..live);
                 let mut met = [x; PLACES_PER_LINK];
                 let (last, switched) =
                     follower.follow(TransitionRun { start, end, x, places: &PLACES, met: &mut met })?;
                 found.switched = switched;
-                by_state(&last, first, &mut a);
+                by_state(&last, first..live, &mut a);
                 for q in 0..PLACES_PER_LINK {
-                    by_state(&met[q], first, &mut here[q]);
+                    by_state(&met[q], first..live, &mut here[q]);
                     states[q] = vector!(f64, D; k => met[q][k].re);
                 }
             }
@@ -135,11 +142,11 @@ where
     }
 }
 
-/// The derivatives of a state by the one it started from, from its component `first` on.
-fn by_state<const D: usize>(x: &[Wide; D], first: usize, matrix: &mut SMatrix<f64, D, D>) {
+/// The derivatives of a state by these components of the one it started from, as many as there are directions.
+fn by_state<const D: usize>(x: &[Wide; D], by: Range<usize>, matrix: &mut SMatrix<f64, D, D>) {
     for m in 0..D {
-        for k in first..D.min(first + WIDTH) {
-            matrix[(m, k)] = x[m].d[k - first];
+        for k in by.start..by.end.min(by.start + WIDTH) {
+            matrix[(m, k)] = x[m].d[k - by.start];
         }
     }
 }

@@ -29,7 +29,16 @@ pub struct ParameterJacobian {
 impl ParameterJacobian {
     /// These columns with others to their right.
     pub fn beside(&self, other: &Self) -> Self {
-        Self { seen: self.seen.beside(&other.seen), state: self.state.beside(&other.state) }
+        self.beside_all(std::slice::from_ref(other))
+    }
+
+    /// These columns with those of all others to their right.
+    pub fn beside_all(&self, others: &[Self]) -> Self {
+        let all = |rows: fn(&Self) -> &RowMatrix| {
+            let parts: Vec<&RowMatrix> = std::iter::once(self).chain(others).map(rows).collect();
+            RowMatrix::side_by_side(&parts)
+        };
+        Self { seen: all(|own| &own.seen), state: all(|own| &own.state) }
     }
 }
 
@@ -99,7 +108,7 @@ where
         timed: &[bool],
         rows: &mut RowMatrix,
     ) -> Result<(), EstimateError> {
-        let p = self.free.len();
+        let (p, live) = (self.free.len(), self.live());
         rows.become_zeros(flow.len() * D, p);
         self.further_rows(point, flow, rows)?;
         if p == 0 {
@@ -115,8 +124,8 @@ where
                 let dt = self.record.t[i + 1] - self.record.t[i];
                 for n in 0..D {
                     let row = &mut rows[n * p..(n + 1) * p];
-                    for k in 0..models[film].len().min(WIDTH.saturating_sub(D)) {
-                        row[models[film][k].0] = link.slopes[n][D + k];
+                    for k in 0..models[film].len().min(WIDTH.saturating_sub(live)) {
+                        row[models[film][k].0] = link.slopes[n][live + k];
                     }
                     // A slower clock lets the flow run on for longer.
                     for &(column, _) in &clocks[film] {
@@ -138,6 +147,10 @@ where
                 }
             }
         });
+        // Idle states leave their directions to parameters.
+        for slopes in flow.iter_mut().flat_map(|link| &mut link.slopes) {
+            (live..D.min(WIDTH)).for_each(|k| slopes[k] = 0.0);
+        }
         Ok(())
     }
 
@@ -148,12 +161,13 @@ where
         flow: &mut [Transition<D>],
         rows: &mut RowMatrix,
     ) -> Result<(), EstimateError> {
+        let live = self.live();
         for FurtherDirections { first, columns, laws } in self.beyond(point) {
             let slopes = self.each_link(
                 point,
                 &laws,
                 &|follower, i, (_, start, end), slopes: &mut [[f64; WIDTH]; D]| {
-                    let x = variable(&point.states[i], first);
+                    let x = variable(&point.states[i], first..live);
                     let (last, _) =
                         follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
                     for k in 0..D {
@@ -164,9 +178,8 @@ where
                 &[[0.0; WIDTH]; D],
                 Vec::new(),
             )?;
-            let states = D.saturating_sub(first).min(WIDTH);
+            let states = live.saturating_sub(first).min(WIDTH);
             for (i, slopes) in slopes.iter().enumerate() {
-                flow[i].further.resize(D.saturating_sub(WIDTH), [0.0; D]);
                 for k in 0..states {
                     flow[i].further[first - WIDTH + k] = vector!(f64, D; n => slopes[n][k]);
                 }
@@ -185,7 +198,7 @@ where
     pub(super) fn own_laws(&self, point: &Unknowns<D>) -> Vec<Law<F::Built<Wide>, Wide>> {
         self.laws(point, &|film, values| {
             let own = acting(&self.free, film, model);
-            tagged(values, &own[..own.len().min(WIDTH.saturating_sub(D))], D)
+            tagged(values, &own[..own.len().min(WIDTH.saturating_sub(self.live()))], self.live())
         })
     }
 
@@ -194,9 +207,9 @@ where
         let films = 0..point.sets.len();
         let models: Vec<_> = films.map(|film| acting(&self.free, film, model)).collect();
         let most = models.iter().map(Vec::len).max().unwrap_or(0);
-        let mut all = Vec::new();
-        for first in (WIDTH..D + most).step_by(WIDTH) {
-            let (from, to) = (first.saturating_sub(D), (first + WIDTH).saturating_sub(D));
+        let (mut all, live) = (Vec::new(), self.live());
+        for first in (WIDTH..live + most).step_by(WIDTH) {
+            let (from, to) = (first.saturating_sub(live), (first + WIDTH).saturating_sub(live));
             let mut own = Vec::new();
             for model in &models {
                 own.push(&model[from.min(model.len())..to.min(model.len())]);
@@ -205,7 +218,7 @@ where
             for own in &own {
                 columns.push(columns_of(own));
             }
-            let behind = D.saturating_sub(first);
+            let behind = live.saturating_sub(first);
             let laws = self.laws(point, &|film, values| tagged(values, own[film], behind));
             all.push(FurtherDirections { first, columns, laws });
         }
@@ -310,7 +323,7 @@ where
     fn seen_by_rate(&self, camera: &[f64], x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
         let camera: Vec<Dual<f64, D>> = constants(camera);
         let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
-        let seen = self.sensor.observe(&camera, &x, &variable(rate, 0));
+        let seen = self.sensor.observe(&camera, &x, &variable(rate, 0..D));
         let mut slopes = [[0.0; D]; M];
         for m in 0..M {
             slopes[m] = seen[m].d;

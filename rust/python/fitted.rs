@@ -1,8 +1,8 @@
 //! The estimator whatever its family and its sensor: plain numbers in, plain numbers out. What is on Python's side
 //! of it is compiled once.
 //!
-//! Of own models with many states the estimator is compiled for a few numbers only: the others have idle states, which
-//! nobody sees, at their end. Here they are added to what comes in, and cut from what goes out.
+//! Of own models with more than four states the estimator is compiled for twelve: others have idle states, which nobody
+//! sees, at their end. Here these are added to what comes in, and cut from what goes out.
 
 use std::sync::Arc;
 
@@ -163,7 +163,8 @@ pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
 /// With idle states up to a number that the estimator is compiled for.
 fn filled(model: AnyModel) -> AnyModel {
     match model {
-        AnyModel::Five(Either::Second(family), values) => AnyModel::Six(family.filled(), values),
+        AnyModel::Five(Either::Second(family), values) => AnyModel::Twelve(family.filled(), values),
+        AnyModel::Six(family, values) => AnyModel::Twelve(family.filled(), values),
         other => other,
     }
 }
@@ -191,8 +192,6 @@ pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
         AnyModel::Two(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
         AnyModel::Three(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
         AnyModel::Four(Either::Second(family), values) => (family, values), seen_as_it_is(family, &values);
-        AnyModel::Six(family, values) => (family, values), seen_as_it_is(family, &values);
-        AnyModel::Eight(family, values) => (family, values), seen_as_it_is(family, &values);
         AnyModel::Twelve(family, values) => (family, values), seen_as_it_is(family, &values);
     })
 }

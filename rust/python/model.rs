@@ -27,9 +27,7 @@ pub enum AnyModel {
     /// With LuGre friction, whose bristles are one more state.
     Five(Either<WithLuGre<DiskFamily>, FormulaFamily<5>>, Vec<f64>),
     Six(FormulaFamily<6>, Vec<f64>),
-    /// With 7 or 8 states, the last of which may be idle.
-    Eight(FormulaFamily<8>, Vec<f64>),
-    /// With 9 to 12, likewise.
+    /// With 7 to 12 states, the last of which may be idle.
     Twelve(FormulaFamily<12>, Vec<f64>),
     /// Apart from the others of three states, whose laws are smooth.
     BristledPendulum(WithLuGre<PendulumFamily>, Vec<f64>),
@@ -47,7 +45,6 @@ macro_rules! with_model {
             $crate::python::model::AnyModel::Four($family, $values) => $body,
             $crate::python::model::AnyModel::Five($family, $values) => $body,
             $crate::python::model::AnyModel::Six($family, $values) => $body,
-            $crate::python::model::AnyModel::Eight($family, $values) => $body,
             $crate::python::model::AnyModel::Twelve($family, $values) => $body,
             $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
         }
@@ -91,10 +88,6 @@ macro_rules! with_wide_model {
                 $body
             }
             $crate::python::model::AnyModel::Six($family, $values) => {
-                let $alone = $family;
-                $body
-            }
-            $crate::python::model::AnyModel::Eight($family, $values) => {
                 let $alone = $family;
                 $body
             }
@@ -219,7 +212,6 @@ impl AnyModel {
             AnyModel::Four(Either::Second(family), _) => return family.states(),
             AnyModel::Five(Either::Second(family), _) => return family.states(),
             AnyModel::Six(family, _) => return family.states(),
-            AnyModel::Eight(family, _) => return family.states(),
             AnyModel::Twelve(family, _) => return family.states(),
         };
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
@@ -259,7 +251,7 @@ impl AnyModel {
 
     /// Whether it is the user's own.
     pub fn is_own(&self) -> bool {
-        use AnyModel::{Eight, Five, Four, One, Six, Three, Twelve, Two};
+        use AnyModel::{Five, Four, One, Six, Three, Twelve, Two};
         matches!(
             self,
             One(..)
@@ -268,7 +260,6 @@ impl AnyModel {
                 | Four(Either::Second(_), _)
                 | Five(Either::Second(_), _)
                 | Six(..)
-                | Eight(..)
                 | Twelve(..)
         )
     }
@@ -371,8 +362,7 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
         4 => Four<4> |own| Either::Second(own),
         5 => Five<5> |own| Either::Second(own),
         6 => Six<6> |own| own,
-        7 | 8 => Eight<8> |own| own,
-        9..=12 => Twelve<12> |own| own
+        7..=12 => Twelve<12> |own| own
     )
     .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
 }

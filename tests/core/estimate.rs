@@ -430,3 +430,76 @@ fn idle_states_change_nothing() {
         }
     }
 }
+
+/// The derivatives of what twelve states become by all states and by fourteen parameters, which takes four turns of eight
+/// directions, against finite differences.
+#[test]
+fn derivatives_of_many_states_equal_finite_differences() {
+    const D: usize = 12;
+    let equation = |i: usize| {
+        let (next, before, last) = ((i + 1) % D, (i + D - 1) % D, (i + D - 2) % D);
+        format!("p{i}*(x{next} - x{last})*x{before} - p12*x{i} + p13*cos(x{i})")
+    };
+    let equations: Vec<String> = (0..D).map(equation).collect();
+    let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
+    let family = FormulaFamily::<D>::parse(&names("x", D), &texts, &names("p", 14), &[]).unwrap();
+    let free = |p| FreeParameter { role: Role::Model(p), film: None, mean: 0.0, sd: f64::INFINITY };
+    let record = Record::<D> {
+        t: vec![0.0, 0.1],
+        seen: vec![SVector::zeros(); 2],
+        information: vec![SMatrix::identity(); 2],
+        linked: vec![true],
+        film: vec![0; 2],
+        memory: [0.0; D],
+    };
+    let estimator = Estimator {
+        family,
+        sensor: Direct { angles: [false; D] },
+        record,
+        free: (0..14).map(free).collect(),
+        diffusion: [1.0; D],
+        tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
+        known: None,
+    };
+    let model: Vec<f64> = (0..14).map(|p| 1.0 + 0.1 * p as f64).collect();
+    let x: [f64; D] = std::array::from_fn(|k| (1.3 * k as f64).sin() + 0.5);
+    let at = |x: [f64; D], model: Vec<f64>| Unknowns {
+        states: vec![x, [0.0; D]],
+        sets: vec![FilmParameters { model, camera: Vec::new(), clock: 0.0 }],
+    };
+    let linear = estimator.linearise(&at(x, model.clone())).unwrap();
+    let (a, h) = (linear.flow[0].a(), 1e-5);
+    let ends = |moved: [&Unknowns<D>; 2]| {
+        let [above, below] = moved.map(|point| estimator.linearise(point).unwrap().defects()[0]);
+        (below - above) / (2.0 * h)
+    };
+    for k in 0..D {
+        let moved = [h, -h].map(|h| {
+            let mut x = x;
+            x[k] += h;
+            at(x, model.clone())
+        });
+        // Differences are good to h^2 and to 1e-12/h.
+        approx::assert_relative_eq!(a.column(k).into_owned(), ends([&moved[0], &moved[1]]), epsilon = 1e-6);
+    }
+    for p in 0..14 {
+        let moved = [h, -h].map(|h| {
+            let mut model = model.clone();
+            model[p] += h;
+            at(x, model)
+        });
+        let wanted = ends([&moved[0], &moved[1]]);
+        for n in 0..D {
+            approx::assert_relative_eq!(linear.columns.state.at(n, p), wanted[n], epsilon = 1e-6);
+        }
+    }
+    for m in 0..D {
+        assert_eq!(linear.sights[0].h.row(m), SMatrix::<f64, D, D>::identity().row(m));
+    }
+    // A forcing's response: of a small one, constant over the link, the sum over its places.
+    let places = &estimator.places(&at(x, model.clone())).unwrap()[0].places;
+    let total = places.iter().fold(SMatrix::<f64, D, D>::zeros(), |sum, place| sum + place.response);
+    // By the mean over the link of the flow from there: (1 + a)/2 to the second order in its length.
+    let rough = (SMatrix::<f64, D, D>::identity() + a) * 0.05;
+    assert!((total - rough).abs().max() < 0.01 && total.abs().max() > 0.09);
+}
