@@ -424,9 +424,11 @@ fn idle_states_change_nothing() {
     let wanted = estimate::<3>(&film);
     for found in [estimate::<6>(&film), estimate::<8>(&film), estimate::<12>(&film)] {
         assert_eq!(found.len(), wanted.len());
-        for (found, wanted) in found.iter().zip(&wanted) {
-            // Sums are rounded in another order, and a matrix of condition 1e4 is inverted.
-            approx::assert_relative_eq!(found, wanted, max_relative = 1e-8, epsilon = 1e-9);
+        for (i, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
+            // Cost and evidence to rounding, which in the rest grows to 1e-7 of the smallest numbers: the third state is not
+            // seen, and seven parameters are free.
+            let accuracy = if i < 2 { 1e-11 } else { 1e-6 };
+            approx::assert_relative_eq!(found, wanted, max_relative = accuracy, epsilon = 1e-9);
         }
     }
 }
