@@ -64,6 +64,15 @@ impl<const D: usize> Bordered<D> {
         row[p] += precision * (mean - value);
     }
 
+    /// Gives the last `idle` states of every frame a weight of one, each by itself: they stay at zero, and neither the
+    /// cost nor the determinant knows of them.
+    pub(super) fn hold(&mut self, idle: usize) {
+        for k in D - idle..D {
+            self.diagonal.iter_mut().for_each(|own| own[(k, k)] = 1.0);
+            self.below.iter_mut().for_each(|link| link[(k, k)] = 0.0);
+        }
+    }
+
     /// Eliminates the states.
     pub fn eliminate(self, t: &[f64]) -> Result<ReducedSystem<D>, EstimateError> {
         f64::work(Isa::best(), Elimination { system: self, t })
@@ -156,7 +165,7 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                 row[p + 1..].fill(0.0);
                 system.diagonal[i + 1][(k, k)] += w * w;
                 for j in 0..D {
-                    a[j][k] = -w * link.slopes[k][j];
+                    a[j][k] = -w * link.slope(k, j);
                     system.below[i][(k, j)] += w * a[j][k];
                 }
                 add(system.border.row_mut(D * (i + 1) + k), w, row);

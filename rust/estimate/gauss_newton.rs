@@ -95,12 +95,13 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The inverse variance of the model's error over each link.
+    /// The inverse variance of the model's error over each link; that of idle states is of no account.
     pub fn precision(&self) -> Vec<SVector<f64, D>> {
         let t = &self.record.t;
-        let mut all: Vec<SVector<f64, D>> = vec![SVector::zeros(); t.len().saturating_sub(1)];
+        let live = self.live();
+        let mut all: Vec<SVector<f64, D>> = vec![SVector::repeat(1.0); t.len().saturating_sub(1)];
         for i in 0..all.len() {
-            for k in 0..D {
+            for k in 0..live {
                 all[i][k] = (self.diffusion[k].powi(2) * (t[i + 1] - t[i])).recip();
             }
         }
@@ -129,11 +130,12 @@ where
         Ok(Iterate { point, linear, cost })
     }
 
-    /// Adds the free parameters' priors to normal equations at a point.
+    /// Adds the free parameters' priors to normal equations at a point, and what holds idle states.
     pub(super) fn add_priors(&self, point: &Unknowns<D>, system: &mut Bordered<D>) {
         for (j, free) in self.free.iter().enumerate() {
             system.prior(j, point.get(free), free.mean, free.sd);
         }
+        system.hold(self.family.idle());
     }
 
     /// Minimises the cost from a start.

@@ -8,7 +8,7 @@ use super::bordered::zeros;
 use super::link_propagation::{Law, variable};
 use super::link_response::Transition;
 use super::parameter_jacobian::{
-    ExtraColumns, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, tagged,
+    FurtherDirections, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, tagged,
 };
 use super::row_matrix::RowMatrix;
 use super::sensor::{Moment, rates, seen};
@@ -90,9 +90,9 @@ where
         let Linearisation { mut sights, flow, columns: ParameterJacobian { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
         let plain = self.plain_laws(point);
-        let flow = self.flow(point, &laws, &plain, flow)?;
+        let mut flow = self.flow(point, &laws, &plain, flow)?;
         let timed = self.timed(point, &plain);
-        self.own_state_rows(point, &flow, &plain, &timed, &mut state)?;
+        self.own_state_rows(point, &mut flow, &plain, &timed, &mut state)?;
         self.sights(point, &laws, &timed, &mut sights, &mut seen);
         Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } })
     }
@@ -169,7 +169,7 @@ struct Look<'a, F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     point: &'a Unknowns<D>,
     law: &'a Law<F::Built<Wide>, Wide>,
     view: &'a View,
-    beyond: &'a [ExtraColumns<F::Built<Wide>>],
+    beyond: &'a [FurtherDirections<F::Built<Wide>>],
     i: usize,
     sight: &'a mut ObservationResidual<D, M>,
     rows: &'a mut [f64],
@@ -181,17 +181,17 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
     #[inline(always)]
     fn run<V: InstructionSet>(self) {
         let Self { of: Estimator { sensor, record, .. }, point, law, view, i, sight, rows, .. } = self;
-        let (film, p) = (record.film[i], rows.len() / M);
+        let (film, p, live) = (record.film[i], rows.len() / M, self.of.live());
         let (state, t) = (&point.states[i], record.t[i] * point.sets[film].pace());
-        let (x, t): ([Wide; D], Wide) = (variable(state), Wide::constant(t));
+        let (x, t): ([Wide; D], Wide) = (variable(state, 0..live), Wide::constant(t));
         let rate = rates(&law.system, t, &x);
         // The parameters of the model are seen through the rate, by a camera that looks at it, or by formulas.
         let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
         let expected = seen(sensor, &law.system, &view.plain, &at);
-        fill(rows, p, &expected, D, &view.model);
+        fill(rows, p, &expected, live, &view.model);
         sight.misfit = self.of.misfit(i, &vector!(f64, M; m => expected[m].re));
         for m in 0..M {
-            for k in 0..D {
+            for k in 0..live.min(WIDTH) {
                 sight.h[(m, k)] = expected[m].d[k];
             }
         }
@@ -209,11 +209,17 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
             let at = Moment { t: clocked, rate: &rate, ..at };
             fill(rows, p, &seen(sensor, &law.system, &view.plain, &at), 0, &view.clock);
         }
-        for ExtraColumns { columns, laws } in self.beyond {
-            let law = &laws[film];
+        for FurtherDirections { first, columns, laws } in self.beyond {
+            let (law, x): (_, [Wide; D]) = (&laws[film], variable(state, *first..live));
             let rate = rates(&law.system, t, &x);
             let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
-            fill(rows, p, &seen(sensor, &law.system, &view.plain, &at), 0, &columns[film]);
+            let expected = seen(sensor, &law.system, &view.plain, &at);
+            for m in 0..M {
+                for k in *first..live.min(first + WIDTH) {
+                    sight.h[(m, k)] = expected[m].d[k - first];
+                }
+            }
+            fill(rows, p, &expected, live.saturating_sub(*first), &columns[film]);
         }
     }
 }
@@ -223,7 +229,7 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
 fn fill<const M: usize>(rows: &mut [f64], p: usize, seen: &[Wide; M], first: usize, columns: &[usize]) {
     for m in 0..M {
         // Those that find no room beside the state are told of elsewhere.
-        for k in 0..columns.len().min(WIDTH - first) {
+        for k in 0..columns.len().min(WIDTH.saturating_sub(first)) {
             rows[m * p + columns[k]] = seen[m].d[first + k];
         }
     }

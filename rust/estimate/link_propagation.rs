@@ -1,5 +1,7 @@
 //! Links followed one after the other.
 
+use std::ops::Range;
+
 use super::{EstimateError, Estimator, Role, Sensor, Unknowns};
 use crate::analysis::batch::parallel::try_in_parts;
 use crate::integrate::{Failure, Integrator, Method, Taylor, Tolerance, order};
@@ -50,11 +52,15 @@ impl<'a, S, const D: usize> TransitionIntegrator<'a, S, D>
 where
     S: Scalar<Real = f64, Mask = bool>,
 {
-    fn new<M: System<S, D>>(tape: Option<&'a Tape<D>>, law: &'a Law<M, S>, tolerance: &Tolerance) -> Self {
+    fn new<M: System<S, D>>(
+        tape: Option<(&'a Tape<D>, usize)>,
+        law: &'a Law<M, S>,
+        tolerance: &Tolerance,
+    ) -> Self {
         let (x, system): (_, &dyn AnySystem<S, D>) = ([S::zero(); D], &law.system);
         match tape {
-            Some(tape) => {
-                let method = Taylor::new(tape, law.values.clone(), order(tolerance), Isa::best());
+            Some((tape, order)) => {
+                let method = Taylor::new(tape, law.values.clone(), order, Isa::best());
                 let driver = Integrator::by(method, system, 0.0, x, Some(1.0), tolerance);
                 Self::Series(Box::new(driver), *tolerance)
             }
@@ -170,7 +176,9 @@ where
         S: Scalar<Real = f64, Mask = bool>,
     {
         let tape = self.tape(point);
-        let new = |film: usize| TransitionIntegrator::new(tape.as_ref(), &laws[film], &self.tolerance);
+        let series = tape.as_ref().map(|tape| (tape, order(&self.tolerance)));
+        let tolerance = self.tolerance.filled::<D>(self.family.idle());
+        let new = |film: usize| TransitionIntegrator::new(series, &laws[film], &tolerance);
         found.resize(self.record.linked.len(), none.clone());
         try_in_parts(&mut found, TOGETHER, &|first, part| {
             // The film whose links were followed last, and what followed them.
@@ -194,9 +202,12 @@ where
     }
 }
 
-/// A state whose numbers are differentiated by its components, in the first directions.
+/// A state whose numbers are differentiated by these of its components, as many as there are directions.
 #[inline(always)]
-pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D]) -> [Dual<f64, N>; D] {
-    const { assert!(D <= N) };
-    vector!(Dual<f64, N>, D; k => Dual::variable(x[k], k))
+pub(super) fn variable<const D: usize, const N: usize>(x: &[f64; D], by: Range<usize>) -> [Dual<f64, N>; D] {
+    let mut all = vector!(Dual<f64, N>, D; k => Dual::constant(x[k]));
+    for k in by.start..by.end.min(by.start + N) {
+        all[k].d[k - by.start] = 1.0;
+    }
+    all
 }

@@ -1,5 +1,7 @@
 //! The model's flow from each frame to the next, and how it responds to what is added on the way.
 
+use std::ops::Range;
+
 use nalgebra::{SMatrix, SVector};
 
 use super::bordered::zeros;
@@ -44,15 +46,24 @@ pub struct Transition<const D: usize> {
     /// The derivatives of what the model makes: by this frame's state, then by those of the model's free
     /// parameters that find room.
     pub slopes: [[f64; WIDTH]; D],
+    /// The derivatives by those components of this frame's state that find no room there, one after the other; those by
+    /// idle ones are zero.
+    pub further: Vec<[f64; D]>,
     /// The rate at the end.
     pub end_rate: SVector<f64, D>,
 }
 
 impl<const D: usize> Transition<D> {
+    /// The derivative of component `m` by component `k` of this frame's state.
+    #[inline(always)]
+    pub fn slope(&self, m: usize, k: usize) -> f64 {
+        if D <= WIDTH || k < WIDTH { self.slopes[m][k] } else { self.further[k - WIDTH][m] }
+    }
+
     /// The derivative by this frame's state.
     #[inline(always)]
     pub fn a(&self) -> SMatrix<f64, D, D> {
-        SMatrix::from_fn(|m, k| self.slopes[m][k])
+        SMatrix::from_fn(|m, k| self.slope(m, k))
     }
 }
 
@@ -61,7 +72,8 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// Every link, kept where `room` was; those of frames that are not linked are all zero.
+    /// Every link, kept where `room` was; those of frames that are not linked are all zero. What is
+    /// [further](Transition::further) is not worked out here.
     pub(super) fn flow(
         &self,
         point: &Unknowns<D>,
@@ -69,13 +81,18 @@ where
         plain: &[Law<F::Built<f64>, f64>],
         room: Vec<Transition<D>>,
     ) -> Result<Vec<Transition<D>>, EstimateError> {
-        let zero = zeros();
-        let none = Transition { defect: zero, slopes: [[0.0; WIDTH]; D], end_rate: zero };
+        let (zero, live) = (zeros(), self.live());
+        let none = Transition {
+            defect: zero,
+            slopes: [[0.0; WIDTH]; D],
+            further: vec![[0.0; D]; D.saturating_sub(WIDTH)],
+            end_rate: zero,
+        };
         let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
                    i: usize,
                    (film, start, end): Span,
                    link: &mut Transition<D>| {
-            let x = variable(&point.states[i]);
+            let x = variable(&point.states[i], 0..live);
             let (last, _) = follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
             let (system, there) = (&plain[film].system, vector!(f64, D; k => last[k].re));
             let end_rate = rates_of(system, end, &there);
@@ -91,26 +108,33 @@ where
 
     /// What acts on every link; all zero where frames are not linked.
     pub fn places(&self, point: &Unknowns<D>) -> Result<Vec<QuadraturePoints<D>>, EstimateError> {
-        let laws = self.own_laws(point);
+        let (laws, live) = (self.own_laws(point), self.live());
         let place = QuadraturePoint { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = QuadraturePoints { switched: false, places: [place; PLACES_PER_LINK] };
         let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
                    i: usize,
                    (_, start, end): Span,
                    found: &mut QuadraturePoints<D>| {
-            let x: [Wide; D] = variable(&point.states[i]);
-            let mut met = [x; PLACES_PER_LINK];
-            let (last, switched) =
-                follower.follow(TransitionRun { start, end, x, places: &PLACES, met: &mut met })?;
-            let a = by_state(&last);
-            found.switched = switched;
+            let mut a = SMatrix::<f64, D, D>::identity();
+            let (mut here, mut states) = ([a; PLACES_PER_LINK], [[0.0; D]; PLACES_PER_LINK]);
+            for first in (0..live).step_by(WIDTH) {
+                let x: [Wide; D] = variable(&point.states[i], first..live);
+                let mut met = [x; PLACES_PER_LINK];
+                let (last, switched) =
+                    follower.follow(TransitionRun { start, end, x, places: &PLACES, met: &mut met })?;
+                found.switched = switched;
+                by_state(&last, first..live, &mut a);
+                for q in 0..PLACES_PER_LINK {
+                    by_state(&met[q], first..live, &mut here[q]);
+                    states[q] = vector!(f64, D; k => met[q][k].re);
+                }
+            }
             for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
-                let here = by_state(&met[q]).try_inverse().unwrap_or_else(zeros);
-                let response = a * here * (WEIGHTS[q] * (end - start));
-                let state = vector!(f64, D; k => met[q][k].re);
-                found.places[q] = QuadraturePoint { since, t: start + since, state, response };
+                let back = here[q].try_inverse().unwrap_or_else(zeros);
+                let response = a * back * (WEIGHTS[q] * (end - start));
+                found.places[q] = QuadraturePoint { since, t: start + since, state: states[q], response };
             }
             Ok(())
         };
@@ -118,13 +142,11 @@ where
     }
 }
 
-/// The derivatives of a state by the one it started from, as a matrix.
-fn by_state<const D: usize>(x: &[Wide; D]) -> SMatrix<f64, D, D> {
-    let mut matrix = zeros();
+/// The derivatives of a state by these components of the one it started from, as many as there are directions.
+fn by_state<const D: usize>(x: &[Wide; D], by: Range<usize>, matrix: &mut SMatrix<f64, D, D>) {
     for m in 0..D {
-        for k in 0..D {
-            matrix[(m, k)] = x[m].d[k];
+        for k in by.start..by.end.min(by.start + WIDTH) {
+            matrix[(m, k)] = x[m].d[k - by.start];
         }
     }
-    matrix
 }

@@ -62,6 +62,18 @@ where
     pub known: Option<CachedLinearisation<D, M>>,
 }
 
+impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// How many states are not idle.
+    #[inline]
+    pub(super) fn live(&self) -> usize {
+        D - self.family.idle()
+    }
+}
+
 /// Why an estimate failed.
 #[derive(Debug, thiserror::Error)]
 pub enum EstimateError {

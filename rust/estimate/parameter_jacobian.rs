@@ -30,7 +30,16 @@ pub struct ParameterJacobian {
 impl ParameterJacobian {
     /// These columns with others to their right.
     pub fn beside(&self, other: &Self) -> Self {
-        Self { seen: self.seen.beside(&other.seen), state: self.state.beside(&other.state) }
+        self.beside_all(std::slice::from_ref(other))
+    }
+
+    /// These columns with those of all others to their right.
+    pub fn beside_all(&self, others: &[Self]) -> Self {
+        let all = |rows: fn(&Self) -> &RowMatrix| {
+            let parts: Vec<&RowMatrix> = std::iter::once(self).chain(others).map(rows).collect();
+            RowMatrix::side_by_side(&parts)
+        };
+        Self { seen: all(|own| &own.seen), state: all(|own| &own.state) }
     }
 }
 
@@ -43,8 +52,10 @@ pub(super) enum TimeOrigin {
     Frame,
 }
 
-/// Laws that are differentiated by some parameters, and the columns of these, film by film.
-pub(super) struct ExtraColumns<B> {
+/// What found no room in the first directions: the state from component `first` on, and behind it some parameters, by
+/// which laws are differentiated; and the columns of these, film by film.
+pub(super) struct FurtherDirections<B> {
+    pub first: usize,
     pub columns: Vec<Vec<usize>>,
     pub laws: Vec<Law<B, Wide>>,
 }
@@ -89,17 +100,18 @@ where
         timed
     }
 
-    /// The rows of the free parameters at the links' ends; some films' laws are [timed](Estimator::timed).
+    /// The rows of the free parameters at the links' ends, and what is [further](Transition::further) there; some films' laws are [timed](Estimator::timed).
     pub(super) fn own_state_rows(
         &self,
         point: &Unknowns<D>,
-        flow: &[Transition<D>],
+        flow: &mut [Transition<D>],
         plain: &[Law<F::Built<f64>, f64>],
         timed: &[bool],
         rows: &mut RowMatrix,
     ) -> Result<(), EstimateError> {
-        let p = self.free.len();
+        let (p, live) = (self.free.len(), self.live());
         rows.become_zeros(flow.len() * D, p);
+        self.further_rows(point, flow, rows)?;
         if p == 0 {
             return Ok(());
         }
@@ -113,8 +125,8 @@ where
                 let dt = self.record.t[i + 1] - self.record.t[i];
                 for n in 0..D {
                     let row = &mut rows[n * p..(n + 1) * p];
-                    for k in 0..models[film].len().min(WIDTH - D) {
-                        row[models[film][k].0] = link.slopes[n][D + k];
+                    for k in 0..models[film].len().min(WIDTH.saturating_sub(live)) {
+                        row[models[film][k].0] = link.slopes[n][live + k];
                     }
                     // A slower clock lets the flow run on for longer.
                     for &(column, _) in &clocks[film] {
@@ -136,13 +148,27 @@ where
                 }
             }
         });
-        // Those that found no room beside the state go the way again.
-        for ExtraColumns { columns, laws } in self.beyond(point) {
+        // Idle states leave their directions to parameters.
+        for slopes in flow.iter_mut().flat_map(|link| &mut link.slopes) {
+            (live..D.min(WIDTH)).for_each(|k| slopes[k] = 0.0);
+        }
+        Ok(())
+    }
+
+    /// What found no room in the first directions goes the way again.
+    fn further_rows(
+        &self,
+        point: &Unknowns<D>,
+        flow: &mut [Transition<D>],
+        rows: &mut RowMatrix,
+    ) -> Result<(), EstimateError> {
+        let live = self.live();
+        for FurtherDirections { first, columns, laws } in self.beyond(point) {
             let slopes = self.each_link(
                 point,
                 &laws,
                 &|follower, i, (_, start, end), slopes: &mut [[f64; WIDTH]; D]| {
-                    let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
+                    let x = variable(&point.states[i], first..live);
                     let (last, _) =
                         follower.follow(TransitionRun { start, end, x, places: &[], met: &mut [] })?;
                     for k in 0..D {
@@ -153,10 +179,14 @@ where
                 &[[0.0; WIDTH]; D],
                 Vec::new(),
             )?;
+            let states = live.saturating_sub(first).min(WIDTH);
             for (i, slopes) in slopes.iter().enumerate() {
+                for k in 0..states {
+                    flow[i].further[first - WIDTH + k] = vector!(f64, D; n => slopes[n][k]);
+                }
                 for (k, &column) in columns[self.record.film[i]].iter().enumerate() {
                     for n in 0..D {
-                        rows.row_mut(D * i + n)[column] = slopes[n][k];
+                        rows.row_mut(D * i + n)[column] = slopes[n][states + k];
                     }
                 }
             }
@@ -164,36 +194,34 @@ where
         Ok(())
     }
 
-    /// The laws of all films over numbers that are differentiated by the state and, behind it, by the first of
-    /// the film's free parameters.
+    /// The laws of all films over numbers that are differentiated by the state, as far as it finds room, and behind it by
+    /// the first of the film's free parameters.
     pub(super) fn own_laws(&self, point: &Unknowns<D>) -> Vec<Law<F::Built<Wide>, Wide>> {
-        const { assert!(D < WIDTH) };
         self.laws(point, &|film, values| {
             let own = acting(&self.free, film, model);
-            tagged(values, &own[..own.len().min(WIDTH - D)], D)
+            tagged(values, &own[..own.len().min(WIDTH.saturating_sub(self.live()))], self.live())
         })
     }
 
-    /// The laws over numbers that are differentiated by the free parameters that find no room there.
-    pub(super) fn beyond(&self, point: &Unknowns<D>) -> Vec<ExtraColumns<F::Built<Wide>>> {
+    /// The laws over numbers that are differentiated by the states and the free parameters that find no room there.
+    pub(super) fn beyond(&self, point: &Unknowns<D>) -> Vec<FurtherDirections<F::Built<Wide>>> {
         let films = 0..point.sets.len();
         let models: Vec<_> = films.map(|film| acting(&self.free, film, model)).collect();
         let most = models.iter().map(Vec::len).max().unwrap_or(0);
-        let (mut all, mut first) = (Vec::new(), WIDTH - D);
-        while first < most {
+        let (mut all, live) = (Vec::new(), self.live());
+        for first in (WIDTH..live + most).step_by(WIDTH) {
+            let (from, to) = (first.saturating_sub(live), (first + WIDTH).saturating_sub(live));
             let mut own = Vec::new();
             for model in &models {
-                own.push(&model[first.min(model.len())..model.len().min(first + WIDTH)]);
+                own.push(&model[from.min(model.len())..to.min(model.len())]);
             }
             let mut columns = Vec::new();
             for own in &own {
                 columns.push(columns_of(own));
             }
-            all.push(ExtraColumns {
-                columns,
-                laws: self.laws(point, &|film, values| tagged(values, own[film], 0)),
-            });
-            first += WIDTH;
+            let behind = live.saturating_sub(first);
+            let laws = self.laws(point, &|film, values| tagged(values, own[film], behind));
+            all.push(FurtherDirections { first, columns, laws });
         }
         all
     }
@@ -289,14 +317,15 @@ where
         let (_, start, end) = self.link(point, i)?;
         let x = vector!(Wide, D; k => Wide::constant(point.states[i][k]));
         // The flow went this way already.
-        propagate(system, start, end, x, &self.tolerance).ok()
+        propagate(system, start, end, x, &self.tolerance.filled::<D>(self.family.idle())).ok()
     }
 
     /// The derivatives of what is seen by the state's rate.
     fn seen_by_rate(&self, set: &FilmParameters, t: f64, x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
         let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
         let (camera, parameters) = (constants(&set.camera), constants(&set.model));
-        let at = Moment { t: Dual::constant(t), x: &x, rate: &variable(rate), parameters: &parameters };
+        let rate = variable(rate, 0..D);
+        let at = Moment { t: Dual::constant(t), x: &x, rate: &rate, parameters: &parameters };
         let seen = self.sensor.observe::<Dual<f64, D>>(&camera, &at);
         let mut slopes = [[0.0; D]; M];
         for m in 0..M {

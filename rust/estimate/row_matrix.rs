@@ -79,12 +79,20 @@ impl RowMatrix {
 
     /// These rows with those of `other` set to their right.
     pub fn beside(&self, other: &Self) -> Self {
-        let rows = self.count().max(other.count());
-        let mut all = Self::zeros(rows, self.width + other.width);
+        Self::side_by_side(&[self, other])
+    }
+
+    /// The rows of all parts, from left to right.
+    pub fn side_by_side(parts: &[&Self]) -> Self {
+        let rows = parts.iter().map(|part| part.count()).max().unwrap_or(0);
+        let mut all = Self::zeros(rows, parts.iter().map(|part| part.width).sum());
         for i in 0..rows {
-            let row = all.row_mut(i);
-            row[..self.width].copy_from_slice(self.row(i));
-            row[self.width..].copy_from_slice(other.row(i));
+            let mut rest = all.row_mut(i);
+            for part in parts {
+                let own;
+                (own, rest) = rest.split_at_mut(part.width);
+                own.copy_from_slice(part.row(i));
+            }
         }
         all
     }

@@ -44,12 +44,10 @@ where
     pub fn score(&self, point: &Unknowns<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
         let linear = self.around(point)?;
         let places = self.places(point)?;
-        let (mut size, mut columns) = (0, linear.columns.clone());
-        for candidate in candidates {
-            let more = self.candidate_columns(point, &places, candidate, TimeOrigin::Record);
-            size += more.seen.width();
-            columns = columns.beside(&more);
-        }
+        let one = |candidate| self.candidate_columns(point, &places, candidate, TimeOrigin::Record);
+        let more: Vec<ParameterJacobian> = candidates.iter().map(one).collect();
+        let size = more.iter().map(|own| own.seen.width()).sum();
+        let columns = linear.columns.beside_all(&more);
         let scores = self.score_beside(point, &linear, &columns, &[size])?;
         Ok(scores.into_iter().next().expect("one group"))
     }

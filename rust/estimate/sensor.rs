@@ -171,6 +171,8 @@ impl Sensor<2, 1> for AngleSensor {
 #[derive(Clone, Debug)]
 pub struct FormulaSensor<const D: usize> {
     pub observation: Observation,
+    /// How many states are not idle.
+    pub states: usize,
     /// The components that are angles, where they are seen as they are.
     pub angles: [bool; D],
 }
@@ -179,7 +181,7 @@ impl<const D: usize> Sensor<D, D> for FormulaSensor<D> {
     const PARAMETERS: &'static [(&'static str, &'static str)] = &[];
 
     fn channels(&self) -> usize {
-        if self.observation.is_empty() { D } else { self.observation.len() }
+        if self.observation.is_empty() { self.states } else { self.observation.len() }
     }
 
     fn is_angle(&self, channel: usize) -> bool {

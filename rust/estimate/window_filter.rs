@@ -62,6 +62,7 @@ where
     ) -> Result<Vec<Vec<[f64; M]>>, EstimateError> {
         let systems: Vec<F::Built<f64>> =
             (0..).zip(sets).map(|(film, set)| self.family.build_for(film, &set.model)).collect();
+        let tolerance = self.tolerance.filled::<D>(self.family.idle());
         try_map(starts.len().min(times.len()), &|i| {
             let ((film, t, x), times) = (starts[i], &times[i]);
             let (system, set) = (&systems[film], &sets[film]);
@@ -69,7 +70,7 @@ where
             let mut expected = Vec::with_capacity(times.len());
             for &next in times {
                 let next = next * set.pace();
-                x = propagate(system, t, next, x, &self.tolerance)
+                x = propagate(system, t, next, x, &tolerance)
                     .map_err(|source| EstimateError::Integration { t, source })?;
                 t = next;
                 let rate = system.rates(t, &x, &sides_of(system, t, &x));

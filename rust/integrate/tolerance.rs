@@ -42,6 +42,13 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
+    /// The tolerance whose norm over `D` components, of which `idle` rest and have no error, is this one's over the
+    /// others.
+    pub fn filled<const D: usize>(&self, idle: usize) -> Self {
+        let factor = ((D - idle) as f64 / D as f64).sqrt();
+        Self { rtol: self.rtol * factor, atol: self.atol * factor }
+    }
+
     /// The norm of `error`: 1 where it is just allowed.
     #[inline(always)]
     pub fn norm<R: Real, const D: usize>(&self, error: [R; D], before: [R; D], after: [R; D]) -> R {

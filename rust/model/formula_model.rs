@@ -183,20 +183,21 @@ pub struct FormulaFamily<const D: usize> {
 }
 
 impl<const D: usize> FormulaFamily<D> {
-    /// Parses the right-hand sides, in the order of the states.
+    /// Parses the right-hand sides, in the order of the states; with fewer than `D` the last states are idle.
     ///
     /// # Errors
     /// The number of the equation and what is wrong with it, in words that continue "the formula ...".
     ///
     /// # Panics
-    /// Where there are not `D` states and equations.
+    /// Where there are more than `D` states, or another number of equations.
     pub fn parse(
         states: &[String],
         equations: &[&str],
         parameters: &[String],
         inputs: &[String],
     ) -> Result<Self, (usize, Mistake)> {
-        assert!(states.len() == D && equations.len() == D, "{D} states and equations are needed");
+        let live = states.len();
+        assert!(live <= D && equations.len() == live, "an equation for each of at most {D} states is needed");
         let mut parsed = Vec::with_capacity(D);
         for (n, text) in equations.iter().enumerate() {
             let wrong = |what: String| Err((n, Mistake(what)));
@@ -213,7 +214,7 @@ impl<const D: usize> FormulaFamily<D> {
         let mut kinks = Kinks { clocked: !inputs.is_empty(), ..Kinks::default() };
         parsed.iter_mut().for_each(|one| kinks.of(one));
         let deep = parsed.iter().chain(&kinks.surfaces).any(|one| one.depth() > SHALLOW);
-        let Ok(equations) = <[Expression; D]>::try_from(parsed) else { unreachable!("as many as states") };
+        let equations = with_idle(parsed);
         let states = states.iter().map(|name| (name.clone(), false)).collect();
         let (equations, kinks) = (Arc::new(equations), Arc::new(kinks));
         let (parameters, inputs, records) = (parameters.to_vec(), inputs.len(), Arc::default());
@@ -253,13 +254,8 @@ impl<const D: usize> FormulaFamily<D> {
     /// # Panics
     /// Where there are more than `E` states already.
     pub fn filled<const E: usize>(&self) -> FormulaFamily<E> {
-        let idle = E.checked_sub(D).expect("at least as many states");
-        let equations = self.equations.iter().cloned().chain(vec![Expression::number(0.0); idle]);
-        let Ok(equations) = <[Expression; E]>::try_from(equations.collect::<Vec<_>>()) else {
-            unreachable!("as many as states")
-        };
         FormulaFamily {
-            equations: Arc::new(equations),
+            equations: Arc::new(with_idle(self.equations[..self.states.len()].to_vec())),
             kinks: self.kinks.clone(),
             deep: self.deep,
             parameters: self.parameters.clone(),
@@ -285,6 +281,16 @@ impl<const D: usize> FormulaFamily<D> {
     pub fn equations(&self) -> &[Expression; D] {
         &self.equations
     }
+}
+
+/// Equations of `D` states, of which those that are not given rest.
+///
+/// # Panics
+/// Where there are more than `D`.
+fn with_idle<const D: usize>(mut equations: Vec<Expression>) -> [Expression; D] {
+    assert!(equations.len() <= D);
+    equations.resize(D, Expression::number(0.0));
+    <[Expression; D]>::try_from(equations).unwrap_or_else(|_| unreachable!("as many as states"))
 }
 
 impl<const D: usize> Family<D> for FormulaFamily<D> {

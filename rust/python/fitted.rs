@@ -1,5 +1,8 @@
 //! The estimator whatever its family and its sensor: plain numbers in, plain numbers out. What is on Python's side
 //! of it is compiled once.
+//!
+//! Of own models with more than four states the estimator is compiled for twelve: others have idle states, which nobody
+//! sees, at their end. Here these are added to what comes in, and cut from what goes out.
 
 use std::sync::Arc;
 
@@ -7,6 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::jobs;
 use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
 use crate::analysis::CancelFlag;
@@ -156,21 +160,39 @@ pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     own: fn(AnyModel) -> Option<(F, Vec<f64>)>,
 }
 
+/// With idle states up to a number that the estimator is compiled for, which is as many as channels at least.
+fn filled(model: AnyModel) -> AnyModel {
+    match model {
+        AnyModel::One(family, values) if family.observation().len() > 1 => {
+            AnyModel::Twelve(family.filled(), values)
+        }
+        AnyModel::Two(Either::Second(family), values) if family.observation().len() > 2 => {
+            AnyModel::Twelve(family.filled(), values)
+        }
+        AnyModel::Three(Either::Second(family), values) if family.observation().len() > 3 => {
+            AnyModel::Twelve(family.filled(), values)
+        }
+        AnyModel::Four(Either::Second(family), values) if family.observation().len() > 4 => {
+            AnyModel::Twelve(family.filled(), values)
+        }
+        AnyModel::Five(Either::Second(family), values) => AnyModel::Twelve(family.filled(), values),
+        AnyModel::Six(family, values) => AnyModel::Twelve(family.filled(), values),
+        other => other,
+    }
+}
+
 /// The problem that is asked of a model.
 pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
     macro_rules! of {
         ($($kind:pat => $told:expr, $problem:expr;)+) => {
-            match model {
+            match filled(model) {
                 $($kind => {
-                    let own = |model| match model {
+                    let own = |model| match filled(model) {
                         $kind => Some($told),
                         _ => None,
                     };
                     Box::new(problem($problem, own, asked)?) as Box<dyn Fitted>
                 })+
-                AnyModel::Five(Either::Second(_), _) | AnyModel::Six(..) => {
-                    return Err(PyValueError::new_err("a model that is fitted has at most 4 states"));
-                }
                 _ => return Err(PyValueError::new_err("a camera sees a disk or a pendulum")),
             }
         };
@@ -182,6 +204,7 @@ pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
         AnyModel::Two(Either::Second(family), values) => (family, values), with_sensor(family, &values);
         AnyModel::Three(Either::Second(family), values) => (family, values), with_sensor(family, &values);
         AnyModel::Four(Either::Second(family), values) => (family, values), with_sensor(family, &values);
+        AnyModel::Twelve(family, values) => (family, values), with_sensor(family, &values);
     })
 }
 
@@ -190,13 +213,12 @@ fn with_sensor<const D: usize>(
     family: FormulaFamily<D>,
     values: &[f64],
 ) -> (FormulaFamily<D>, &[f64], FormulaSensor<D>) {
-    let states = family.states();
     let mut angles = [false; D];
-    for n in 0..D {
-        angles[n] = states[n].1;
+    for (n, (_, angle)) in family.states().into_iter().enumerate() {
+        angles[n] = angle;
     }
-    let observation = family.observation().clone();
-    (family, values, FormulaSensor { observation, angles })
+    let (observation, states) = (family.observation().clone(), family.states().len());
+    (family, values, FormulaSensor { observation, states, angles })
 }
 
 /// The same for one family and one sensor.
@@ -209,29 +231,39 @@ where
     F: Family<D> + 'static,
     C: Sensor<D, M> + 'static,
 {
-    let m = sensor.channels();
-    asked.check((D, m), (values.len(), C::PARAMETERS.len()))?;
+    let (d, m) = (D - family.idle(), sensor.channels());
+    asked.check((d, m), (values.len(), C::PARAMETERS.len()))?;
     let mut record = Record::default();
     if let Some(data) = asked.data {
         (record.t, record.linked, record.film) = (data.t.clone(), data.linked.clone(), data.film.clone());
         record.memory[..m].copy_from_slice(&data.autocorrelation);
-        // Channels that there are not have no information.
-        for (seen, information) in data.seen.numbers.chunks(m).zip(data.information.numbers.chunks(m * m)) {
-            record.seen.push(SVector::from_fn(|i, _| seen.get(i).copied().unwrap_or(0.0)));
-            let there = |i, j| if i < m && j < m { information[m * i + j] } else { 0.0 };
-            record.information.push(SMatrix::from_fn(there));
+        record.seen = padded(&data.seen.numbers, m).into_iter().map(SVector::from).collect();
+        for information in data.information.numbers.chunks_exact(m * m) {
+            let number = |r, c| if r < m && c < m { information[m * r + c] } else { 0.0 };
+            record.information.push(SMatrix::from_fn(number));
         }
     }
     let mut diffusion = [1.0; D];
     if asked.data.is_some() {
-        diffusion.copy_from_slice(asked.diffusion);
+        diffusion[..d].copy_from_slice(asked.diffusion);
     }
-    let point = Unknowns { states: asked.states.numbers.as_chunks().0.to_vec(), sets: asked.sets };
+    let point = Unknowns { states: padded(&asked.states.numbers, d), sets: asked.sets };
     let tolerance = TOLERANCE;
     let mut estimator =
         Estimator { family, sensor, record, free: asked.free, diffusion, tolerance, known: None };
     estimator.known = asked.linear.and_then(|linear| linear.known(&estimator));
     Ok(Fit { estimator, point, own })
+}
+
+impl<F, C, const D: usize, const M: usize> Fit<F, C, D, M>
+where
+    F: Family<D>,
+    C: Sensor<D, M>,
+{
+    /// The numbers of states and channels that are not idle.
+    fn live(&self) -> (usize, usize) {
+        (D - self.estimator.family.idle(), self.estimator.sensor.channels())
+    }
 }
 
 impl<F, C, const D: usize, const M: usize> Fitted for Fit<F, C, D, M>
@@ -241,21 +273,22 @@ where
 {
     fn size(&self) -> Size {
         let (frames, free) = (self.estimator.record.t.len(), self.estimator.free.len());
-        Size { frames, free, states: D, channels: self.estimator.sensor.channels() }
+        let (states, channels) = self.live();
+        Size { frames, free, states, channels }
     }
 
     fn solve(self: Box<Self>, options: &Options, stop: &CancelFlag) -> Result<Solved, EstimateError> {
+        let (d, m) = self.live();
         let Self { estimator, point, .. } = *self;
-        let m = estimator.sensor.channels();
         let s = estimator.solve(point, options, stop)?;
         Ok(Solved {
-            states: s.point.states.as_flattened().to_vec(),
+            states: rows(&s.point.states, d),
             sets: s.point.sets.clone(),
             covariance: s.covariance.as_slice().to_vec(),
-            state_covariance: numbers(&s.state_covariance, D),
-            misfit: numbers(&s.misfit, m),
-            seen_variance: numbers(&s.seen_variance, m),
-            defect: numbers(&s.defect[..estimator.record.t.len() - 1], D),
+            state_covariance: numbers(&s.state_covariance, (d, d)),
+            misfit: numbers(&s.misfit, (m, 1)),
+            seen_variance: numbers(&s.seen_variance, (m, 1)),
+            defect: numbers(&s.defect[..estimator.record.t.len() - 1], (d, 1)),
             cost: s.cost,
             evidence: s.evidence,
             converged: s.converged,
@@ -281,40 +314,44 @@ where
     }
 
     fn score_groups(&self, state: RowMatrix, groups: &[usize]) -> Result<Vec<Score>, EstimateError> {
-        let seen = RowMatrix::zeros(self.estimator.record.t.len() * M, state.width());
+        let (seen, live) =
+            (RowMatrix::zeros(self.estimator.record.t.len() * M, state.width()), self.live().0);
+        let mut all = RowMatrix::zeros(state.count() / live * D, state.width());
+        for i in 0..state.count() {
+            all.row_mut(i / live * D + i % live).copy_from_slice(state.row(i));
+        }
+        let state = all;
         self.estimator.score_groups(&self.point, &ParameterJacobian { seen, state }, groups)
     }
 
     fn places(&self) -> Result<[Vec<f64>; 3], EstimateError> {
+        let d = self.live().0;
         let (mut t, mut states, mut responses) = (Vec::new(), Vec::new(), Vec::new());
         for link in self.estimator.places(&self.point)? {
             for place in &link.places {
                 t.push(place.t);
-                states.extend_from_slice(&place.state);
+                states.extend_from_slice(&place.state[..d]);
                 responses.push(place.response);
             }
         }
-        Ok([t, states, numbers(&responses, D)])
+        Ok([t, states, numbers(&responses, (d, d))])
     }
 
     fn filter(&self, windows: &[(usize, usize)], stop: &CancelFlag) -> Result<[Vec<f64>; 3], EstimateError> {
+        let d = self.live().0;
         let (mut first, mut last, mut covariance) = (Vec::new(), Vec::new(), Vec::new());
         for end in self.estimator.filter(&self.point, windows, &Options::default(), stop)? {
-            first.extend_from_slice(&end.first);
-            last.extend_from_slice(&end.last);
+            first.extend_from_slice(&end.first[..d]);
+            last.extend_from_slice(&end.last[..d]);
             covariance.push(end.covariance);
         }
-        Ok([first, last, numbers(&covariance, D)])
+        Ok([first, last, numbers(&covariance, (d, d))])
     }
 
     fn innovations(&self, vague: &[f64]) -> Result<Vec<f64>, EstimateError> {
-        let vague = vague.first_chunk().expect("one per state");
-        let m = self.estimator.sensor.channels();
-        let mut all = Vec::new();
-        for own in self.estimator.innovations(&self.point, vague)? {
-            all.extend_from_slice(&own[..m]);
-        }
-        Ok(all)
+        let mut all = [1.0; D];
+        all[..vague.len()].copy_from_slice(vague);
+        Ok(rows(&self.estimator.innovations(&self.point, &all)?, self.live().1))
     }
 
     fn predict(&self, film: &[usize], t0: &[f64], times: &[Vec<f64>]) -> Result<Vec<f64>, EstimateError> {
@@ -322,10 +359,9 @@ where
         for i in 0..times.len() {
             starts.push((film[i], t0[i], self.point.states[i]));
         }
-        let m = self.estimator.sensor.channels();
         let mut all = Vec::new();
-        for own in self.estimator.predict(&self.point.sets, &starts, times)?.iter().flatten() {
-            all.extend_from_slice(&own[..m]);
+        for seen in self.estimator.predict(&self.point.sets, &starts, times)? {
+            all.extend(rows(&seen, self.live().1));
         }
         Ok(all)
     }
@@ -339,12 +375,29 @@ fn added(values: &[f64], own: usize, indices: &[usize]) -> PyResult<(Vec<f64>, V
     Ok((values[own..].to_vec(), indices.iter().map(|&index| Role::Model(index)).collect()))
 }
 
-/// The numbers of small matrices' first rows in C order.
-fn numbers<const A: usize, const B: usize>(blocks: &[SMatrix<f64, A, B>], rows: usize) -> Vec<f64> {
-    let mut all = Vec::with_capacity(rows * B * blocks.len());
+/// Rows of so many numbers, filled up with zeros.
+fn padded<const D: usize>(numbers: &[f64], live: usize) -> Vec<[f64; D]> {
+    let mut all = vec![[0.0; D]; numbers.len() / live];
+    for (row, numbers) in all.iter_mut().zip(numbers.chunks_exact(live)) {
+        row[..live].copy_from_slice(numbers);
+    }
+    all
+}
+
+/// The first so many numbers of every row.
+fn rows<const D: usize>(rows: &[[f64; D]], live: usize) -> Vec<f64> {
+    jobs::live(rows.as_flattened().to_vec(), D, live)
+}
+
+/// The numbers of small matrices in C order, of the first so many rows and columns.
+fn numbers<const A: usize, const B: usize>(
+    blocks: &[SMatrix<f64, A, B>],
+    (height, width): (usize, usize),
+) -> Vec<f64> {
+    let mut all = Vec::with_capacity(height * width * blocks.len());
     for block in blocks {
-        for i in 0..rows {
-            for j in 0..B {
+        for i in 0..height {
+            for j in 0..width {
                 all.push(block[(i, j)]);
             }
         }

@@ -8,13 +8,16 @@ use pyo3::prelude::*;
 
 use super::errors::ModelError;
 use crate::analysis::batch::rows::tape;
-use crate::estimate::{FormulaSensor, Moment, seen};
+use crate::estimate::{FormulaSensor, Moment, Sensor, seen};
 use crate::formula::{Names, is_reserved};
 use crate::model::effects::{Body, Formula, FrictionModel, Kind, Slot, Source};
 use crate::model::{
     DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, MAX_INPUTS, Momentum, Observation,
     PendulumFamily, Signal, Signals, System, WithLuGre, sides_of,
 };
+
+/// The most states and sensors of a user's own model.
+const MAX_STATES: usize = 12;
 
 /// Any model with its parameter values, in the order of its family's parameters.
 ///
@@ -28,6 +31,8 @@ pub enum AnyModel {
     /// With LuGre friction, whose bristles are one more state.
     Five(Either<WithLuGre<DiskFamily>, FormulaFamily<5>>, Vec<f64>),
     Six(FormulaFamily<6>, Vec<f64>),
+    /// With 7 to 12 states, the last of which may be idle.
+    Twelve(FormulaFamily<12>, Vec<f64>),
     /// Apart from the others of three states, whose laws are smooth.
     BristledPendulum(WithLuGre<PendulumFamily>, Vec<f64>),
 }
@@ -44,6 +49,7 @@ macro_rules! with_model {
             $crate::python::model::AnyModel::Four($family, $values) => $body,
             $crate::python::model::AnyModel::Five($family, $values) => $body,
             $crate::python::model::AnyModel::Six($family, $values) => $body,
+            $crate::python::model::AnyModel::Twelve($family, $values) => $body,
             $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
         }
     };
@@ -86,6 +92,10 @@ macro_rules! with_wide_model {
                 $body
             }
             $crate::python::model::AnyModel::Six($family, $values) => {
+                let $alone = $family;
+                $body
+            }
+            $crate::python::model::AnyModel::Twelve($family, $values) => {
                 let $alone = $family;
                 $body
             }
@@ -206,6 +216,7 @@ impl AnyModel {
             AnyModel::Four(Either::Second(family), _) => return family.states(),
             AnyModel::Five(Either::Second(family), _) => return family.states(),
             AnyModel::Six(family, _) => return family.states(),
+            AnyModel::Twelve(family, _) => return family.states(),
         };
         names.iter().map(|&name| (name.to_owned(), matches!(name, "beta" | "theta"))).collect()
     }
@@ -231,14 +242,20 @@ impl AnyModel {
         }
     }
 
-    /// Why it is for `udd.simulate` only.
+    /// Why it is not for what was asked.
     pub fn too_much(&self) -> PyErr {
+        if self.is_own() {
+            let states = self.states().len();
+            return ModelError::new_err(format!(
+                "sections, exponents, covariant vectors and cycles are for models with at most 6 states, not {states}"
+            ));
+        }
         ModelError::new_err("friction with the treatment lugre is for udd.simulate; here take set-valued")
     }
 
     /// Whether it is the user's own.
     pub fn is_own(&self) -> bool {
-        use AnyModel::{Five, Four, One, Six, Three, Two};
+        use AnyModel::{Five, Four, One, Six, Three, Twelve, Two};
         matches!(
             self,
             One(..)
@@ -247,6 +264,7 @@ impl AnyModel {
                 | Four(Either::Second(_), _)
                 | Five(Either::Second(_), _)
                 | Six(..)
+                | Twelve(..)
         )
     }
 
@@ -337,36 +355,33 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
     let observation = observation(observe, Names { states, parameters, inputs: &[], rates: true })?;
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     macro_rules! parsed {
-        ($($d:literal $Kind:ident |$family:ident| $held:expr),+) => {
+        ($($count:pat => $Kind:ident<$D:literal> |$family:ident| $held:expr),+) => {
             match states.len() {
-                $($d => FormulaFamily::<$d>::parse(states, &texts, parameters, inputs).map(|family| {
+                $($count => FormulaFamily::<$D>::parse(states, &texts, parameters, inputs).map(|family| {
                     let $family =
                         family.with_angles(angles).with_records(signals, *record).with_observation(observation);
                     AnyModel::$Kind($held, values)
                 }),)+
-                n => return Err(ModelError::new_err(format!("a model has 1 to 6 states, not {n}"))),
+                n => return Err(ModelError::new_err(format!("a model has 1 to 12 states, not {n}"))),
             }
         };
     }
     parsed!(
-        1 One |own| own,
-        2 Two |own| Either::Second(own),
-        3 Three |own| Either::Second(own),
-        4 Four |own| Either::Second(own),
-        5 Five |own| Either::Second(own),
-        6 Six |own| own
+        1 => One<1> |own| own,
+        2 => Two<2> |own| Either::Second(own),
+        3 => Three<3> |own| Either::Second(own),
+        4 => Four<4> |own| Either::Second(own),
+        5 => Five<5> |own| Either::Second(own),
+        6 => Six<6> |own| own,
+        7..=12 => Twelve<12> |own| own
     )
     .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
 }
 
 /// What sensors see of a user's own model.
 fn observation(channels: &[ChannelSpec], names: Names<'_>) -> PyResult<Observation> {
-    if channels.len() > names.states.len() {
-        let message = format!(
-            "a model has at most as many sensors as states, {}, not {}",
-            names.states.len(),
-            channels.len()
-        );
+    if channels.len() > MAX_STATES {
+        let message = format!("a model has at most {MAX_STATES} sensors, not {}", channels.len());
         return Err(ModelError::new_err(message));
     }
     let mut texts = Vec::with_capacity(channels.len());
@@ -506,14 +521,17 @@ fn rates<'py>(
         t: &[f64],
         flat: &[f64],
     ) -> PyResult<Vec<f64>> {
-        if flat.len() != t.len() * D {
-            let message = format!("{} states of {D} numbers are needed, not {} numbers", t.len(), flat.len());
+        let live = D - family.idle();
+        if flat.len() != t.len() * live {
+            let message =
+                format!("{} states of {live} numbers are needed, not {} numbers", t.len(), flat.len());
             return Err(ModelError::new_err(message));
         }
         let system = family.build(values);
         let mut out = Vec::with_capacity(flat.len());
-        for (&t, x) in t.iter().zip(flat.as_chunks::<D>().0) {
-            out.extend(system.rates(t, x, &sides_of(&system, t, x)));
+        for (&t, x) in t.iter().zip(flat.chunks_exact(live)) {
+            let x = state(x, family.idle())?;
+            out.extend_from_slice(&system.rates(t, &x, &sides_of(&system, t, &x))[..live]);
         }
         Ok(out)
     }
@@ -530,29 +548,32 @@ fn observed<'py>(
     t: PyReadonlyArray1<'py, f64>,
     states: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    fn all<const D: usize>(family: &FormulaFamily<D>, values: &[f64], t: &[f64], flat: &[f64]) -> Vec<f64> {
-        let (system, observation) = (family.build(values), family.observation().clone());
-        let channels = if observation.is_empty() { D } else { observation.len() };
-        let sensor = FormulaSensor { observation, angles: [false; D] };
-        let mut out = Vec::with_capacity(t.len() * channels);
-        for (&t, x) in t.iter().zip(flat.as_chunks::<D>().0) {
-            let rate = system.rates(t, x, &sides_of(&system, t, x));
-            let at = Moment { t, x, rate: &rate, parameters: values };
-            out.extend_from_slice(&seen(&sensor, &system, &[], &at)[..channels]);
-        }
-        out
-    }
     let parsed = AnyModel::from_python(model)?;
-    let (t, states) = (t.as_slice()?, states.as_slice()?);
-    let out = match &parsed {
-        AnyModel::One(family, values) => all(family, values, t, states),
-        AnyModel::Two(Either::Second(family), values) => all(family, values, t, states),
-        AnyModel::Three(Either::Second(family), values) => all(family, values, t, states),
-        AnyModel::Four(Either::Second(family), values) => all(family, values, t, states),
-        AnyModel::Five(Either::Second(family), values) => all(family, values, t, states),
-        AnyModel::Six(family, values) => all(family, values, t, states),
+    let (t, flat, values) = (t.as_slice()?, states.as_slice()?, parsed.values());
+    let family: FormulaFamily<MAX_STATES> = match &parsed {
+        AnyModel::One(family, _) => family.filled(),
+        AnyModel::Two(Either::Second(family), _) => family.filled(),
+        AnyModel::Three(Either::Second(family), _) => family.filled(),
+        AnyModel::Four(Either::Second(family), _) => family.filled(),
+        AnyModel::Five(Either::Second(family), _) => family.filled(),
+        AnyModel::Six(family, _) => family.filled(),
+        AnyModel::Twelve(family, _) => family.clone(),
         _ => return Err(ModelError::new_err("a udd.Model is needed")),
     };
+    let (system, live) = (family.build(values), family.states().len());
+    let sensor = FormulaSensor {
+        observation: family.observation().clone(),
+        states: live,
+        angles: [false; MAX_STATES],
+    };
+    let mut out = Vec::with_capacity(t.len() * sensor.channels());
+    for (&t, row) in t.iter().zip(flat.chunks_exact(live)) {
+        let mut x = [0.0; MAX_STATES];
+        x[..live].copy_from_slice(row);
+        let rate = system.rates(t, &x, &sides_of(&system, t, &x));
+        let at = Moment { t, x: &x, rate: &rate, parameters: values };
+        out.extend_from_slice(&seen(&sensor, &system, &[], &at)[..sensor.channels()]);
+    }
     Ok(PyArray1::from_vec(model.py(), out))
 }
 

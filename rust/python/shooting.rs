@@ -106,12 +106,24 @@ fn expansion<'py>(
     all: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?.undriven()?;
-    let (d, rate, by_state, by_parameter, surfaces, more) = with_model!(&model, |family, values| {
+    let d = x.len();
+    let (rate, by_state, by_parameter, surfaces, more) = with_model!(&model, |family, values| {
         let x = state(&x, family.idle())?;
         let found = linear(family, values, t, &x);
         let more = if all { higher(family, values, t, &x) } else { Default::default() };
-        let by_state = found.by_state.as_flattened().to_vec();
-        (x.len(), found.rate.to_vec(), by_state, found.by_parameter.into_flattened(), found.surfaces, more)
+        // Idle states are cut from every axis.
+        let cut = |numbers: Vec<f64>, axes: u32| {
+            let mut numbers = numbers;
+            for axis in 0..axes {
+                let inner = d.pow(axis);
+                numbers = jobs::live(numbers, x.len() * inner, d * inner);
+            }
+            numbers
+        };
+        let by_state = cut(found.by_state.as_flattened().to_vec(), 2);
+        let by_parameter = cut(found.by_parameter.into_flattened(), 1);
+        let more = (cut(more.0, 3), cut(more.1, 4));
+        (cut(found.rate.to_vec(), 1), by_state, by_parameter, found.surfaces, more)
     });
     let dict = PyDict::new(py);
     let set = |name: &str, values: Vec<f64>, shape: &[usize]| {

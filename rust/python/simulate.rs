@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 
 use super::errors::{IntegrationError, ModelError};
 use super::interrupt;
+use super::jobs;
 use super::model::{AnyModel, state, with_model};
 use crate::analysis::{CancelFlag, MethodChoice, Output, Run, Stiffness, rows, trajectory};
 use crate::integrate::{Dop853, Dopri5, Failure, Rodas, Taylor, Tolerance, order};
@@ -36,12 +37,18 @@ trait Piecewise: Send + Sync {
     fn append(&self, t: f64, out: &mut Vec<f64>) -> bool;
 }
 
-impl<const D: usize> Piecewise for Record<D> {
+/// A run of which so many states at the end are idle.
+struct Recorded<const D: usize> {
+    record: Record<D>,
+    idle: usize,
+}
+
+impl<const D: usize> Piecewise for Recorded<D> {
     fn span(&self) -> (f64, f64) {
-        Record::span(self)
+        self.record.span()
     }
     fn append(&self, t: f64, out: &mut Vec<f64>) -> bool {
-        self.at(t).map(|x| out.extend(x)).is_some()
+        self.record.at(t).map(|x| out.extend_from_slice(&x[..D - self.idle])).is_some()
     }
 }
 
@@ -73,6 +80,8 @@ fn run<F: Family<D>, const D: usize>(
     (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
 ) -> Result<Flat, PyErr> {
     let system = || family.build(values);
+    let (idle, order) = (family.idle(), order(tolerance));
+    let tolerance = &tolerance.filled::<D>(idle);
     let (stiff, stop) = ((stop, None), (stop, stiffness));
     let rodas = || {
         let method = Rodas::new(family.build(&constants(values)), family.build(&constants(values)));
@@ -93,7 +102,7 @@ fn run<F: Family<D>, const D: usize>(
     };
     let series = || {
         let tape = tape.as_ref()?;
-        let method = Taylor::new(tape, values.to_vec(), order(tolerance), Isa::best());
+        let method = Taylor::new(tape, values.to_vec(), order, Isa::best());
         Some(trajectory(system(), method, output, x0, tolerance, keep, stop))
     };
     let run = match by {
@@ -121,18 +130,18 @@ fn run<F: Family<D>, const D: usize>(
     for event in &events {
         event_kinds.push(event.name(&system));
         event_t.push(event.t);
-        event_x.extend_from_slice(&event.x);
+        event_x.extend_from_slice(&event.x[..D - idle]);
     }
     Ok(Flat {
-        dimension: D,
+        dimension: D - idle,
         t,
-        x: x.into_flattened(),
+        x: jobs::live(x.into_flattened(), D, D - idle),
         event_kinds,
         event_t,
         event_x,
         outcome: outcome.name(),
         counts: (counts.accepted, counts.rejected, counts.evaluations, counts.grazes),
-        record: record.map(|record| Box::new(record) as Box<dyn Piecewise>),
+        record: record.map(|record| Box::new(Recorded { record, idle }) as Box<dyn Piecewise>),
     })
 }
 

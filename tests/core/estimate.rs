@@ -6,12 +6,12 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 use udd::analysis::CancelFlag;
 use udd::estimate::{
-    Bordered, CachedLinearisation, Candidate, DiskCamera, Estimator, FilmParameters, FreeParameter, Options,
-    Record, Role, RowMatrix, Sensor, Unknowns,
+    Bordered, CachedLinearisation, Candidate, Direct, DiskCamera, Estimator, FilmParameters, FreeParameter,
+    Options, Record, Role, RowMatrix, Sensor, Unknowns,
 };
 use udd::integrate::{Tolerance, propagate};
 use udd::model::effects::{Effect, Kind, Momentum};
-use udd::model::{DiskFamily, Family, System, sides_of};
+use udd::model::{DiskFamily, Family, FormulaFamily, System, sides_of};
 
 const PAPER: [f64; 6] = [0.039, 0.08, 9.81, 0.012, 0.103, 0.055];
 
@@ -331,4 +331,177 @@ fn a_known_linearisation_is_not_made_again() {
     let other = solve(&estimator, &elsewhere);
     estimator.known = None;
     assert_eq!(other.point, solve(&estimator, &elsewhere).point);
+}
+
+/// The names `x0, x1, ...`
+fn names(prefix: &str, count: usize) -> Vec<String> {
+    (0..count).map(|i| format!("{prefix}{i}")).collect()
+}
+
+/// An estimate of a family of three states and one parameter, all filled up to `D`, seen as they are.
+fn filled_up<const D: usize>(
+    family: &FormulaFamily<3>,
+    film: &[[f64; 3]],
+    parameters: usize,
+) -> (Estimator<FormulaFamily<D>, Direct<D>, D, D>, Unknowns<D>) {
+    let up = |x: &[f64; 3]| std::array::from_fn(|k| x.get(k).copied().unwrap_or(0.0));
+    let seen = SVector::from_fn(|k, _| if k < 2 { 25.0 } else { 0.0 });
+    let mut record = Record::<D> {
+        t: (0..film.len()).map(|i| 0.02 * i as f64).collect(),
+        seen: film.iter().map(|x| SVector::from(up(x))).collect(),
+        information: vec![SMatrix::from_diagonal(&seen); film.len()],
+        linked: vec![true; film.len() - 1],
+        film: vec![0; film.len()],
+        memory: [0.0; D],
+    };
+    // A new run begins in the middle; one frame is not seen; noise remembers itself.
+    record.linked[40] = false;
+    record.information[20] = SMatrix::zeros();
+    record.memory[0] = 0.3;
+    let free = |p| FreeParameter { role: Role::Model(p), film: None, mean: 0.0, sd: f64::INFINITY };
+    let estimator = Estimator {
+        family: family.filled::<D>(),
+        sensor: Direct { angles: [false; D] },
+        record,
+        free: (0..parameters).map(free).collect(),
+        diffusion: [0.1; D],
+        tolerance: Tolerance { rtol: 1e-7, atol: 1e-9 },
+        known: None,
+    };
+    let model = [10.0, 28.0, 8.0 / 3.0, 1.0, 1.0, 1.0, 0.0][..parameters].to_vec();
+    let states = film.iter().map(up).collect();
+    (estimator, Unknowns { states, sets: vec![FilmParameters { model, camera: Vec::new(), clock: 0.0 }] })
+}
+
+/// What idle states must not change: cost, evidence, parameters and their covariance, the states with theirs, what is
+/// foretold, innovations, and the score of a further term.
+fn estimate<const D: usize>(film: &[[f64; 3]]) -> Vec<f64> {
+    let equations = ["p0*(x1 - p3*x0)", "x0*(p1 - p4*x2) - p5*x1 + p6", "x0*x1 - p2*x2"];
+    let family = FormulaFamily::<3>::parse(&names("x", 3), &equations, &names("p", 7), &[]).unwrap();
+    let (estimator, start) = filled_up::<D>(&family, film, 7);
+    let stop = CancelFlag::new();
+    let found = estimator.solve(start, &Options::default(), &stop).unwrap();
+    assert!(found.converged);
+    let mut all = vec![found.cost.total(), found.evidence, found.iterations as f64];
+    all.extend(&found.point.sets[0].model);
+    all.extend(found.covariance.iter());
+    for (x, covariance) in found.point.states.iter().zip(&found.state_covariance) {
+        all.extend(&x[..3]);
+        all.extend(covariance.fixed_view::<3, 3>(0, 0).iter());
+        assert!(x[3..].iter().all(|&idle| idle == 0.0));
+    }
+    for own in estimator.innovations(&found.point, &[10.0; D]).unwrap() {
+        all.extend(own[..3].iter().filter(|v| v.is_finite()));
+    }
+    let starts = [(0, 0.0, found.point.states[0])];
+    all.extend(&estimator.predict(&found.point.sets, &starts, &[vec![0.1, 0.5]]).unwrap()[0][1][..3]);
+    for end in estimator.filter(&found.point, &[(0, 15)], &Options::default(), &stop).unwrap() {
+        all.extend(&end.last[..3]);
+        all.extend(end.covariance.fixed_view::<3, 3>(0, 0).iter());
+    }
+    let wider = ["p0*(x1 - p3*x0) + p7*x2", "x0*(p1 - p4*x2) - p5*x1 + p6", "x0*x1 - p2*x2 + p8*x1^2"];
+    let wider = FormulaFamily::<3>::parse(&names("x", 3), &wider, &names("p", 9), &[]).unwrap();
+    let candidate = Candidate {
+        family: wider.filled::<D>(),
+        more: vec![0.0; 2],
+        amplitudes: vec![Role::Model(7), Role::Model(8)],
+    };
+    let score = estimator.score(&found.point, &[candidate]).unwrap();
+    all.extend(score.gradient.iter().chain(score.information.iter()).chain(score.alone.iter()));
+    all
+}
+
+#[test]
+fn idle_states_change_nothing() {
+    let equations = ["10*(x1 - x0)", "x0*(28 - x2) - x1", "x0*x1 - 8/3*x2"];
+    let family = FormulaFamily::<3>::parse(&names("x", 3), &equations, &[], &[]).unwrap();
+    let (system, tolerance) = (family.build::<f64>(&[]), Tolerance { rtol: 1e-10, atol: 1e-12 });
+    let (mut noise, mut x, mut film) = (Noise(11), [-5.0, -6.0, 22.0], Vec::new());
+    for _ in 0..90 {
+        film.push(std::array::from_fn(|k| x[k] + 0.2 * noise.normal()));
+        x = propagate(&system, 0.0, 0.02, x, &tolerance).unwrap();
+    }
+    let wanted = estimate::<3>(&film);
+    for found in [estimate::<6>(&film), estimate::<8>(&film), estimate::<12>(&film)] {
+        assert_eq!(found.len(), wanted.len());
+        for (i, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
+            // Cost and evidence to rounding, which in the rest grows to 1e-7 of the smallest numbers: the third state is not
+            // seen, and seven parameters are free.
+            let accuracy = if i < 2 { 1e-11 } else { 1e-6 };
+            approx::assert_relative_eq!(found, wanted, max_relative = accuracy, epsilon = 1e-9);
+        }
+    }
+}
+
+/// The derivatives of what twelve states become by all states and by fourteen parameters, which takes four turns of eight
+/// directions, against finite differences.
+#[test]
+fn derivatives_of_many_states_equal_finite_differences() {
+    const D: usize = 12;
+    let equation = |i: usize| {
+        let (next, before, last) = ((i + 1) % D, (i + D - 1) % D, (i + D - 2) % D);
+        format!("p{i}*(x{next} - x{last})*x{before} - p12*x{i} + p13*cos(x{i})")
+    };
+    let equations: Vec<String> = (0..D).map(equation).collect();
+    let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
+    let family = FormulaFamily::<D>::parse(&names("x", D), &texts, &names("p", 14), &[]).unwrap();
+    let free = |p| FreeParameter { role: Role::Model(p), film: None, mean: 0.0, sd: f64::INFINITY };
+    let record = Record::<D> {
+        t: vec![0.0, 0.1],
+        seen: vec![SVector::zeros(); 2],
+        information: vec![SMatrix::identity(); 2],
+        linked: vec![true],
+        film: vec![0; 2],
+        memory: [0.0; D],
+    };
+    let estimator = Estimator {
+        family,
+        sensor: Direct { angles: [false; D] },
+        record,
+        free: (0..14).map(free).collect(),
+        diffusion: [1.0; D],
+        tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
+        known: None,
+    };
+    let model: Vec<f64> = (0..14).map(|p| 1.0 + 0.1 * p as f64).collect();
+    let x: [f64; D] = std::array::from_fn(|k| (1.3 * k as f64).sin() + 0.5);
+    let at = |x: [f64; D], model: Vec<f64>| Unknowns {
+        states: vec![x, [0.0; D]],
+        sets: vec![FilmParameters { model, camera: Vec::new(), clock: 0.0 }],
+    };
+    let linear = estimator.linearise(&at(x, model.clone())).unwrap();
+    let (a, h) = (linear.flow[0].a(), 1e-5);
+    let ends = |moved: [&Unknowns<D>; 2]| {
+        let [above, below] = moved.map(|point| estimator.linearise(point).unwrap().defects()[0]);
+        (below - above) / (2.0 * h)
+    };
+    for k in 0..D {
+        let moved = [h, -h].map(|h| {
+            let mut x = x;
+            x[k] += h;
+            at(x, model.clone())
+        });
+        // Differences are good to h^2 and to 1e-12/h.
+        approx::assert_relative_eq!(a.column(k).into_owned(), ends([&moved[0], &moved[1]]), epsilon = 1e-6);
+    }
+    for p in 0..14 {
+        let moved = [h, -h].map(|h| {
+            let mut model = model.clone();
+            model[p] += h;
+            at(x, model)
+        });
+        let wanted = ends([&moved[0], &moved[1]]);
+        for n in 0..D {
+            approx::assert_relative_eq!(linear.columns.state.at(n, p), wanted[n], epsilon = 1e-6);
+        }
+    }
+    for m in 0..D {
+        assert_eq!(linear.sights[0].h.row(m), SMatrix::<f64, D, D>::identity().row(m));
+    }
+    // A forcing's response: of a small one, constant over the link, the sum over its places.
+    let places = &estimator.places(&at(x, model.clone())).unwrap()[0].places;
+    let total = places.iter().fold(SMatrix::<f64, D, D>::zeros(), |sum, place| sum + place.response);
+    // By the mean over the link of the flow from there: (1 + a)/2 to the second order in its length.
+    let rough = (SMatrix::<f64, D, D>::identity() + a) * 0.05;
+    assert!((total - rough).abs().max() < 0.01 && total.abs().max() > 0.09);
 }

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from udd.discovery.scoring import score_scan
 from udd.discovery.scoring.score_scan import Scan, Scored
 
 
@@ -18,7 +19,8 @@ def test_a_group_lowers_chi2_as_least_squares_do(size: int) -> None:
     design[:, 5] = design[:, 4] + 1e-7 * rng.standard_normal(60)  # two candidates that act alike
     data = design @ [0.0, 2.0, -1.0, 0.5, 0.3, 0.0] + rng.standard_normal(60)
     scored = [Scored(str(k), 0.0, 1.0, (), (), k == 2, True) for k in range(5)]  # type: ignore[arg-type]
-    found = Scan(scored, design.T @ data, design.T @ design, columns, 2.0).groups(size)
+    found, number = Scan(scored, design.T @ data, design.T @ design, columns, 2.0).groups(size)
+    assert number == len(found)
 
     usable = [0, 1, 3, 4]  # the third is absorbed
     expected = {}
@@ -34,3 +36,15 @@ def test_a_group_lowers_chi2_as_least_squares_do(size: int) -> None:
     assert {tuple(s.candidate for s in group): fall for group, fall in found} == pytest.approx(
         expected, rel=1e-9
     )
+
+
+def test_of_millions_of_groups_those_of_the_strongest_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(score_scan, "_MOST_GROUPS", 10)
+    strength = [3.0, 9.0, 1.0, 7.0, 5.0, 8.0]
+    scored = [Scored(str(k), chi2, 1.0, (), (), False, True) for k, chi2 in enumerate(strength)]  # type: ignore[arg-type]
+    columns = [[k] for k in range(6)]
+    found, number = Scan(scored, np.sqrt(strength), np.eye(6), columns, 1.0).groups(2)
+    # Five candidates make ten pairs, six make fifteen, which all count.
+    assert len(found) == 10 and number == 15
+    assert [s.candidate for s in found[0][0]] == ["1", "5"]
+    assert "2" not in {s.candidate for group, _ in found for s in group}

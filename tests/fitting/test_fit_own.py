@@ -109,6 +109,3 @@ def test_what_does_not_belong_together_is_refused() -> None:
         udd.fit(own, lorenz())
     with pytest.raises(FitError, match="columns u, which are neither a disk's"):
         udd.fit(own, udd.Pendulum(0.5))
-    five = udd.Model(list("abcde"), ["1"] * 5)
-    with pytest.raises(FitError, match="at most 4 states"):
-        udd.fit(Measurement(t, {"a": t}), five)

@@ -426,15 +426,15 @@ class Search:
 
     def _group(self, current: SearchState, scores: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
         """Several effects at once that pass only together."""
-        best = scores.library.groups(size)
+        best, number = scores.library.groups(size, _TRIED)
         likely = [
             [s.candidate for s in group]
-            for group, fall in best[:_TRIED]
+            for group, fall in best
             if len({s.candidate.effect.name for s in group}) == size
             and fall > scores.fit.faults
-            and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
+            and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
-        return self._accept(current, self._together(current, likely), replace(scores, comparisons=len(best)))
+        return self._accept(current, self._together(current, likely), replace(scores, comparisons=number))
 
     def _curves(self, current: SearchState, likely: list[Curve]) -> list[TrialFit]:
         """The likeliest curves, as splines and by short formulas."""

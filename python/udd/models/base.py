@@ -44,7 +44,7 @@ class Model:
     Parameters
     ----------
     states : sequence of str
-        The names of the state's components, 1 to 6.
+        The names of the state's components, 1 to 12.
     equations : mapping of str to formula, or sequence of formula
         The rate of each state: text or a SymPy expression of the states, the parameters, the time ``t``,
         numbers and ``pi``, with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``,

@@ -23,7 +23,7 @@ from .profile import DiscoveryProfile, DynamicsProfile, FitProfile, ModelProfile
 
 __all__ = ["FormulaModel", "cofactor", "determinant"]
 
-_MOST_STATES = 6
+_MOST_STATES = 12
 _POINT = "__"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ _ALIKE = 1e6  # condition of the information from which on candidates act alike
 _STRONG = 4.0  # times the usual amplitudes, of effects that may have either sign
 _WAVES = 100  # scored at a time: what a long record takes in memory
 _GROUPS = 20_000  # looked at together: some ten megabytes
+_MOST_GROUPS = 700_000  # looked at in all: a few seconds
 _LINES = 24  # of a scan over frequencies, looked at between them too
 
 
@@ -69,9 +71,14 @@ class Scan:
     columns: list[list[int]]
     scatter: float
 
-    def groups(self, size: int) -> list[tuple[list[Scored], float]]:
-        """Every so many candidates with the fall of chi2 that all of them together give, largest first."""
-        usable = [k for k, s in enumerate(self.scored) if not s.absorbed]
+    def groups(self, size: int, most: int | None = None) -> tuple[list[tuple[list[Scored], float]], int]:
+        """So many candidates with the fall of chi2 that all of them together give, largest first.
+
+        At most so many groups, and how many there are. Where there are millions only those of the candidates
+        that alone give most are looked at; the others count, too, as the data chose which.
+        """
+        told_apart = [k for k, s in enumerate(self.scored) if not s.absorbed]
+        usable = self._strongest(told_apart, size)
         # Candidates that act alike have no place side by side.
         unit = _unit(self.information)
 
@@ -92,7 +99,17 @@ class Scan:
             groups = groups[self._each(groups, alike) < _ALIKE]
         falls = self._each(groups, fall)
         order = np.argsort(-falls, kind="stable")
-        return [([self.scored[k] for k in groups[i]], float(falls[i])) for i in order]
+        found = [([self.scored[k] for k in groups[i]], float(falls[i])) for i in order[:most]]
+        left_out = math.comb(len(told_apart), size) - math.comb(len(usable), size)
+        return found, len(order) + left_out
+
+    def _strongest(self, usable: list[int], size: int) -> list[int]:
+        """Candidates that make no more groups than are looked at."""
+        many = len(usable)
+        while math.comb(many, size) > _MOST_GROUPS:
+            many -= 1
+        best = sorted(usable, key=lambda k: -self.scored[k].chi2)[:many]
+        return sorted(best)
 
     def _each(
         self, groups: NDArray[np.intp], value: Callable[[NDArray[np.intp]], NDArray[np.float64]]
@@ -103,8 +120,11 @@ class Scan:
         for row, own in zip(table, self.columns, strict=True):
             row[: len(own)] = own
         result = np.empty(len(groups))
-        for kind in np.unique(widths[groups], axis=0):
-            rows = np.flatnonzero((widths[groups] == kind).all(axis=1))
+        # The widths of a group as one number, which is told apart sooner than a row.
+        kinds = widths[groups] @ (widths.max(initial=0) + 1) ** np.arange(groups.shape[1])
+        for one in np.unique(kinds):
+            rows = np.flatnonzero(kinds == one)
+            kind = widths[groups[rows[0]]]
             for some in np.array_split(rows, len(rows) // _GROUPS + 1):
                 at = [table[groups[some, k], :width] for k, width in enumerate(kind)]
                 result[some] = value(np.concatenate(at, axis=1))

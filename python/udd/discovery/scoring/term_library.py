@@ -22,7 +22,10 @@ from .candidate import Candidate
 from .coordinates import slots
 
 _DEGREE = 3
-_FEW = 4  # states of which all products up to that degree are tried; of more, up to the second
+#: Products of so many states and inputs may have that degree: of 4 there are 35 for each equation, of 12
+#: there would be 455.
+_FEW = 4
+_MOST = 200  # terms of an equation; beyond it sines and cosines are not multiplied by states
 #: Widths over which dry friction turns, in units of the speed's root mean square. As narrow as the last it
 #: holds a body at rest for hundreds of swings.
 _WIDTHS = (0.3, 0.03, 0.002)
@@ -32,12 +35,13 @@ def terms(model: FormulaModel) -> list[Candidate]:
     """Every term that is tried in the equations of a user's own model, but for dry friction.
 
     Of the states that are no angles and of the measured inputs: a constant, all products up to the third
-    degree, and each times its own size; of each angle and of every two angles' difference sine and cosine,
-    also times each of the others; of every angle the rate, where that is no state itself. An equation that
-    only says that one state is the rate of another gets none. Of a mechanical model, where a state is another
-    one's rate, forces as machines have them (inputs, springs, drags, gravity) are preferred by a prior
-    penalty on the others. Where it has a mass matrix, all are forces along its coordinates, and those of
-    machines act between two of them too.
+    degree (of more than four of them up to the second, and the cube of each), and each times its own size;
+    of each angle and of every two angles' difference sine and cosine, also times each of the others unless
+    an equation then had more than 200 terms; of every angle the rate, where that is no state itself. An
+    equation that only says that one state is the rate of another gets none. Of a mechanical model, where a
+    state is another one's rate, forces as machines have them (inputs, springs, drags, gravity) are
+    preferred by a prior penalty on the others. Where it has a mass matrix, all are forces along its
+    coordinates, and those of machines act between two of them too.
     """
     plain = [(text, _name(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}
@@ -264,11 +268,13 @@ def _of_states(model: FormulaModel) -> list[str]:
     plain = [name for name in (*model.state_names, *model.inputs) if name not in model.angles]
     degree = _DEGREE if len(plain) <= _FEW else 2
     powers = [p for d in range(degree + 1) for p in itertools.combinations_with_replacement(plain, d)]
+    powers += [(name,) * _DEGREE for name in plain if degree < _DEGREE]
     result = [_product(p) for p in powers] + [f"abs({name})*{name}" for name in plain]
     turning = list(model.angles) + [f"{a} - {b}" for a, b in itertools.combinations(model.angles, 2)]
+    times = plain if len(result) + len(turning) * (2 * len(plain) + 3) <= _MOST else []
     for angle in turning:
         for wave in ("sin", "cos"):
-            result += [f"{wave}({angle})"] + [f"{name}*{wave}({angle})" for name in plain]
+            result += [f"{wave}({angle})"] + [f"{name}*{wave}({angle})" for name in times]
         result.append(f"sin(2*({angle}))" if " " in angle else f"sin(2*{angle})")
     return result
 
