@@ -12,6 +12,7 @@ import io
 import json
 import math
 import os
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -85,6 +86,7 @@ _RENAMED = {"Discovery": {"looks": "comparisons", "refused": "rejected"}}
 _BROKEN = (
     *(AttributeError, IndexError, KeyError, OSError, OverflowError, RecursionError, TypeError, ValueError),
     *(EOFError, MemoryError, NotImplementedError, zipfile.BadZipFile, zlib.error),
+    *(SyntaxError, tokenize.TokenError),  # of an array's header
 )
 
 

@@ -59,7 +59,7 @@ def test_curves_that_cannot_be_told_from_the_parameters_are_a_case(monkeypatch):
         raise np.linalg.LinAlgError("the leading minor is not positive definite")
 
     monkeypatch.setattr(absorbing, "eigh", singular)
-    theirs = absorbing.absorbed(curve, found.baseline)
+    theirs = absorbing.confounded_directions(curve, found.baseline)
     np.testing.assert_array_equal(theirs.left(curve.covariance), curve.covariance)
 
 
