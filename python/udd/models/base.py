@@ -68,8 +68,8 @@ class Model:
         delay [s].
     observe : mapping of str to formula, optional
         What sensors see (the output equation): for each column of a measurement a formula of the states,
-        their rates (``w'``), the parameters and ``t``, such as ``{"volts": "gain*theta + zero"}``; at most 12.
-        Without it the columns are states.
+        their rates (``w'``), the parameters and ``t``, such as ``{"volts": "gain*theta + zero"}``; at most
+        12. Without it the columns are states.
 
     Raises
     ------
