@@ -85,7 +85,8 @@ def discover(
     of freedom exceeds 2.5 or free runs lose the motion, the model lacks an effect that these data do not
     name. The nearest candidates are listed with their held-out errors.
 
-    Records of more than 8000 frames are averaged in blocks as far as their motion and noise allow.
+    Records of more than 8000 frames, of 2000 where inputs were measured, are averaged in blocks as far as
+    their motion and noise allow.
 
     Parameters
     ----------

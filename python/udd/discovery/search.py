@@ -31,6 +31,7 @@ from udd.discovery.validation.held_out_errors import (
 )
 from udd.discovery.validation.predictive_comparison import Foretelling
 from udd.discovery.validation.sensor_drift import as_random, drift_gain
+from udd.effects.user_defined import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released
 from udd.fitting.parameters import Free
@@ -129,6 +130,20 @@ def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tupl
     left = [c for c in mine if c.effect not in [o.effect for o in others]]
     right = [o for o in others if o.effect not in [c.effect for c in mine]]
     return list(zip(left, right, strict=False))
+
+
+def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
+    """The best to be tried, of a machine the forces that machines have, each in the width that scores best.
+
+    Around a model that is far off many a product of states scores as high as they do.
+    """
+    usual = [s for s in passing if s.candidate.usual] or passing
+    if not any(along_of(s.candidate.effect.slots[0]) for s in passing):
+        return list(passing[:_TRIED])
+    first: dict[str, Scored] = {}
+    for one in usual:
+        first.setdefault(one.candidate.effect.name, one)
+    return list(first.values())[:_TRIED]
 
 
 def _chance(pair: Pair, trial: TrialFit, scores: ScoreRound) -> tuple[float, float]:
@@ -348,17 +363,19 @@ class Search:
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
+        # With these the model cannot even be held as tightly as without: nor with another one beside.
+        loose = {t.candidates[0].effect.name for t in singles if t.fit.level < current.part.level}
         if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             # Formulas that may explain the data as well as what the library has.
             known = max(scores.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
-            singles += self._pairs(current, scores)
+            singles += self._pairs(current, scores, loose)
         return (
             self._accept(current, singles, scores)
-            or self._group(current, scores, 2)
-            or self._group(current, scores, 3)
+            or self._group(current, scores, 2, loose)
+            or self._group(current, scores, 3, loose)
         )
 
     def _located(
@@ -389,7 +406,7 @@ class Search:
         return formulas_for(curve, part.observations, taken=part.model.state_names).formulas[:_FORMULAS]
 
     def _singles(self, current: SearchState, passing: list[Scored]) -> list[TrialFit]:
-        best = passing[:_TRIED]
+        best = _machines_first(passing)
         self._trying([s.candidate.title for s in best])
         return self._tried(current, best)
 
@@ -398,7 +415,7 @@ class Search:
         found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
-    def _pairs(self, current: SearchState, scores: ScoreRound) -> list[TrialFit]:
+    def _pairs(self, current: SearchState, scores: ScoreRound, loose: set[str]) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
 
         One that drives where it should brake may do so because another one brakes too much.
@@ -406,7 +423,7 @@ class Search:
         scored = sorted((s for s in scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
         for one in scored:
-            if one.candidate.usual:
+            if one.candidate.usual and one.candidate.effect.name not in loose:
                 first.setdefault(one.candidate.effect.name, one.candidate)
         best = list(first.values())[:_PAIRED]
         pairs = [list(pair) for pair in itertools.combinations(best, 2)]
@@ -424,13 +441,15 @@ class Search:
         self._trying([" with ".join(c.title for c in group) for group in groups])
         return fitted_ones(self._each(tried, groups))
 
-    def _group(self, current: SearchState, scores: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
+    def _group(
+        self, current: SearchState, scores: ScoreRound, size: int, loose: set[str]
+    ) -> tuple[Step, SearchState] | None:
         """Several effects at once that pass only together."""
         best = scores.library.groups(size)
         likely = [
             [s.candidate for s in group]
             for group, fall in best[:_TRIED]
-            if len({s.candidate.effect.name for s in group}) == size
+            if len({s.candidate.effect.name for s in group} - loose) == size
             and fall > scores.fit.faults
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * len(best) < ALPHA
         ]
