@@ -103,11 +103,22 @@ class Step:
 
 @dataclass(frozen=True)
 class SearchState:
-    """Where the search stands: fits of the first part and of all data, and held-out errors."""
+    """Where the search stands: fits of the first part and of all data, and held-out errors.
+
+    Where whole records are held out both are one fit, of all other records.
+    """
 
     part: Fit
     whole: Fit
     errors: Errors
+
+
+def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
+    """The same done to the fits of the first part and of all data, once where they are one."""
+    if part is whole:
+        return (work(part),) * 2
+    one, other = parallel_map(work, (part, whole))
+    return one, other
 
 
 def _cheaper(
@@ -314,7 +325,7 @@ class Search:
         if all(f.name in names for f in self.free):
             return state
         try:
-            part, whole = parallel_map(partial(released, free=self.free), (state.part, state.whole))
+            part, whole = both(partial(released, free=self.free), state.part, state.whole)
             if not (part.converged and whole.converged):
                 return state
             errors = self.errors(part)
@@ -526,7 +537,7 @@ class Search:
         near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
         costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
-        foretelling = Foretelling(self.record, wholes, self.unit)
+        foretelling = Foretelling(current.whole.record, wholes, self.unit)
         near = self._foretelling(near, costs, foretelling)
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
@@ -582,7 +593,7 @@ class Search:
 
         def again(trial: TrialFit) -> TrialFit | None:
             try:
-                return self._again(current.whole, trial)
+                return self._again(current, trial)
             except FitError:
                 return None
 
@@ -602,7 +613,7 @@ class Search:
     def _judged(self, current: SearchState, trial: TrialFit, scores: ScoreRound) -> TestResult | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
         try:
-            whole = self._again(current.whole, trial)
+            whole = self._again(current, trial)
             if whole is None:
                 return None
             pair = same_level(current.whole, whole.fit)
@@ -625,8 +636,11 @@ class Search:
         except FitError:
             return None
 
-    def _again(self, whole: Fit, trial: TrialFit) -> TrialFit | None:
+    def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
         """The same proposal fitted to all data."""
+        whole = current.whole
+        if whole is current.part:
+            return trial
         if trial.curve is None:
             return of_library(whole, trial.candidates, trial.amplitudes)
         if trial.formula is None:
