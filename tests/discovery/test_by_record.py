@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import udd
-from udd.discovery.validation.by_record import RecordAnswer, belief, sentence
+from udd.discovery.validation.by_record import RecordAnswer, belief, by_record, sentence
 from udd.errors import FitError
+from udd.fitting import extend, fit_record, record_of
 
 NOISE = 2e-3
 FORCED = {"x": "v", "v": "-k*x - c*v + u"}
@@ -55,18 +56,32 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
     assert "Whole records, by number 1, were held back." in page
 
 
+@pytest.mark.slow
 def test_what_only_one_record_wants_is_told_apart() -> None:
     found = udd.discover(records([0.0, 0.12, 0.0]), oscillator())
-    told = [e for e in found.effects if e.by_record]
-    assert found.verdict == "effect present, form not identified"
-    (effect,) = told
-    assert [a.answer for a in effect.by_record] == ["does not want it", "wants it", "does not want it"]
-    assert found.remarks[0].endswith("only record 1 wants it.")
+    assert found.verdict == "effect present, form not identified" and not found.effects
+    nearest = found.rejected[0]
+    assert nearest.title == "abs(v)*v in v'" and nearest.why == "records"
+    assert [a.answer for a in nearest.by_record] == ["does not want it", "wants it", "does not want it"]
+    assert found.remarks[0] == "abs(v)*v in v': only record 1 wants it."
 
 
-def test_a_record_alone_in_what_it_wants_does_not_carry_over_to_one_held_out() -> None:
-    found = udd.discover(records([0.0, 0.12, 0.0]), oscillator(), held_out=[2])
-    assert found.verdict != "effect identified"
+@pytest.mark.parametrize(
+    ("drags", "expected"),
+    [
+        ([0.08, 0.08, 0.08], ["wants it"] * 3),
+        ([0.0, 0.12, 0.0], ["does not want it", "wants it", "does not want it"]),
+    ],
+)
+def test_each_record_has_its_own_amplitude(drags: list[float], expected: list[str]) -> None:
+    given, model = records(drags), oscillator()
+    known = fit_record(given, record_of(given, model), model, search=True)
+    drag = udd.effects.formula("v'", "-c*abs(v)*v", name="drag", c=0.0)
+    answers, _chi2 = by_record(known, extend(known, [drag], [0.0]), drag, [5, 6, 7])
+    assert [a.answer for a in answers] == expected and [a.record for a in answers] == [5, 6, 7]
+    for answer, truth in zip(answers, drags, strict=True):
+        assert abs(answer.parameters["c"] - truth) < 4 * answer.errors["c"]
+        assert answer.errors["c"] < 0.01
 
 
 @pytest.mark.parametrize("held_out", [None, [2]])
@@ -83,11 +98,11 @@ def test_the_sentences() -> None:
     assert sentence("drag", answers(wants, silent, wants)) == (
         "drag: wanted by 2 of 3 records; record 1 cannot tell."
     )
-    both = [("drag", answers(wants, wants)), ("slip", answers(not_, wants)), ("curve", [])]
+    both = [("drag", answers(wants, wants)), ("slip", answers(not_, wants))]
     assert belief(both) == (
         "What we would believe of all records: drag. Apart from that: slip: only record 1 wants it."
     )
-    assert belief([("curve", [])]) == ""
+    assert belief([]) == ""
 
 
 @pytest.mark.parametrize(

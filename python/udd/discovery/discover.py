@@ -176,7 +176,7 @@ def discover(
     clock.finish("fitting the model as found")
     final = refit(end.whole)
     found = [
-        replace(f, by_record=by_record(baseline, end.whole, f.effect, order))
+        replace(f, by_record=by_record(baseline, end.whole, f.effect, order)[0])
         for step in end.accepted
         for f in _describe(step, final)
     ]
@@ -194,7 +194,7 @@ def discover(
     if unexplained and not rejected and end.rounds:
         try:
             clock.tell("trying what comes nearest")
-            rejected = search.rejected(begin, end.rounds[-1])
+            rejected = search.rejected(begin, end.rounds[-1], order)
         except TimeUpError as up:
             stopped = stopped or str(up)
     if not found and end.unconfirmed:

@@ -152,11 +152,13 @@ class RejectedEffect:
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
-    why : {"chance", "drift", "part", "held", "form", "unconfirmed"}
+    why : {"chance", "drift", "part", "held", "form", "unconfirmed", "records"}
         Why it is not added: chance does as much, in all data or in the part that effects are sought in; a
         slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that
         fits clearly better does not pass; or it passed, but free runs over the held-out data do not get
-        better beyond doubt.
+        better beyond doubt; or only some of several records want it, though the others could show it.
+    by_record : list of RecordAnswer
+        Of several records that were fitted together, what each says of it.
     """
 
     effect: Effect
@@ -166,6 +168,7 @@ class RejectedEffect:
     errors: Errors
     ratio: Ratio
     why: RejectionReason
+    by_record: list[RecordAnswer] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -179,6 +182,7 @@ class RejectedEffect:
             "p": self.p,
             "error": self.errors.to_dict(),
             "held_out_ratio": _named(self.ratio),
+            "by_record": [own.to_dict() for own in self.by_record],
         }
 
 
@@ -307,9 +311,16 @@ class Discovery:
         return [replace(one, step=steps.get(one.name, one.step)) for one in readings(self.fit)]
 
     @property
+    def by_record(self) -> list[tuple[str, list[RecordAnswer]]]:
+        """What each of several records says of what was found, and of what only some want; with the titles."""
+        found = [(one.title, one.by_record) for one in self.effects]
+        found += [(one.title, one.by_record) for one in self.rejected if one.why == "records"]
+        return [own for own in found if own[1]]
+
+    @property
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
-        said = [sentence(one.title, one.by_record) for one in self.effects if one.by_record]
+        said = [sentence(title, answers) for title, answers in self.by_record]
         said += [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
         if self.effects and lacks_more(self.fit, self.error_after):
             said.append("Something is missing beside what was found: it leaves more than noise does.")

@@ -20,6 +20,7 @@ from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan, Scored
 from udd.discovery.symbolic.formulas import Formula, formulas_for
 from udd.discovery.validation.acceptance_tests import Pair, confirmed_by, same_level
+from udd.discovery.validation.by_record import by_record, contested
 from udd.discovery.validation.held_out_errors import (
     Errors,
     Ratio,
@@ -336,13 +337,19 @@ class Search:
             return state
         return state if self._worse(state.errors, errors) else SearchState(part, whole, errors)
 
-    def rejected(self, base: SearchState, scores: ScoreRound) -> list[RejectedEffect]:
-        """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
+    def rejected(
+        self, base: SearchState, scores: ScoreRound, numbers: Sequence[int] = (0,)
+    ) -> list[RejectedEffect]:
+        """What comes nearest where nothing passes: the strongest of the library, by their held-out errors.
+
+        Of several records, by `numbers`, first of all what only some of them want: the form that explains
+        these best where each has its own amplitude.
+        """
         strongest: dict[object, Scored] = {}
         for one in scores.usable():
             strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
         shown = [s.candidate for s in scores.passing()]
-        rejected = []
+        rejected, apart = [], []
         for trial in self._tried(base, list(strongest.values())[:_NEAREST]):
             if trial.fit.level < base.part.level:
                 continue
@@ -359,9 +366,17 @@ class Search:
             elif judged.witness is None or self._worse(base.errors, errors):
                 why = "held"
             effect, ratio = judged.whole.model.effects[-1], self.improvement(base.errors, errors)
+            answers, chi2 = by_record(base.whole, judged.whole, effect, numbers)
             title = trial.candidates[0].title
-            rejected.append(RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why))
-        return sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
+            told = RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why, answers)
+            rejected.append(told)
+            if contested(answers):
+                apart.append((chi2, told))
+        near = sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
+        if not apart:
+            return near
+        best = min(apart, key=lambda pair: pair[0])[1]
+        return [replace(best, why="records"), *(r for r in near if r is not best)]
 
     def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
         """The best addition of the library that passes: an effect, or some of them together.

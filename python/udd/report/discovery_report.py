@@ -42,7 +42,7 @@ BEFORE, AFTER = "known model", "with the effect"
 def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str = "") -> Head:
     """What stands first: the verdict, what was added, and the held-out errors; `unit` says theirs."""
     numbers = wording.headline(discovery)
-    if believed := belief([(one.title, one.by_record) for one in discovery.effects]):
+    if believed := belief(discovery.by_record):
         said = [Paragraph(believed), *said]
     shown = [
         Number(

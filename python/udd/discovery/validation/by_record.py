@@ -42,7 +42,9 @@ class RecordAnswer:
         return dict(vars(self))
 
 
-def by_record(known: Fit, found: Fit, effect: Effect, numbers: Sequence[int]) -> list[RecordAnswer]:
+def by_record(
+    known: Fit, found: Fit, effect: Effect, numbers: Sequence[int]
+) -> tuple[list[RecordAnswer], float]:
     """Fit the amplitudes of an effect to each record apart, and test each against zero (Wald).
 
     Everything else stays common to the records and is refitted beside them. A record that does not want the
@@ -60,14 +62,16 @@ def by_record(known: Fit, found: Fit, effect: Effect, numbers: Sequence[int]) ->
 
     Returns
     -------
-    list of RecordAnswer
+    answers : list of RecordAnswer
         None where there is but one record, where the effect is a curve without amplitudes, or where it cannot
         be fitted so.
+    chi2 : float
+        Of the fit with amplitudes for each record, held as tightly as `known`; infinite where there is none.
     """
     films = np.unique(found.record.film).tolist()
     names = {p: f"{effect.name}.{p}" for p in effect.amplitudes if f"{effect.name}.{p}" in found.parameters}
     if len(films) < 2 or not names:
-        return []
+        return [], np.inf
     apart = [
         replace(f, name=f"{f.name}[{film}]", film=film)
         for f in found.problem.free
@@ -79,9 +83,10 @@ def by_record(known: Fit, found: Fit, effect: Effect, numbers: Sequence[int]) ->
         # `released` keeps what it does not know: the common amplitudes must go.
         each = released(replace(found, problem=replace(found.problem, free=tuple(common))), [*common, *apart])
         level = min(known.level, each.level)
-        inflation = at_level(each, level).inflation(at_level(known, level))
+        compared = at_level(each, level)
+        inflation = compared.inflation(at_level(known, level))
     except FitError:
-        return []
+        return [], np.inf
     order = list(each.parameters)
     result = []
     blocks = {film: [order.index(f"{name}[{film}]") for name in names.values()] for film in films}
@@ -109,7 +114,7 @@ def by_record(known: Fit, found: Fit, effect: Effect, numbers: Sequence[int]) ->
                 dict(zip(names, errors.tolist(), strict=True)),
             )
         )
-    return result
+    return result, compared.chi2
 
 
 def sentence(title: str, answers: Sequence[RecordAnswer]) -> str:
@@ -128,18 +133,17 @@ def belief(effects: Sequence[tuple[str, Sequence[RecordAnswer]]]) -> str:
     Parameters
     ----------
     effects : sequence of (str, list of RecordAnswer)
-        Titles, and what each record says; those of which the records say nothing are passed over.
+        Titles, and what each record says.
     """
-    asked = [(title, answers) for title, answers in effects if answers]
-    shared = [title for title, answers in asked if not contested(answers)]
+    shared = [title for title, answers in effects if not contested(answers)]
     told = " and ".join(shared) if shared else "none of what was found"
-    apart = [sentence(title, answers) for title, answers in asked if contested(answers)]
+    apart = [sentence(title, answers) for title, answers in effects if contested(answers)]
     said = [
         f"What we would believe of all records: {told}.",
         *(["Apart from that:"] if apart else []),
         *apart,
     ]
-    return " ".join(said) if asked else ""
+    return " ".join(said) if effects else ""
 
 
 def _records(numbers: Sequence[int]) -> str:
