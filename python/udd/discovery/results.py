@@ -312,7 +312,7 @@ class Discovery:
 
     @property
     def by_record(self) -> list[tuple[str, list[RecordAnswer]]]:
-        """What each of several records says of what was found, and of what only some want; with the titles."""
+        """Titles, and what each of several records says: of what was found, and of what only some want."""
         found = [(one.title, one.by_record) for one in self.effects]
         found += [(one.title, one.by_record) for one in self.rejected if one.why == "records"]
         return [own for own in found if own[1]]
