@@ -55,6 +55,16 @@ def test_friction_and_motors_act_in_the_joints() -> None:
     np.testing.assert_allclose(rates, np.linalg.solve([[2.0, 1.0], [1.0, 1.0]], force), rtol=1e-12)
 
 
+def test_rotors_turn_with_their_joints() -> None:
+    chain = point_masses(3, rotors=[0.1, 0.2, 0.3])
+    state = np.array([0.3, -1.0, 2.0, 1.5, -0.5, 0.7])
+    more = chain.mass_matrix(state) - point_masses(3).mass_matrix(state)
+    joints = np.array([1.5, -0.5 - 1.5, 0.7 + 0.5])
+    energy = 0.5 * np.sum([0.1, 0.2, 0.3] * joints**2)
+    # Adding to elements of order one and taking them away again leaves rounding.
+    np.testing.assert_allclose(0.5 * state[3:] @ more @ state[3:], energy, rtol=1e-13)
+
+
 def test_a_missing_force_enters_every_acceleration() -> None:
     chain = point_masses(2)
     pushed = chain.with_effects([udd.effects.formula("force(a2)", "c", c=0.5)])

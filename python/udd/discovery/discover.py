@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from udd._util.expressions import Expression
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
+from udd.discovery.validation.by_record import by_record, contested
 from udd.discovery.validation.camera_faults import camera_shows
 from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
 from udd.discovery.validation.sensor_drift import FORETELLS, as_random
@@ -36,7 +39,7 @@ from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .results import AddedEffect, Discovery, RejectedEffect
-from .search import Search, SearchState, Step
+from .search import Search, SearchState, Step, both
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 
@@ -55,6 +58,7 @@ def discover(
     each: Iterable[str] | None = None,
     state0: Mapping[str, float] | Sequence[Mapping[str, float]] | None = None,
     candidates: Iterable[tuple[str, Expression]] = (),
+    held_out: Iterable[int] | None = None,
     budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Discovery:
@@ -85,7 +89,12 @@ def discover(
     of freedom exceeds 2.5 or free runs lose the motion, the model lacks an effect that these data do not
     name. The nearest candidates are listed with their held-out errors.
 
-    Records of more than 8000 frames are averaged in blocks as far as their motion and noise allow.
+    Records of more than 8000 frames, of 2000 where inputs were measured, are averaged in blocks as far as
+    their motion and noise allow.
+
+    *Several records* share the model, and what is missing must be missing in all of them: the amplitudes of
+    what was found are fitted to each record apart, and where one that could show the effect does not want it,
+    it is not identified. Whole records can be held out instead of the last 40 % of each.
 
     Parameters
     ----------
@@ -98,6 +107,10 @@ def discover(
         Terms to try in a user's own model beside those made of its states: the state in whose equation it
         stands and the term, as in ``("v", "abs(v)*v")``; of a model with a mass matrix also a force, as in
         ``("force(b - a)", "q^5")``.
+    held_out : iterable of int, optional
+        Of several measurements, the numbers (from 0) of those that no fit sees: they are the held-out data.
+        Effects are sought in all frames of the others, and their cost on these alone confirms them. In names
+        like ``W[0]`` the measurements held out count last.
     budget : float, optional
         Seconds after which the search ends with what it has, which the verdict then says. The known model's
         fit, which comes first, and the last one are made in any case.
@@ -128,6 +141,9 @@ def discover(
     """
     clock = Clock(budget, progress or (lambda _text: None))
     free = free if free is None or isinstance(free, str) else list(free)
+    order, apart = _held_out(measurement, held_out)
+    if apart:
+        measurement, model, state0 = (_ordered(one, order) for one in (measurement, model, state0))
     thin = _thinned(measurement, model)
     measurement = [own.measurement for own in thin]
     measurement = measurement[0] if len(measurement) == 1 else measurement
@@ -137,19 +153,21 @@ def discover(
     n = len(record.t)
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
-    train = record.first(TRAIN)
+    train = ~np.isin(record.film, range(len(order) - apart, len(order))) if apart else record.first(TRAIN)
     options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
 
     clock.finish("fitting the known model")
     background_import.importing("scipy.stats", "pyoperon.sklearn")
 
     def fits() -> tuple[Fit, ...]:
-        parts = (record.part(train), record)
+        parts = (record.part(train), *(() if apart else (record,)))
         return tuple(
             parallel_map(lambda some: fit_record(measurement, some, model, **options, search=True), parts)
         )
 
-    base, baseline = checked_units(measurement, model, options, fits)
+    # Where whole records are held out, all data that a fit may see are those that effects are sought in.
+    base, *others_too = checked_units(measurement, model, options, fits)
+    baseline = others_too[0] if others_too else base
     search = Search(record, ~train, clock, motion_time_scale(base), given, base.problem.free)
     before = search.errors(base)
     known = SearchState(base, baseline, before)
@@ -157,7 +175,11 @@ def discover(
     end = search.run(begin, known)
     clock.finish("fitting the model as found")
     final = refit(end.whole)
-    found = [f for step in end.accepted for f in _describe(step, final)]
+    found = [
+        replace(f, by_record=by_record(baseline, end.whole, f.effect, order)[0])
+        for step in end.accepted
+        for f in _describe(step, final)
+    ]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
     left = bool(found) and lacks_more(final, end.errors)
@@ -172,7 +194,7 @@ def discover(
     if unexplained and not rejected and end.rounds:
         try:
             clock.tell("trying what comes nearest")
-            rejected = search.rejected(begin, end.rounds[-1])
+            rejected = search.rejected(begin, end.rounds[-1], order)
         except TimeUpError as up:
             stopped = stopped or str(up)
     if not found and end.unconfirmed:
@@ -183,6 +205,7 @@ def discover(
         or left
         or random
         or excused is not None
+        or any(contested(f.by_record) for f in found)
         or any(is_spline(f.effect) or f.like_a_drift(final.model) for f in found)
         or (any(f.curve is not None for f in found) and any(one.coarse for one in readings(final)))
     ):
@@ -203,7 +226,7 @@ def discover(
         scans=[sorted(one.library.scored, key=lambda s: -s.chi2) for one in end.rounds],
         curves=[one.curves for one in end.rounds],
         comparisons=[one.comparisons for one in end.rounds],
-        split=float(record.clock[np.flatnonzero(~train)[0]]),
+        split=float(record.clock[np.flatnonzero(~(record.first(TRAIN) if apart else train))[0]]),
         trained=end.part.without_cache(),
         rejected=rejected,
         thinned=thin if any(own.every > 1 for own in thin) else [],
@@ -211,7 +234,41 @@ def discover(
         stopped=stopped,
         excused=None if excused is None else [f.title for f in found if f.effect.name in excused],
         random=random.doubts.missed if random else [],
+        held_out=tuple(sorted(order[len(order) - apart :])),
     )
+
+
+def _held_out(
+    measurement: Measurement | Sequence[Measurement], held_out: Iterable[int] | None
+) -> tuple[list[int], int]:
+    """The measurements' numbers, those to be held out last, and how many these are.
+
+    Raises
+    ------
+    FitError
+        Numbers that there are not, or none that is left to fit.
+    """
+    number = 1 if isinstance(measurement, Measurement) else len(list(measurement))
+    if held_out is None:
+        return list(range(number)), 0
+    try:
+        last = sorted({operator.index(one) for one in held_out})
+    except TypeError:
+        raise FitError(
+            f"held_out must be a list of the measurements' numbers, as in held_out=[2], not {held_out!r}"
+        ) from None
+    if not last or not 0 <= last[0] <= last[-1] < number or len(last) == number:
+        raise FitError(
+            f"held_out must name some of the measurements 0 to {number - 1}, but not all, not {last}"
+            if number > 1
+            else "held_out takes several measurements: of one its last part is held out"
+        )
+    return [k for k in range(number) if k not in last] + last, len(last)
+
+
+def _ordered(one: Any, order: Sequence[int]) -> Any:
+    """A list for several measurements in another order; what is one for all as it is."""
+    return [one[k] for k in order] if isinstance(one, (list, tuple)) and len(one) == len(order) else one
 
 
 def _thinned(
@@ -236,7 +293,7 @@ def _begin(search: Search, known: SearchState) -> SearchState:
     if not (ran_away(known.part) or ran_away(known.whole)):
         return known
     try:
-        part, whole = parallel_map(as_stated, (known.part, known.whole))
+        part, whole = both(as_stated, known.part, known.whole)
         return SearchState(part, whole, search.errors(part))
     except FitError:
         return known

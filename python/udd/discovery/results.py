@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from udd._util.keywords import renamed_attribute
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
+from udd.discovery.validation.by_record import RecordAnswer, sentence
 from udd.discovery.validation.held_out_errors import Errors, Ratio, comparison_horizon, lacks_more
 from udd.effects import Effect
 from udd.fitting import Fit
@@ -56,6 +57,8 @@ class AddedEffect:
         for it.
     tried : str
         What it was called as a candidate, with the shape and the frequency that it was tried with.
+    by_record : list of RecordAnswer
+        Of several records that were fitted together, what each says of it.
     """
 
     effect: Effect
@@ -70,6 +73,7 @@ class AddedEffect:
     witness: Confirmation
     curve: Curve | None = None
     tried: str = ""
+    by_record: list[RecordAnswer] = field(default_factory=list)
 
     def like_a_drift(self, model: Model) -> bool:
         """Whether it was located as a curve over time alone, as the zero of a sensor that drifts is one.
@@ -92,6 +96,7 @@ class AddedEffect:
             "p": self.p,
             "held_out_cost_ratio": _named(self.ratio),
             "borne_out_by": self.witness,
+            "by_record": [own.to_dict() for own in self.by_record],
         }
 
 
@@ -147,11 +152,13 @@ class RejectedEffect:
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
-    why : {"chance", "drift", "part", "held", "form", "unconfirmed"}
+    why : {"chance", "drift", "part", "held", "form", "unconfirmed", "records"}
         Why it is not added: chance does as much, in all data or in the part that effects are sought in; a
         slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that
         fits clearly better does not pass; or it passed, but free runs over the held-out data do not get
-        better beyond doubt.
+        better beyond doubt; or only some of several records want it, though the others could show it.
+    by_record : list of RecordAnswer
+        Of several records that were fitted together, what each says of it.
     """
 
     effect: Effect
@@ -161,6 +168,7 @@ class RejectedEffect:
     errors: Errors
     ratio: Ratio
     why: RejectionReason
+    by_record: list[RecordAnswer] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads."""
@@ -174,6 +182,7 @@ class RejectedEffect:
             "p": self.p,
             "error": self.errors.to_dict(),
             "held_out_ratio": _named(self.ratio),
+            "by_record": [own.to_dict() for own in self.by_record],
         }
 
 
@@ -223,6 +232,9 @@ class Discovery:
     random : list of ModelError
         The random forces that the model needs beside the effects, where such forces alone, like those of a
         support that moves, explain the data about as well: the effects are not identified then.
+    held_out : tuple of int
+        The numbers of the measurements that were held out whole; none where the last part of each was. Then
+        `split` is but where pictures of the first measurement let the models go.
     """
 
     verdict: str
@@ -244,6 +256,7 @@ class Discovery:
     stopped: str | None = None
     excused: list[str] | None = None
     random: list[ModelError] = field(default_factory=list)
+    held_out: tuple[int, ...] = ()
 
     looks = renamed_attribute("looks", "comparisons")
     refused = renamed_attribute("refused", "rejected")
@@ -298,9 +311,17 @@ class Discovery:
         return [replace(one, step=steps.get(one.name, one.step)) for one in readings(self.fit)]
 
     @property
+    def by_record(self) -> list[tuple[str, list[RecordAnswer]]]:
+        """Titles, and what each of several records says: of what was found, and of what only some want."""
+        found = [(one.title, one.by_record) for one in self.effects]
+        found += [(one.title, one.by_record) for one in self.rejected if one.why == "records"]
+        return [own for own in found if own[1]]
+
+    @property
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
-        said = [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        said = [sentence(title, answers) for title, answers in self.by_record]
+        said += [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
         if self.effects and lacks_more(self.fit, self.error_after):
             said.append("Something is missing beside what was found: it leaves more than noise does.")
         if self.excused is not None:
@@ -368,6 +389,7 @@ class Discovery:
             "held_out_ratio": _named(self.ratio),
             "horizon_s": self.horizon,
             "held_out_from_s": self.split,
+            "held_out_records": list(self.held_out),
             "baseline": self.baseline.numbers(),
             "fit": self.fit.numbers(),
         }

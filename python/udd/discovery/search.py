@@ -20,6 +20,7 @@ from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan, Scored
 from udd.discovery.symbolic.formulas import Formula, formulas_for
 from udd.discovery.validation.acceptance_tests import Pair, confirmed_by, same_level
+from udd.discovery.validation.by_record import by_record, contested
 from udd.discovery.validation.held_out_errors import (
     Errors,
     Ratio,
@@ -31,6 +32,7 @@ from udd.discovery.validation.held_out_errors import (
 )
 from udd.discovery.validation.predictive_comparison import Foretelling
 from udd.discovery.validation.sensor_drift import as_random, drift_gain
+from udd.effects.user_defined import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released
 from udd.fitting.parameters import Free
@@ -102,11 +104,22 @@ class Step:
 
 @dataclass(frozen=True)
 class SearchState:
-    """Where the search stands: fits of the first part and of all data, and held-out errors."""
+    """Where the search stands: fits of the first part and of all data, and held-out errors.
+
+    Where whole records are held out both are one fit, of all other records.
+    """
 
     part: Fit
     whole: Fit
     errors: Errors
+
+
+def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
+    """The same done to the fits of the first part and of all data, once where they are one."""
+    if part is whole:
+        return (work(part),) * 2
+    one, other = parallel_map(work, (part, whole))
+    return one, other
 
 
 def _cheaper(
@@ -129,6 +142,20 @@ def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tupl
     left = [c for c in mine if c.effect not in [o.effect for o in others]]
     right = [o for o in others if o.effect not in [c.effect for c in mine]]
     return list(zip(left, right, strict=False))
+
+
+def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
+    """The best to be tried, of a machine the forces that machines have, each in the width that scores best.
+
+    Around a model that is far off many a product of states scores as high as they do.
+    """
+    usual = [s for s in passing if s.candidate.usual] or passing
+    if not any(along_of(s.candidate.effect.slots[0]) for s in passing):
+        return list(passing[:_TRIED])
+    first: dict[str, Scored] = {}
+    for one in usual:
+        first.setdefault(one.candidate.effect.name, one)
+    return list(first.values())[:_TRIED]
 
 
 def _chance(pair: Pair, trial: TrialFit, scores: ScoreRound) -> tuple[float, float]:
@@ -299,7 +326,7 @@ class Search:
         if all(f.name in names for f in self.free):
             return state
         try:
-            part, whole = parallel_map(partial(released, free=self.free), (state.part, state.whole))
+            part, whole = both(partial(released, free=self.free), state.part, state.whole)
             if not (part.converged and whole.converged):
                 return state
             errors = self.errors(part)
@@ -310,13 +337,19 @@ class Search:
             return state
         return state if self._worse(state.errors, errors) else SearchState(part, whole, errors)
 
-    def rejected(self, base: SearchState, scores: ScoreRound) -> list[RejectedEffect]:
-        """What comes nearest where nothing passes: the strongest of the library, by their held-out errors."""
+    def rejected(
+        self, base: SearchState, scores: ScoreRound, numbers: Sequence[int] = (0,)
+    ) -> list[RejectedEffect]:
+        """What comes nearest where nothing passes: the strongest of the library, by their held-out errors.
+
+        Of several records, by `numbers`, first of all what only some of them want: the form that explains
+        these best where each has its own amplitude.
+        """
         strongest: dict[object, Scored] = {}
         for one in scores.usable():
             strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
         shown = [s.candidate for s in scores.passing()]
-        rejected = []
+        rejected, apart = [], []
         for trial in self._tried(base, list(strongest.values())[:_NEAREST]):
             if trial.fit.level < base.part.level:
                 continue
@@ -333,9 +366,17 @@ class Search:
             elif judged.witness is None or self._worse(base.errors, errors):
                 why = "held"
             effect, ratio = judged.whole.model.effects[-1], self.improvement(base.errors, errors)
+            answers, chi2 = by_record(base.whole, judged.whole, effect, numbers)
             title = trial.candidates[0].title
-            rejected.append(RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why))
-        return sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
+            told = RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why, answers)
+            rejected.append(told)
+            if contested(answers):
+                apart.append((chi2, told))
+        near = sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
+        if not apart:
+            return near
+        best = min(apart, key=lambda pair: pair[0])[1]
+        return [replace(best, why="records"), *(r for r in near if r is not best)]
 
     def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
         """The best addition of the library that passes: an effect, or some of them together.
@@ -348,17 +389,19 @@ class Search:
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
+        # With these the model cannot even be held as tightly as without: nor with another one beside.
+        loose = {t.candidates[0].effect.name for t in singles if t.fit.level < current.part.level}
         if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             # Formulas that may explain the data as well as what the library has.
             known = max(scores.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
-            singles += self._pairs(current, scores)
+            singles += self._pairs(current, scores, loose)
         return (
             self._accept(current, singles, scores)
-            or self._group(current, scores, 2)
-            or self._group(current, scores, 3)
+            or self._group(current, scores, 2, loose)
+            or self._group(current, scores, 3, loose)
         )
 
     def _located(
@@ -389,7 +432,7 @@ class Search:
         return formulas_for(curve, part.observations, taken=part.model.state_names).formulas[:_FORMULAS]
 
     def _singles(self, current: SearchState, passing: list[Scored]) -> list[TrialFit]:
-        best = passing[:_TRIED]
+        best = _machines_first(passing)
         self._trying([s.candidate.title for s in best])
         return self._tried(current, best)
 
@@ -398,7 +441,7 @@ class Search:
         found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
-    def _pairs(self, current: SearchState, scores: ScoreRound) -> list[TrialFit]:
+    def _pairs(self, current: SearchState, scores: ScoreRound, loose: set[str]) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
 
         One that drives where it should brake may do so because another one brakes too much.
@@ -406,7 +449,7 @@ class Search:
         scored = sorted((s for s in scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
         for one in scored:
-            if one.candidate.usual:
+            if one.candidate.usual and one.candidate.effect.name not in loose:
                 first.setdefault(one.candidate.effect.name, one.candidate)
         best = list(first.values())[:_PAIRED]
         pairs = [list(pair) for pair in itertools.combinations(best, 2)]
@@ -424,13 +467,15 @@ class Search:
         self._trying([" with ".join(c.title for c in group) for group in groups])
         return fitted_ones(self._each(tried, groups))
 
-    def _group(self, current: SearchState, scores: ScoreRound, size: int) -> tuple[Step, SearchState] | None:
+    def _group(
+        self, current: SearchState, scores: ScoreRound, size: int, loose: set[str]
+    ) -> tuple[Step, SearchState] | None:
         """Several effects at once that pass only together."""
         best, number = scores.library.groups(size, _TRIED)
         likely = [
             [s.candidate for s in group]
             for group, fall in best
-            if len({s.candidate.effect.name for s in group}) == size
+            if len({s.candidate.effect.name for s in group} - loose) == size
             and fall > scores.fit.faults
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
@@ -507,7 +552,7 @@ class Search:
         near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
         costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
-        foretelling = Foretelling(self.record, wholes, self.unit)
+        foretelling = Foretelling(current.whole.record, wholes, self.unit)
         near = self._foretelling(near, costs, foretelling)
         # Where the best form fails a test, a clearly worse one is not named instead.
         for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
@@ -563,7 +608,7 @@ class Search:
 
         def again(trial: TrialFit) -> TrialFit | None:
             try:
-                return self._again(current.whole, trial)
+                return self._again(current, trial)
             except FitError:
                 return None
 
@@ -583,7 +628,7 @@ class Search:
     def _judged(self, current: SearchState, trial: TrialFit, scores: ScoreRound) -> TestResult | None:
         """What the tests say of a trial; None where it cannot be fitted to all data."""
         try:
-            whole = self._again(current.whole, trial)
+            whole = self._again(current, trial)
             if whole is None:
                 return None
             pair = same_level(current.whole, whole.fit)
@@ -606,8 +651,11 @@ class Search:
         except FitError:
             return None
 
-    def _again(self, whole: Fit, trial: TrialFit) -> TrialFit | None:
+    def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
         """The same proposal fitted to all data."""
+        whole = current.whole
+        if whole is current.part:
+            return trial
         if trial.curve is None:
             return of_library(whole, trial.candidates, trial.amplitudes)
         if trial.formula is None:

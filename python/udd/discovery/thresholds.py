@@ -15,4 +15,5 @@ Confirmation = Literal["held", "fitted", "halves"]
 #: Why an effect is not added: chance does as much, in all data or in the part that effects are sought in; a
 #: slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that fits
 #: better fails; or it passed all tests but free runs over the held-out data do not get better beyond doubt.
-RejectionReason = Literal["chance", "drift", "part", "held", "form", "unconfirmed"]
+#: Or only some of several records want it, though the others could show it.
+RejectionReason = Literal["chance", "drift", "part", "held", "form", "unconfirmed", "records"]

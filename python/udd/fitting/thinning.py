@@ -17,8 +17,10 @@ from .sensor import lattice
 
 Array = NDArray[np.float64]
 
-#: Frames above which a record is thinned, and about how many are left then.
-_MANY, _LEFT = 8000, 4000
+#: Frames above which a record is thinned: about half as many are left then.
+MANY = 8000
+#: The same where inputs were measured: a run over their samples takes a step for each.
+MANY_DRIVEN = 2000
 #: Blocks in the time in which the motion changes (its spread over its fast rates), at least.
 _BLOCKS = 2
 _SHORTER = 0.8  # times the block, tried next where the motion bends too much within it
@@ -64,7 +66,8 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
         Columns that count modulo a turn.
     """
     n = int(measurement.seen.sum())
-    if n <= _MANY:
+    many = MANY_DRIVEN if measurement.inputs else MANY
+    if n <= many:
         return Thinned(measurement, 1, n, {})
     t = measurement.t[measurement.seen]
     values = measurement.values[measurement.seen].copy()
@@ -72,7 +75,7 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
         if name in angles and np.ptp(values[:, k]) <= 2 * np.pi:
             values[:, k] = np.unwrap(values[:, k])
     step = float(np.median(np.diff(t)))
-    every = min(int(_change(t, values, step) / _BLOCKS / step), -(-n // _LEFT))
+    every = min(int(_change(t, values, step) / _BLOCKS / step), -(-2 * n // many))
     while every > 1:
         found = _averaged(measurement, t, values, step, every)
         if found is not None:

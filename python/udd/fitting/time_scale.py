@@ -28,5 +28,5 @@ def motion_time_scale(fit: Fit) -> float:
     if not fit.model.profile.written:
         return 1.0
     change = correlation_time(fit) or float(np.median(np.diff(fit.record.t)))
-    longest = max(float(np.ptp(fit.record.t[fit.record.film == k])) for k in range(len(fit.models)))
+    longest = max(float(np.ptp(fit.record.t[fit.record.film == k])) for k in np.unique(fit.record.film))
     return max(change, min(4.0 * change, longest / _UNITS))

@@ -97,6 +97,7 @@ def pendulum_chain(
     inertias: Sequence[float],
     *,
     friction: Sequence[float] | None = None,
+    rotors: Sequence[float] | None = None,
     g: float = 9.81,
     motors: bool = False,
 ) -> FormulaModel:
@@ -117,6 +118,9 @@ def pendulum_chain(
         Moments of inertia about the upper joints [kg m^2], parameters ``I1, ...``.
     friction : sequence of float, shape (n,), optional
         Viscous friction of the joints [N m s], parameters ``b1, ...``.
+    rotors : sequence of float, shape (n,), optional
+        Moments of inertia of the motors' rotors as the joints feel them, that is times the square of the gear
+        ratio [kg m^2], parameters ``J1, ...``.
     g : float
         Gravity [m/s^2].
     motors : bool
@@ -135,7 +139,9 @@ def pendulum_chain(
     -----
     With ``M_ij = c_ij cos(a_i - a_j)``, ``c_ii = I_i + l_i^2 sum_{k>i} m_k`` and, for i < j,
     ``c_ij = l_i (m_j r_j + l_j sum_{k>j} m_k)``, the equations are ``M a'' = -(c_ij sin(a_i - a_j) w_j^2
-    summed over j) - g (m_i r_i + l_i sum_{k>i} m_k) sin a_i`` and the joints' torques.
+    summed over j) - g (m_i r_i + l_i sum_{k>i} m_k) sin a_i`` and the joints' torques. A rotor adds
+    ``J_i (w_i - w_{i-1})^2 / 2`` to the kinetic energy: what its own turning with the link above adds to that
+    is smaller by the gear ratio, and left out.
 
     Examples
     --------
@@ -155,6 +161,8 @@ def pendulum_chain(
     columns = {"m": masses, "l": lengths, "r": centres, "I": inertias}
     if friction is not None:
         columns["b"] = friction
+    if rotors is not None:
+        columns["J"] = rotors
     if not 1 <= n <= _MOST_LINKS or any(len(values) != n for values in columns.values()):
         raise ModelError(
             f"a chain has 1 to {_MOST_LINKS} links with a mass, length, centre and inertia each, "
@@ -172,10 +180,13 @@ def pendulum_chain(
             return f"(I{i} + l{i}^2*({below[i]}))" if below[i] else f"I{i}"
         return f"l{min(i, j)}*{moment(max(i, j))}"
 
-    mass = [
-        [coefficient(i, j) + (f"*cos(a{min(i, j)} - a{max(i, j)})" if i != j else "") for j in links]
-        for i in links
-    ]
+    def inertia(i: int, j: int) -> str:
+        """An element of the mass matrix, with the rotors of the joints between."""
+        joints = {i, i + 1} & {j, j + 1} & set(links) if rotors is not None else set()
+        turned = "".join(f" {'+' if i == j else '-'} J{k}" for k in sorted(joints))
+        return coefficient(i, j) + (f"*cos(a{min(i, j)} - a{max(i, j)})" if i != j else "") + turned
+
+    mass = [[inertia(i, j) for j in links] for i in links]
     forces = []
     for i in links:
         parts = [f"-g*{moment(i)}*sin(a{i})"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from udd.discovery.validation.by_record import belief
 from udd.plot.inputs import first_film
 
 from . import animation, figures, tables, wording
@@ -41,6 +42,8 @@ BEFORE, AFTER = "known model", "with the effect"
 def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str = "") -> Head:
     """What stands first: the verdict, what was added, and the held-out errors; `unit` says theirs."""
     numbers = wording.headline(discovery)
+    if believed := belief(discovery.by_record):
+        said = [Paragraph(believed), *said]
     shown = [
         Number(
             f"error of the known model {numbers.span}, on data it had not seen{unit}",
@@ -163,12 +166,18 @@ def columns_with(columns: dict[str, Column], discovery: Discovery) -> dict[str, 
     return {name: c for name, c in columns.items() if name != "after" or discovery.effects}
 
 
-def _errors(discovery: Discovery) -> Section:
+def held_back(discovery: Discovery) -> str:
+    """Which data were held out."""
     m = discovery.measurement
-    held = 100 * (1 - (discovery.split - m.t[0]) / m.duration)
+    if discovery.held_out:
+        return f"Whole records, by number {', '.join(map(str, discovery.held_out))},"
+    return f"The last {100 * (1 - (discovery.split - m.t[0]) / m.duration):.0f} % of the record"
+
+
+def _errors(discovery: Discovery) -> Section:
     proved = "; there the effect had to prove itself" if discovery.effects else ""
     said = (
-        f"The last {held:.0f} % of the record were held back. On them the model was let go at "
+        f"{held_back(discovery)} were held back. On them the model was let go at "
         f"{len(discovery.error_before.samples)} moments, each time from a state that the data just before it "
         f"show{proved}."
     )

@@ -20,6 +20,7 @@ from .discovery_report import (
     errors_heading,
     errors_table,
     head,
+    held_back,
     nearest,
     reasons,
     round_heading,
@@ -91,7 +92,8 @@ def _errors(discovery: Discovery) -> Section:
         "noise floor, which noise in the data and in the starting state alone would leave to a faultless "
         "model."
     )
-    shown = (Figure(figures.errors(discovery), caption), errors_table(discovery))
+    held = Paragraph(f"{held_back(discovery)} were held back.") if discovery.held_out else None
+    shown = parts(held, Figure(figures.errors(discovery), caption), errors_table(discovery))
     return Section(errors_heading(discovery), shown)
 
 

@@ -136,6 +136,7 @@ def rejected(discovery: Discovery) -> list[str]:
             "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
             "held": "the frames that were held back do not bear it out",
             "form": "another form fits these data clearly better, and does not pass",
+            "records": "only some of the records want it",
         }[near.why]
         sentences.append(
             f"{near.title} ({near.effect.expression}) would bring the held-out error {numbers.span} from "

@@ -34,7 +34,7 @@ def confirmed_by(
     frames cost significantly less. Or chi2 falls significantly further when these frames are fitted too; this
     test is stronger, because the parameters' errors do not count. Or, if the held-out frames carry too little
     information on the effect, each half of the record (alternate blocks) lowers chi2 further than the other
-    half alone.
+    half alone. Of whole records that no fit sees their cost alone counts.
 
     Parameters
     ----------
@@ -58,6 +58,8 @@ def confirmed_by(
     ratio = held_out_ratio(*part, rest, unit)
     if ratio[2] < 1.0:
         return ratio, "held"
+    if part[0] is whole[0]:
+        return ratio, None  # no fit may see the rest
     if ratio[0] < 1.0 and _held_out_chi2_falls(part, whole):
         return ratio, "fitted"
     silent = names and _expected(part[1], whole, names) < _INFORMATIVE_CHI2

@@ -103,7 +103,7 @@ def held_out_errors(
     record : Record
         The whole measurement's frames.
     held_out : ndarray of bool (n,)
-        Which frames are held out: the last ones of each measurement.
+        Which frames are held out: the last ones of each measurement, or all of some.
     unit : float
         See :func:`udd.fitting.time_scale.motion_time_scale`.
     """
@@ -134,7 +134,7 @@ def held_out_errors(
         floor=floor,
         samples=samples,
         blocks=blocks,
-        run=_run(fit, record, held_out),
+        run=_run(fit, record, held_out, window),
         run_blocks=own_blocks[held_out],
     )
 
@@ -151,8 +151,14 @@ def _blocks(record: Record, held_out: NDArray[np.bool_], length: float) -> NDArr
     result = block_numbers(record, length)
     if len(np.unique(result[held_out])) >= _FEWEST:
         return result
-    spans = [np.ptp(record.t[held_out & (record.film == film)]) for film in range(len(record.origins))]
+    spans = [np.ptp(record.t[own]) for own in _held_out_of(record, held_out)]
     return block_numbers(record, float(max(spans)) / _SHORT)
+
+
+def _held_out_of(record: Record, held_out: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """The frames that are held out, of each measurement that has some."""
+    frames = (np.flatnonzero(held_out & (record.film == film)) for film in range(len(record.origins)))
+    return [own for own in frames if len(own)]
 
 
 def comparison_horizon(errors: Errors) -> float:
@@ -249,7 +255,7 @@ def _windows(
     often: float = _EVERY,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
     """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
-    spans = [np.flatnonzero(held_out & (record.film == film)) for film in range(len(record.origins))]
+    spans = _held_out_of(record, held_out)
     longest = max(float(np.ptp(record.t[own])) for own in spans)
     step = float(np.median(np.diff(record.t)))
     horizons = tuple(h for h in wanted if h <= longest / 3 and h >= step)
@@ -281,16 +287,27 @@ def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Arr
     return first, last
 
 
-def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_]) -> Array:
-    """Error of free runs from the last fitted frame of each measurement to its end, frame by frame."""
+def _settled(record: Record, own: NDArray[np.int64], window: float) -> int:
+    """The frame of a measurement up to which its first state is filtered."""
+    ahead = np.searchsorted(record.t[own], record.t[own[0]] + window)
+    return int(own[min(max(int(ahead), 6), len(own) - 2)])
+
+
+def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_], window: float) -> Array:
+    """Error of free runs from the last fitted frame of each measurement to its end, frame by frame.
+
+    Of a measurement that is held out whole, from the state that its first frames show.
+    """
     errors = np.full(len(record.t), np.nan)
-    for film in range(len(record.origins)):
-        own = np.flatnonzero(held_out & (record.film == film))
-        start = fit.states[fit.record.film == film][-1:]
+    for own in _held_out_of(record, held_out):
+        film = record.film[own[:1]]
+        start, at = fit.states[fit.record.film == film][-1:], own[0] - 1
+        if not len(start):
+            at = _settled(record, own, window)
+            _first, start = _filtered(fit, record, np.array([[own[0], at]]))
+            own = own[own > at]
         times = record.t[own][None, :]
-        found = predicted(
-            fit.models, fit.point.sets, np.array([film]), record.t[own[0] - 1 : own[0]], start, times
-        )[0]
+        found = predicted(fit.models, fit.point.sets, film, record.t[[at]], start, times)[0]
         errors[own] = _distance(fit, record, found, np.where(record.observed[own], record.seen[own], np.nan))
     result: Array = np.where(_comparable(fit, record), errors, np.nan)[held_out]
     return result

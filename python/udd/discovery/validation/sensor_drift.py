@@ -26,7 +26,7 @@ def drift_gain(fit: Fit) -> float:
     """
     sd = fit.noise.sd(fit.record, fit.blurring) / np.sqrt(np.maximum(fit.noise.weight, 1e-12))[:, None]
     change, total = correlation_time(fit), 0.0
-    for film in range(len(fit.models)):
+    for film in np.unique(fit.record.film):
         own = fit.record.film == film
         t = fit.record.t[own]
         span = float(np.ptp(t))
