@@ -250,7 +250,7 @@ def checked(name: str, given: dict[str, Any]) -> Any:
         if field in hints and not is_a(value, hints[field]):
             raise ValueError(field)
     result = _TYPES[name](**given)
-    if not consistent(result, _SHAPES.get(name, "")) or (isinstance(result, Fit) and not _named(result)):
+    if not consistent(result, _SHAPES.get(name, "")) or (isinstance(result, Fit) and not _sound(result)):
         raise ValueError(name)
     return result
 
@@ -269,10 +269,10 @@ def driven(equations: Any, records: list[dict[str, InputSignal]], record: int) -
     return model.with_inputs(*records, record=record)
 
 
-def _named(fit: Fit) -> bool:
-    """Whether a fit's numbers are those of the parameters that were free."""
+def _sound(fit: Fit) -> bool:
+    """Whether a fit's numbers are those of the parameters that were free, and its scatter is one."""
     free = [one.name for one in fit.problem.free]
-    return list(fit.parameters) == free == list(fit.errors)
+    return list(fit.parameters) == free == list(fit.errors) and fit.dof != 0
 
 
 def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import random
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -90,8 +91,14 @@ def test_what_is_no_result_is_refused(swing: tuple[udd.Measurement, udd.Fit], tm
     np.savez(foreign, x=np.arange(3))
     pickled = io.BytesIO()
     np.savez(pickled, tree=np.array([{}], dtype=object))
+    open_bracket = io.BytesIO()  # in an array's header
+    with zipfile.ZipFile(io.BytesIO(content)) as files, zipfile.ZipFile(open_bracket, "w") as result:
+        for name in files.namelist():
+            part = files.read(name)
+            result.writestr(name, part.replace(b"}", b"(", 1) if name == "a0.npy" else part)
     other = tmp_path / "other.npz"
-    for wrong in (b"", b"no zip", foreign.getvalue(), pickled.getvalue(), content[:-1], content[1:]):
+    wrongs = (foreign, pickled, open_bracket)
+    for wrong in (b"", b"no zip", content[:-1], content[1:], *(one.getvalue() for one in wrongs)):
         other.write_bytes(wrong)
         with pytest.raises(udd.UddError, match=r"other\.npz is not a whole file of udd\.save$"):
             udd.load(other)
