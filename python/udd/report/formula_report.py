@@ -170,7 +170,12 @@ def equations(discovery: Discovery) -> list[str]:
     """The known model."""
     model = discovery.baseline.model
     assert isinstance(model, FormulaModel)
-    return [f"{name}' = {text}" for name, text in model.equations.items()]
+    late = dict(model.delays)
+    seen = [
+        f"{name} = {text}" + (f", late by {late[name]}" if name in late else "")
+        for name, text in model.observe
+    ]
+    return [f"{name}' = {text}" for name, text in model.equations.items()] + seen
 
 
 def measured(discovery: Discovery) -> str:
