@@ -25,7 +25,7 @@ _MEANS = {
     "joints": r"viscous_friction_(along_a|between_a_and_b)",
     "quadratic": r"quadratic_drag|abs_v_v_in_v|v2_in_v",
     "cubic": r"cubic_drag|v3_in_v",
-    "cubic spring": r"y3_in_v",
+    "cubic spring": r"[xy]3_in_v",
 }
 
 
