@@ -1,6 +1,6 @@
 //! How a state is seen.
 
-use crate::model::{Observation, System, sides_of};
+use crate::model::{FormulaFamily, Observation, System, sides_of};
 use crate::scalar::Scalar;
 use crate::unroll::vector;
 
@@ -48,11 +48,11 @@ where
     C: Sensor<D, M>,
 {
     let mut all = sensor.observe(camera, at);
-    for m in 0..M {
+    for (m, own) in all.iter_mut().enumerate() {
         let Some(delay) = sensor.delay(m) else { continue };
         let by = at.parameters[delay];
         let (t, x) = (at.t - by, earlier(system, at, by));
-        all[m] = sensor.observe(camera, &Moment { t, x: &x, rate: &rates(system, t, &x), ..*at })[m];
+        *own = sensor.observe(camera, &Moment { t, x: &x, rate: &rates(system, t, &x), ..*at })[m];
     }
     all
 }
@@ -170,11 +170,22 @@ impl Sensor<2, 1> for AngleSensor {
 /// are. Channels beyond the last formula see nothing, and those that a record lacks have no information.
 #[derive(Clone, Debug)]
 pub struct FormulaSensor<const D: usize> {
-    pub observation: Observation,
+    observation: Observation,
     /// How many states are not idle.
-    pub states: usize,
+    states: usize,
     /// The components that are angles, where they are seen as they are.
-    pub angles: [bool; D],
+    angles: [bool; D],
+}
+
+impl<const D: usize> FormulaSensor<D> {
+    /// The sensors that were given with a model's equations.
+    pub fn of(family: &FormulaFamily<D>) -> Self {
+        let (states, mut angles) = (family.states(), [false; D]);
+        for (own, (_, angle)) in angles.iter_mut().zip(&states) {
+            *own = *angle;
+        }
+        Self { observation: family.observation().clone(), states: states.len(), angles }
+    }
 }
 
 impl<const D: usize> Sensor<D, D> for FormulaSensor<D> {

@@ -213,12 +213,8 @@ fn with_sensor<const D: usize>(
     family: FormulaFamily<D>,
     values: &[f64],
 ) -> (FormulaFamily<D>, &[f64], FormulaSensor<D>) {
-    let mut angles = [false; D];
-    for (n, (_, angle)) in family.states().into_iter().enumerate() {
-        angles[n] = angle;
-    }
-    let (observation, states) = (family.observation().clone(), family.states().len());
-    (family, values, FormulaSensor { observation, states, angles })
+    let sensor = FormulaSensor::of(&family);
+    (family, values, sensor)
 }
 
 /// The same for one family and one sensor.

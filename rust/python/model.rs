@@ -561,11 +561,7 @@ fn observed<'py>(
         _ => return Err(ModelError::new_err("a udd.Model is needed")),
     };
     let (system, live) = (family.build(values), family.states().len());
-    let sensor = FormulaSensor {
-        observation: family.observation().clone(),
-        states: live,
-        angles: [false; MAX_STATES],
-    };
+    let sensor = FormulaSensor::of(&family);
     let mut out = Vec::with_capacity(t.len() * sensor.channels());
     for (&t, row) in t.iter().zip(flat.chunks_exact(live)) {
         let mut x = [0.0; MAX_STATES];

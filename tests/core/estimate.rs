@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 use udd::analysis::CancelFlag;
 use udd::estimate::{
-    Bordered, CachedLinearisation, Candidate, Direct, DiskCamera, Estimator, FilmParameters, FreeParameter,
-    Options, Record, Role, RowMatrix, Sensor, Unknowns,
+    Bordered, CachedLinearisation, Candidate, DiskCamera, Estimator, FilmParameters, FormulaSensor,
+    FreeParameter, Moment, Options, Record, Role, RowMatrix, Sensor, Unknowns,
 };
 use udd::integrate::{Tolerance, propagate};
 use udd::model::effects::{Effect, Kind, Momentum};
@@ -219,7 +219,9 @@ fn a_camera_follows_paths_to_the_second_order() {
     let look = |name: &str, value: f64| {
         let own = |&(own, _): &(&str, _)| if own == name { value } else { 0.0 };
         let camera: Vec<f64> = DiskCamera::PARAMETERS.iter().map(own).collect();
-        SVector::from(DiskCamera.observe(&camera, &x, &rate))
+        SVector::from(
+            DiskCamera.observe(&camera, &Moment { t: 0.02, x: &x, rate: &rate, parameters: &PAPER }),
+        )
     };
     let seen = |state: [f64; 4]| SVector::from([state[1], state[2], state[3]]);
     // By Gauss' rule at three places, exact to the fifth order.
@@ -343,7 +345,7 @@ fn filled_up<const D: usize>(
     family: &FormulaFamily<3>,
     film: &[[f64; 3]],
     parameters: usize,
-) -> (Estimator<FormulaFamily<D>, Direct<D>, D, D>, Unknowns<D>) {
+) -> (Estimator<FormulaFamily<D>, FormulaSensor<D>, D, D>, Unknowns<D>) {
     let up = |x: &[f64; 3]| std::array::from_fn(|k| x.get(k).copied().unwrap_or(0.0));
     let seen = SVector::from_fn(|k, _| if k < 2 { 25.0 } else { 0.0 });
     let mut record = Record::<D> {
@@ -359,9 +361,10 @@ fn filled_up<const D: usize>(
     record.information[20] = SMatrix::zeros();
     record.memory[0] = 0.3;
     let free = |p| FreeParameter { role: Role::Model(p), film: None, mean: 0.0, sd: f64::INFINITY };
+    let family = family.filled::<D>();
     let estimator = Estimator {
-        family: family.filled::<D>(),
-        sensor: Direct { angles: [false; D] },
+        sensor: FormulaSensor::of(&family),
+        family,
         record,
         free: (0..parameters).map(free).collect(),
         diffusion: [0.1; D],
@@ -455,8 +458,8 @@ fn derivatives_of_many_states_equal_finite_differences() {
         memory: [0.0; D],
     };
     let estimator = Estimator {
+        sensor: FormulaSensor::of(&family),
         family,
-        sensor: Direct { angles: [false; D] },
         record,
         free: (0..14).map(free).collect(),
         diffusion: [1.0; D],

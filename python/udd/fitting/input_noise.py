@@ -79,8 +79,9 @@ def diffusion_by_noise(models: Sequence[FormulaModel], record: Record) -> Array:
     Errors of samples that are independent add up as a random walk does, to first order.
     """
     squares = np.zeros((len(models), record.states.shape[1]))
-    for film, model in enumerate(models):
-        own = record.film == film
+    there = np.unique(record.film)  # a part of a record may lack some measurements
+    for film in there:
+        model, own = models[film], record.film == film
         t, states = record.t[own], record.states[own]
         plain = model.rates(t, states)
         for name in model.inputs:
@@ -89,5 +90,5 @@ def diffusion_by_noise(models: Sequence[FormulaModel], record: Record) -> Array:
             noised = model.with_inputs({**model.records[model.record], name: moved})
             step = float(np.median(np.diff(signal.t)))
             squares[film] += np.mean((noised.rates(t, states) - plain) ** 2, axis=0) * step
-    result: Array = np.sqrt(squares.mean(axis=0))
+    result: Array = np.sqrt(squares[there].mean(axis=0))
     return result
