@@ -49,6 +49,7 @@ class Case:
     number: int
     noise: float
     additive: bool
+    told: bool
     draw: int
     budget: float
     limit: float
@@ -62,6 +63,7 @@ def main() -> int:
     parser.add_argument("--systems", default="1-63", help="numbers and ranges, as in 1-23,54")
     parser.add_argument("--noise", type=float, nargs="+", default=[0.0, 0.01, 0.05, 0.1])
     parser.add_argument("--additive", action="store_true", help="noise of a share of the standard deviation")
+    parser.add_argument("--told", action="store_true", help="udd is told each sample's standard deviation")
     parser.add_argument("--only", default="missing,hidden,library", help=f"of {', '.join(QUESTIONS)}")
     parser.add_argument("--draw", type=int, default=0, help="the number of the noise's draw")
     parser.add_argument("--budget", type=float, default=60.0, help="s, after which a search ends by itself")
@@ -77,7 +79,7 @@ def main() -> int:
     except ValueError as wrong:
         parser.error(str(wrong))
     cases = [
-        Case(question, number, noise, given.additive, given.draw, given.budget, given.limit)
+        Case(question, number, noise, given.additive, given.told, given.draw, given.budget, given.limit)
         for question in questions
         for noise in given.noise
         for number in numbers
@@ -90,7 +92,7 @@ def main() -> int:
             print(table.line(rows[-1]), file=sys.stderr, flush=True)
             if given.json:
                 part = given.json.with_suffix(".part")
-                part.write_text(json.dumps({"additive": given.additive, "records": rows}))
+                part.write_text(json.dumps({"additive": given.additive, "told": given.told, "records": rows}))
                 part.replace(given.json)
     print(table.report(rows))
     return int(any(row["outcome"] == "failed" for row in rows))
@@ -132,7 +134,8 @@ def score(case: Case) -> dict[str, Any]:
     """Draw the record and put the question; a record's failure is a result too."""
     system = SYSTEMS[case.number]
     try:
-        own = record(system, case.noise, case.question == "hidden", case.additive, case.draw)
+        hidden = case.question == "hidden"
+        own = record(system, case.noise, hidden, case.additive, case.told, case.draw)
         with _at_most(case.limit):
             if case.question in ("missing", "hidden"):
                 import missing
@@ -141,13 +144,14 @@ def score(case: Case) -> dict[str, Any]:
             import library
 
             return library.find(case.question, own, case.noise).to_dict()
-    except Exception as raised:
+    except Exception as raised:  # a sentence of udd's is an answer, anything else is not
+        refused = "UddError" in [kind.__name__ for kind in type(raised).__mro__]
         return {
             "question": case.question,
             "number": case.number,
             "title": system.title,
             "noise": case.noise,
-            "outcome": "failed",
+            "outcome": "refused" if refused else "failed",
             "error": traceback.format_exc(limit=-4),
             "said": f"{type(raised).__name__}: {raised}",
             "seconds": 0.0,

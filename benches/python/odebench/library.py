@@ -22,8 +22,8 @@ class Library:
     """What came of a record of which nothing was known but a library.
 
     `outcome` is "recovered" (exactly the true terms), "more" (these and others), "fewer" (some of these),
-    "wrong", or "failed"; where the library does not hold every true term, "fits" or "wrong" by whether R2
-    from the other start exceeds 0.9. `missed` and `extra` count terms.
+    "wrong", "refused" or "failed"; where the library does not hold every true term, "fits" or "wrong" by
+    whether R2 from the other start exceeds 0.9. `missed` and `extra` count terms.
     """
 
     method: str
@@ -123,7 +123,7 @@ def prune(record: Record) -> Array:
         {n: 0.0 for own in names for n in own},
         angles=list(system.angles),
     )
-    found = udd.prune(udd.Measurement(record.t, record.columns), model).model
+    found = udd.prune(udd.Measurement(record.t, record.columns, sigma=record.sigma), model).model
     return np.array([[found.parameters[n] for n in own] for own in names]).T
 
 

@@ -29,8 +29,8 @@ class Missing:
         "recovered": what was added is that term, and nothing else. "unsure": it is, but the verdict is that
         the form is not identified. "beside": another form was added, and this one is named as one that the
         data cannot tell from it. "wrong": another form is said to be identified. "located": something is said
-        to be missing, its form not identified. "unconfirmed", "silent" (nothing is said to be missing) and
-        "failed", the last with what was raised.
+        to be missing, its form not identified. "unconfirmed", "silent" (nothing is said to be missing),
+        "refused" (with what udd says) and "failed" (with what else was raised).
     off : float
         Relative error of the term's factor, where it was recovered.
     before, after : float
@@ -117,7 +117,10 @@ def search(record: Record, noise: float, budget: float) -> Missing:
     # A fit of what was not seen has to begin somewhere.
     hidden = {s: x for s, x in zip(system.states, system.starts[0], strict=True) if s not in record.seen}
     found = udd.discover(
-        udd.Measurement(record.t, record.columns), model, budget=budget, state0=hidden or None
+        udd.Measurement(record.t, record.columns, sigma=record.sigma),
+        model,
+        budget=budget,
+        state0=hidden or None,
     )
     result.seconds = time.perf_counter() - begin
     _judge(result, record, model, found, truth)

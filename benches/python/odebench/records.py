@@ -62,18 +62,30 @@ def run(
 
 @dataclass(frozen=True)
 class Record:
-    """What was measured: a column for each state, those of `seen` only were looked at."""
+    """What was measured: a column for each state, those of `seen` only were looked at.
+
+    `told` is the noise's standard deviation in every sample, where a method may know it.
+    """
 
     system: System
     t: Array
     clean: Array
     noisy: Array
     seen: tuple[str, ...]
+    told: Array | None = None
 
     @property
     def columns(self) -> dict[str, Array]:
         """The noisy samples of the states that were seen."""
-        columns = zip(self.system.states, self.noisy.T, strict=True)
+        return self._seen(self.noisy)
+
+    @property
+    def sigma(self) -> dict[str, Array] | None:
+        """The standard deviations of these, where they are told."""
+        return None if self.told is None else self._seen(self.told)
+
+    def _seen(self, table: Array) -> dict[str, Array]:
+        columns = zip(self.system.states, table.T, strict=True)
         return {name: column for name, column in columns if name in self.seen}
 
     def points(self) -> Array:
@@ -97,7 +109,12 @@ class Record:
 
 
 def record(
-    system: System, noise: float, hidden: bool = False, additive: bool = False, number: int = 0
+    system: System,
+    noise: float,
+    hidden: bool = False,
+    additive: bool = False,
+    told: bool = False,
+    number: int = 0,
 ) -> Record:
     """A record from the system's first start.
 
@@ -110,8 +127,10 @@ def record(
     if clean is None:
         raise RuntimeError(f"the motion of system {system.number} ends before {LAST:g}")
     drawn = np.random.default_rng([SEED, system.number, number]).standard_normal(clean.shape)
-    size = clean.std(axis=0) if additive else np.abs(clean)
+    size = noise * (clean.std(axis=0) if additive else np.abs(clean))
     seen = list(system.states)
     if hidden:
         seen.pop(int(np.random.default_rng([SEED, system.number, 1]).integers(len(seen))))
-    return Record(system, t, clean, clean + noise * size * drawn, tuple(seen))
+    # No sample is exact: where a state goes through zero it is told as known to a thousandth of its size.
+    least = np.maximum(size, noise * 1e-3 * clean.std(axis=0))
+    return Record(system, t, clean, clean + size * drawn, tuple(seen), least if told and noise else None)

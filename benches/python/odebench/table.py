@@ -16,7 +16,7 @@ def line(row: Row) -> str:
     """A record in a line."""
     head = f"{row['question']:8s} {row['number']:2d} {row['title'][:26]:26s} {row['noise']:5.1%}"
     head += f" {row['outcome']:11s}"
-    if row["outcome"] == "failed":
+    if "said" in row:
         return f"{head} {row['said']}"
     if "term" in row:
         return (
@@ -38,9 +38,12 @@ def report(rows: Sequence[Row]) -> str:
     key = lambda row: (row["question"], row["noise"])  # noqa: E731
     for (question, noise), group in groupby(sorted(rows, key=key), key):
         own = list(group)
-        failed = [row for row in own if row["outcome"] == "failed"]
-        done = [row for row in own if row["outcome"] != "failed"]
-        lines.append(f"\n{question}, noise {noise:.1%}: {len(own)} records, {len(failed)} failed")
+        done = [row for row in own if "said" not in row]
+        counts = Counter(row["outcome"] for row in own)
+        lines.append(
+            f"\n{question}, noise {noise:.1%}: {len(own)} records, {counts['refused']} refused, "
+            f"{counts['failed']} failed"
+        )
         for listed in (True, False):
             some = [row for row in done if row["listed"] == listed]
             if some:

@@ -23,8 +23,10 @@ _AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
 _FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record's frames are cut into
+_INTEGRATED = 1e-6  # of a state's spread that free runs are off by because of how they are integrated
 _FLOOR = 1.5  # times the noise floor that an error may be and still be noise
 _LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
+_BLOWN_UP = 1e6  # what a free run is off by from where its solution blows up
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
 
 
@@ -199,9 +201,10 @@ def confirmed(before: Errors, ratio: Ratio) -> bool:
 
 
 def reaches_noise_floor(errors: Errors, horizon: float) -> bool:
-    """Whether errors are no larger than noise makes them, give or take a half."""
+    """Whether errors are no larger than noise makes them, give or take a half, or than integration does."""
     median, low, _high, floor = errors.at(horizon)
-    return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
+    least = _INTEGRATED if errors.unit == "spread" else 0.0
+    return bool((low if np.isfinite(low) else median) <= max(_FLOOR * floor, least))
 
 
 def lacks_more(fit: Fit, errors: Errors) -> bool:
@@ -229,7 +232,8 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
     if errors.unit != "spread":
         places = record.seen[held_out & _fully_observed(record)][:, : 2 if errors.unit == "m" else 1]
         size = float(np.sqrt(places.var(axis=0).sum()))
-    return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
+    # A model whose runs all blow up makes no data of its own, and has no floor.
+    return bool(error > _LOST * size and not floor >= 0.5 * _LOST * size)
 
 
 def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:
@@ -309,6 +313,11 @@ def _floor(
     film = record.film[windows[:, 1]]
     frames = np.hstack([begins[:, None] + np.arange(length), ends])
     made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
+    whole = np.isfinite(made).all(axis=(1, 2))
+    if not whole.any():
+        return np.full(ends.shape[1], np.nan)
+    n, windows, ends, film = int(whole.sum()), windows[whole], ends[whole], film[whole]
+    frames, made = frames[whole], made[whole]
     # In a search the noise stays what the first model's misfits made it; where less remains it is less.
     sd = fit.noise.sd(record, record.states[:, 0]) * math.sqrt(min(fit.scatter, 1.0))
     sd = np.minimum(sd, _shown(fit, record))[frames]
@@ -360,7 +369,10 @@ def _fully_observed(record: Record) -> NDArray[np.bool_]:
 
 
 def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
-    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread."""
+    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread.
+
+    What a run gives is first; where that blew up it is far.
+    """
     difference = a - b
     result: Array
     sensor = fit.model.profile.sensor
@@ -368,7 +380,7 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
         if sensor.error_unit == "rad":
             difference = _turned(difference)
         result = np.abs(reduce(np.hypot, np.moveaxis(difference[..., : sensor.compared], -1, 0)))
-        return result
+        return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
     squares = []
     for k in np.flatnonzero(record.observed.any(axis=0)):
         spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
@@ -376,7 +388,7 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
         own = _turned(difference[..., k]) if angle else difference[..., k]
         squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
     result = np.sqrt(np.mean(squares, axis=0))
-    return result
+    return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
 
 
 def _turned(angle: Array) -> Array:
