@@ -22,7 +22,7 @@ Ratio = tuple[float, float, float]
 _AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
-_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record's frames are cut into
+_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record is cut into
 _INTEGRATED = 1e-6  # of a state's spread that free runs are off by because of how they are integrated
 _FLOOR = 1.5  # times the noise floor that an error may be and still be noise
 _LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
@@ -123,8 +123,7 @@ def held_out_errors(
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    own_blocks = _blocks(record, held_out, _BLOCK * unit)
-    blocks = own_blocks[starts]
+    blocks = _blocks(record, starts, _BLOCK * unit)
     low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
     return Errors(
         unit=profile.sensor.error_unit,
@@ -136,7 +135,7 @@ def held_out_errors(
         samples=samples,
         blocks=blocks,
         run=_run(fit, record, held_out),
-        run_blocks=own_blocks[held_out],
+        run_blocks=_blocks(record, np.flatnonzero(held_out), _BLOCK * unit),
     )
 
 
@@ -147,13 +146,14 @@ def block_numbers(record: Record, length: float) -> NDArray[np.int64]:
     return result
 
 
-def _blocks(record: Record, held_out: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
-    """Stretches to resample; shorter ones where the frames held out would be too few stretches for it."""
-    result = block_numbers(record, length)
-    if len(np.unique(result[held_out])) >= _FEWEST:
+def _blocks(record: Record, frames: NDArray[np.int64], length: float) -> NDArray[np.int64]:
+    """The stretches to resample that frames lie in; shorter ones where these would be too few for it."""
+    result = block_numbers(record, length)[frames]
+    if len(np.unique(result)) >= _FEWEST:
         return result
-    spans = [np.ptp(record.t[held_out & (record.film == film)]) for film in range(len(record.origins))]
-    return block_numbers(record, float(max(spans)) / _SHORT)
+    films = record.film[frames]
+    span = max(float(np.ptp(record.t[frames[films == film]])) for film in np.unique(films))
+    return block_numbers(record, span / _SHORT)[frames] if span > 0 else result
 
 
 def comparison_horizon(errors: Errors) -> float:
