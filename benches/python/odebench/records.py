@@ -15,6 +15,7 @@ from systems import System
 LAST, SAMPLES = 10.0, 512
 SEED = 20240101
 _TOLERANCE = 1e-11
+_LONGEST = 100_000  # evaluations of a right-hand side
 _FAR = 1e6  # in units of the true motion's largest state: from there a free run is lost
 
 Array = np.ndarray
@@ -39,12 +40,21 @@ def rates(system: System) -> Rates:
     return lambda states: np.stack([sum(c * f(states) for c, f in own) for own in equations], axis=1)
 
 
+class _TooLongError(Exception):
+    """A run takes more evaluations than any that is worth while."""
+
+
 def run(
-    right: Rates, start: Array, times: Array, limit: float, tolerance: float = _TOLERANCE
+    right: Rates, start: Array, times: Array, limit: float = np.inf, tolerance: float = _TOLERANCE
 ) -> Array | None:
     """A motion by DOP853, (n, d); None where it ends before the last time."""
+    left = _LONGEST
 
     def single(_t: float, state: Array) -> Array:
+        nonlocal left
+        left -= 1
+        if not left:
+            raise _TooLongError
         return right(state[None])[0]
 
     def far(_t: float, state: Array) -> float:
@@ -52,10 +62,12 @@ def run(
 
     far.terminal = True  # type: ignore[attr-defined]
     scale = tolerance * max(1.0, float(np.abs(start).max()))
-    with np.errstate(all="ignore"):
-        done = solve_ivp(
-            single, (times[0], times[-1]), start, "DOP853", times, events=far, rtol=tolerance, atol=scale
-        )
+    options = {"method": "DOP853", "t_eval": times, "rtol": tolerance, "atol": scale}
+    try:
+        with np.errstate(all="ignore"):
+            done = solve_ivp(single, (times[0], times[-1]), start, events=far, **options)
+    except _TooLongError:
+        return None
     whole = done.status == 0 and np.isfinite(done.y).all()
     return done.y.T if whole else None
 
@@ -99,7 +111,7 @@ class Record:
         NaN where the true motion ends there before the last time, -inf where the other one does.
         """
         start = np.array(self.system.starts[1])
-        truth = run(rates(self.system), start, self.t, np.inf)
+        truth = run(rates(self.system), start, self.t)
         if truth is None:
             return float("nan")
         found = run(right, start, self.t, _FAR * max(1.0, float(np.abs(truth).max())), 1e-7)
@@ -123,7 +135,7 @@ def record(
     is drawn, all others are seen.
     """
     t = np.linspace(0.0, LAST, SAMPLES)
-    clean = run(rates(system), np.array(system.starts[0]), t, np.inf)
+    clean = run(rates(system), np.array(system.starts[0]), t)
     if clean is None:
         raise RuntimeError(f"the motion of system {system.number} ends before {LAST:g}")
     drawn = np.random.default_rng([SEED, system.number, number]).standard_normal(clean.shape)
