@@ -121,7 +121,6 @@ def search(record: Record, noise: float) -> Missing:
     found = udd.discover(
         udd.Measurement(record.t, record.columns, sigma=record.sigma),
         model,
-        budget=budget,
         state0=hidden or None,
     )
     result.seconds = time.process_time() - begin
