@@ -35,7 +35,7 @@ endif
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install edit demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-discovery bench-tracker bench-page test-browser
+.PHONY: help install edit demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -111,6 +111,12 @@ bench-states: .venv/.ready-user ## what steps and fits take by the number of sta
 
 bench-discovery: .venv/.ready-user ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(STEP) "bench-discovery" $(PY) benches/python/discovery $(ARGS)
+
+bench-odebench: .venv/.ready-user ## ODEBench's 63 systems: a missing term, a whole system (ARGS="--systems 1-23 --noise 0 0.01 --only missing")
+	$(STEP) "bench-odebench" $(PY) benches/python/odebench $(ARGS)
+
+bench-odebench-pysindy: .venv-peers/.deps ## whole systems of it by PySINDy with its defaults
+	$(PEERS)/python benches/python/odebench --only pysindy $(ARGS)
 
 bench-tracker: .venv/.ready-user ## the tracker on films with every defect in turn (ARGS="--only clean,standard --trackers udd,fast,HSV")
 	$(PY) benches/python/tracker $(ARGS)

@@ -281,3 +281,45 @@ def test_effects_belong_to_own_models_as_terms_do() -> None:
         swing.with_effects([udd.effects.formula("v'", "x*v", v=0.0)])
     with pytest.raises(ModelError, match="takes a term"):
         swing.with_effects([udd.effects.slip(c=1.0)])
+
+
+def logistic(t: np.ndarray) -> np.ndarray:
+    """x' = 0.8 x - 0.01 x^2 from 8, in closed form."""
+    return 80 / (1 + 9 * np.exp(-0.8 * t))
+
+
+def test_a_known_model_whose_free_runs_blow_up_is_found_to_lack_its_growth(tmp_path: Path) -> None:
+    t = np.linspace(0, 10, 512)
+    x = logistic(t) + 0.3 * np.random.default_rng(0).standard_normal(len(t))
+    # Of x' = k x^2 with k > 0, which the growth at first asks for, a run from 75 ends within the record.
+    found = udd.discover(udd.Measurement(t, {"x": x}), udd.Model(["x"], ["k*x^2"], {"k": 0.001}))
+    assert found.verdict == "effect identified"
+    assert [f.title for f in found.effects] == ["x in x'"]
+    within(found, "x_in_x.c", 0.8)
+    within(found, "k", -0.01)
+    assert found.report(tmp_path / "page.html")
+
+
+@pytest.mark.parametrize("record", [logistic, lambda t: 2.0 - 1.5 * np.exp(-0.4 * t)])
+def test_what_a_record_without_noise_lacks_is_identified(record: Any) -> None:
+    t = np.linspace(0, 10, 512)
+    known = "k*x^2" if record is logistic else "k"
+    found = udd.discover(udd.Measurement(t, {"x": record(t)}), udd.Model(["x"], [known], {"k": 0.001}))
+    # Free runs are off by what integration leaves, and what that leaves is no noise.
+    assert (found.verdict, [f.title for f in found.effects]) == ("effect identified", ["x in x'"])
+    expected = 0.8 if record is logistic else -0.4
+    assert found.fit.parameters["x_in_x.c"] == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_short_record_whose_held_out_part_holds_few_stretches_confirms_what_it_shows() -> None:
+    t = np.linspace(0, 10, 512)
+    turning = np.exp((-0.2 + 2.1j) * t)  # x'' + 0.4 x' + (0.04 + 2.1^2) x = 0 in closed form
+    x, v = 0.12 * turning.real, 0.12 * ((-0.2 + 2.1j) * turning).real
+    rng = np.random.default_rng(0)
+    noisy = {name: s + 0.01 * s.std() * rng.standard_normal(len(t)) for name, s in (("x", x), ("v", v))}
+    found = udd.discover(udd.Measurement(t, noisy), udd.Model(["x", "v"], ["v", "-k*x"], {"k": 4.0}))
+    # Free runs start in two stretches of the held-out part only, which say nothing about their spread.
+    assert (found.verdict, [f.title for f in found.effects]) == ("effect identified", ["v in v'"])
+    within(found, "v_in_v.c", -0.4)
+    within(found, "k", 0.04 + 2.1**2)
+    assert found.ratio[2] < 1.0

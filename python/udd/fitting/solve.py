@@ -133,8 +133,39 @@ def predicted(
     Returns
     -------
     ndarray (k, h, m)
+        NaN from where a run ends because the model's solution blows up.
     """
-    return _core.predict(models[0], sets, film.tolist(), t0, states, times)
+    try:
+        return _core.predict(models[0], sets, film.tolist(), t0, states, times)
+    except FitError:
+        if len(t0) > 1:
+            rows = [slice(k, k + 1) for k in range(len(t0))]
+            some = [predicted(models, sets, film[k], t0[k], states[k], times[k]) for k in rows]
+            return np.concatenate(some)
+        return _as_far_as_it_runs(models, sets, film, t0, states, times)
+
+
+def _as_far_as_it_runs(
+    models: Sequence[Model],
+    sets: Sequence[FilmParameters],
+    film: NDArray[np.int64],
+    t0: Array,
+    states: Array,
+    times: Array,
+) -> Array:
+    """One run that does not reach its last time, by bisection for the last that it does."""
+    reached, beyond = 0, times.shape[1]
+    # What is seen at the start itself takes no run: it says how many columns there are.
+    result = np.repeat(_core.predict(models[0], sets, film.tolist(), t0, states, t0[:, None]), beyond, axis=1)
+    while beyond - reached > 1:
+        half = (reached + beyond) // 2
+        try:
+            result[:, :half] = _core.predict(models[0], sets, film.tolist(), t0, states, times[:, :half])
+            reached = half
+        except FitError:
+            beyond = half
+    result[:, reached:] = np.nan
+    return result
 
 
 def filtered(

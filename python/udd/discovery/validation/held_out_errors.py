@@ -23,9 +23,11 @@ Ratio = tuple[float, float, float]
 _AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
-_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record's frames are cut into
+_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record is cut into
+_INTEGRATED = 1e-6  # of a state's spread that free runs are off by because of how they are integrated
 _FLOOR = 1.5  # times the noise floor that an error may be and still be noise
 _LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
+_BLOWN_UP = 1e6  # what a free run is off by from where its solution blows up
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
 
 
@@ -122,8 +124,7 @@ def held_out_errors(
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
 
-    own_blocks = _blocks(record, held_out, _BLOCK * unit)
-    blocks = own_blocks[starts]
+    blocks = _blocks(record, starts, _BLOCK * unit)
     low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
     return Errors(
         unit=profile.sensor.error_unit,
@@ -135,7 +136,7 @@ def held_out_errors(
         samples=samples,
         blocks=blocks,
         run=_run(fit, record, held_out, window),
-        run_blocks=own_blocks[held_out],
+        run_blocks=_blocks(record, np.flatnonzero(held_out), _BLOCK * unit),
     )
 
 
@@ -146,13 +147,14 @@ def block_numbers(record: Record, length: float) -> NDArray[np.int64]:
     return result
 
 
-def _blocks(record: Record, held_out: NDArray[np.bool_], length: float) -> NDArray[np.int64]:
-    """Stretches to resample; shorter ones where the frames held out would be too few stretches for it."""
-    result = block_numbers(record, length)
-    if len(np.unique(result[held_out])) >= _FEWEST:
+def _blocks(record: Record, frames: NDArray[np.int64], length: float) -> NDArray[np.int64]:
+    """The stretches to resample that frames lie in; shorter ones where these would be too few for it."""
+    result = block_numbers(record, length)[frames]
+    if len(np.unique(result)) >= _FEWEST:
         return result
-    spans = [np.ptp(record.t[own]) for own in _held_out_of(record, held_out)]
-    return block_numbers(record, float(max(spans)) / _SHORT)
+    films = record.film[frames]
+    span = max(float(np.ptp(record.t[frames[films == film]])) for film in np.unique(films))
+    return block_numbers(record, span / _SHORT)[frames] if span > 0 else result
 
 
 def _held_out_of(record: Record, held_out: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
@@ -206,9 +208,10 @@ def confirmed(before: Errors, ratio: Ratio) -> bool:
 
 
 def reaches_noise_floor(errors: Errors, horizon: float) -> bool:
-    """Whether errors are no larger than noise makes them, give or take a half."""
+    """Whether errors are no larger than noise makes them, give or take a half, or than integration does."""
     median, low, _high, floor = errors.at(horizon)
-    return bool((low if np.isfinite(low) else median) <= _FLOOR * floor)
+    least = _INTEGRATED if errors.unit == "spread" else 0.0
+    return bool((low if np.isfinite(low) else median) <= max(_FLOOR * floor, least))
 
 
 def lacks_more(fit: Fit, errors: Errors) -> bool:
@@ -237,7 +240,8 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
         complete = held_out & record.observed.all(axis=1)
         places = record.seen[complete][:, : 2 if errors.unit == "m" else 1]
         size = float(np.sqrt(places.var(axis=0).sum()))
-    return bool(error > _LOST * size and floor < 0.5 * _LOST * size)
+    # A model whose runs all blow up makes no data of its own, and has no floor.
+    return bool(error > _LOST * size and not floor >= 0.5 * _LOST * size)
 
 
 def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:
@@ -328,6 +332,11 @@ def _floor(
     film = record.film[windows[:, 1]]
     frames = np.hstack([begins[:, None] + np.arange(length), ends])
     made = predicted(fit.models, fit.point.sets, film, record.t[begins], first, record.t[frames])
+    whole = np.isfinite(made).all(axis=(1, 2))
+    if not whole.any():
+        return np.full(ends.shape[1], np.nan)
+    n, windows, ends, film = int(whole.sum()), windows[whole], ends[whole], film[whole]
+    frames, made = frames[whole], made[whole]
     # In a search the noise stays what the first model's misfits made it; where less remains it is less.
     sd = fit.noise.sd(record, record.states[:, 0]) * math.sqrt(min(fit.scatter, 1.0))
     sd = np.minimum(sd, _shown(fit, record))[frames]
@@ -382,7 +391,10 @@ def _comparable(fit: Fit, record: Record) -> NDArray[np.bool_]:
 
 
 def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
-    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread."""
+    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread.
+
+    What a run gives is first; where that blew up it is far.
+    """
     difference = a - b
     result: Array
     sensor = fit.model.profile.sensor
@@ -390,7 +402,7 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
         if sensor.error_unit == "rad":
             difference = _turned(difference)
         result = np.abs(reduce(np.hypot, np.moveaxis(difference[..., : sensor.compared], -1, 0)))
-        return result
+        return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
     squares = []
     for k in np.flatnonzero(record.observed.any(axis=0)):
         spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
@@ -399,7 +411,7 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
         squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
     known = np.count_nonzero(np.isfinite(squares), axis=0)
     result = np.sqrt(np.nansum(squares, axis=0) / np.where(known, known, np.nan))
-    return result
+    return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
 
 
 def _turned(angle: Array) -> Array:
