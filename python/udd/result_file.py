@@ -35,6 +35,7 @@ from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.coordinates import Slot, coordinate, slots
 from udd.discovery.scoring.forcing import Score
 from udd.discovery.scoring.score_scan import Scored
+from udd.discovery.validation.by_record import RecordAnswer
 from udd.discovery.validation.held_out_errors import Errors
 from udd.effects import Effect
 from udd.errors import ModelError, UddError
@@ -61,7 +62,7 @@ _TYPES: dict[str, type] = {
         *(Fit, Problem, Point, Record, Noise, Free, InputSignal, Measurement, Thinned),
         *(diagnostics.Diagnostics, diagnostics.ModelError, diagnostics.Reading, diagnostics.RunawayParameter),
         NoisyInput,
-        *(Discovery, AddedEffect, Alternative, RejectedEffect, Candidate, Scored, Errors),
+        *(Discovery, AddedEffect, Alternative, RejectedEffect, RecordAnswer, Candidate, Scored, Errors),
         *(Curve, Spline, Score, Confounding),
     )
 }

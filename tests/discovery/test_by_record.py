@@ -50,6 +50,10 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
     assert set(found.fit.record.film.tolist()) == set(found.baseline.record.film.tolist()) == {0, 1, 2}
     np.testing.assert_array_equal(found.fit.measurements[3]["x"], given[1]["x"])
     assert found.ratio[2] < 0.5
+    udd.save(found, tmp_path / "found.npz")
+    again = udd.load(tmp_path / "found.npz")
+    assert isinstance(again, udd.Discovery)
+    assert again.by_record == found.by_record and again.held_out == (1,)
     found.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.index("What we would believe of all records: abs(v)*v in v") < page.index("<img")
