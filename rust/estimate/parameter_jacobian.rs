@@ -320,7 +320,7 @@ where
         propagate(system, start, end, x, &self.tolerance.filled::<D>(self.family.idle())).ok()
     }
 
-    /// The derivatives of what is seen by the state's rate.
+    /// The derivatives of what is seen by the state's rate; a sensor's delay plays no part.
     fn seen_by_rate(&self, set: &FilmParameters, t: f64, x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
         let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
         let (camera, parameters) = (constants(&set.camera), constants(&set.model));

@@ -1,5 +1,6 @@
 //! How a state is seen.
 
+use crate::integrate::{Tolerance, propagate};
 use crate::model::{FormulaFamily, Observation, System, sides_of};
 use crate::scalar::Scalar;
 use crate::unroll::vector;
@@ -35,7 +36,11 @@ pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
     fn observe<S: Scalar>(&self, camera: &[S], at: &Moment<'_, S, D>) -> [S; M];
 }
 
-/// What a sensor sees; of channels that are late, what it was then.
+/// How closely the way back to a late sensor's moment is followed.
+const BACK: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
+
+/// What a sensor sees; of channels that are late, what it was then. Not a number where the law leads from nowhere to
+/// that moment's state.
 #[inline(always)]
 pub fn seen<S, C, const D: usize, const M: usize>(
     sensor: &C,
@@ -44,32 +49,39 @@ pub fn seen<S, C, const D: usize, const M: usize>(
     at: &Moment<'_, S, D>,
 ) -> [S; M]
 where
-    S: Scalar,
+    S: Scalar<Real = f64, Mask = bool>,
     C: Sensor<D, M>,
 {
     let mut all = sensor.observe(camera, at);
     for (m, own) in all.iter_mut().enumerate() {
         let Some(delay) = sensor.delay(m) else { continue };
-        let by = at.parameters[delay];
-        let (t, x) = (at.t - by, earlier(system, at, by));
-        *own = sensor.observe(camera, &Moment { t, x: &x, rate: &rates(system, t, &x), ..*at })[m];
+        *own = late(sensor, system, camera, at, at.parameters[delay])[m];
     }
     all
 }
 
-/// The state a short while before, by one step of the classical Runge-Kutta method.
+/// What is seen of the state a while before.
 #[inline(never)]
-fn earlier<S: Scalar, const D: usize>(system: &impl System<S, D>, at: &Moment<'_, S, D>, by: S) -> [S; D] {
-    let slope = |part: f64, slope: &[S; D]| {
-        let moved = vector!(S, D; n => at.x[n] - by.scale(part) * slope[n]);
-        rates(system, at.t - by.scale(part), &moved)
+fn late<S, C, const D: usize, const M: usize>(
+    sensor: &C,
+    system: &impl System<S, D>,
+    camera: &[S],
+    at: &Moment<'_, S, D>,
+    by: S,
+) -> [S; M]
+where
+    S: Scalar<Real = f64, Mask = bool>,
+    C: Sensor<D, M>,
+{
+    let before = at.t.real() - by.real();
+    let Ok(x) = propagate(system, at.t.real(), before, *at.x, &BACK) else {
+        return [S::constant(f64::NAN); M];
     };
-    let first = at.rate;
-    let second = slope(0.5, first);
-    let third = slope(0.5, &second);
-    let last = slope(1.0, &third);
-    let mean = vector!(S, D; n => (first[n] + (second[n] + third[n]).scale(2.0) + last[n]).scale(1.0 / 6.0));
-    vector!(S, D; n => at.x[n] - by * mean[n])
+    // A delay that is longer by little leads back by as much more at that moment's rate.
+    let (t, longer) = (at.t - by, by - S::constant(by.real()));
+    let rate = rates(system, t, &x);
+    let x = vector!(S, D; n => x[n] - longer * rate[n]);
+    sensor.observe(camera, &Moment { t, x: &x, rate: &rates(system, t, &x), ..*at })
 }
 
 #[inline(always)]

@@ -142,6 +142,11 @@ def discover(
     clock = Clock(budget, progress or (lambda _text: None))
     free = free if free is None or isinstance(free, str) else list(free)
     order, apart = _held_out(measurement, held_out)
+    if apart and (each is not None or any("[" in name for name in priors or {})):
+        raise FitError(
+            "held_out cannot go with each, or with priors of single records: "
+            "nothing would determine what only a record that is held out has"
+        )
     if apart:
         measurement, model, state0 = (_ordered(one, order) for one in (measurement, model, state0))
     thin = _thinned(measurement, model)
@@ -248,7 +253,7 @@ def _held_out(
     FitError
         Numbers that there are not, or none that is left to fit.
     """
-    number = 1 if isinstance(measurement, Measurement) else len(list(measurement))
+    number = len(measurement) if isinstance(measurement, (list, tuple)) else 1
     if held_out is None:
         return list(range(number)), 0
     try:
@@ -281,7 +286,7 @@ def _thinned(
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
     one = model if isinstance(model, Model) else next(iter(model))
-    angles = one.angles if isinstance(one, Model) else ()
+    angles = one.turning if isinstance(one, FormulaModel) else one.angles if isinstance(one, Model) else ()
     return [thinned(own, angles) for own in some]
 
 

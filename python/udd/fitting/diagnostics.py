@@ -169,7 +169,7 @@ class Diagnostics:
         if self.missing:
             return "something is missing: run udd discover"
         if self.by_inputs:
-            return "nothing shows that something is missing beside the noise of what drives it"
+            return "nothing shows that something is missing: the inputs' noise explains what the model misses"
         if self.coloured:
             return "what is left is not white, by a fault of the film or something small: run udd discover"
         return "nothing shows that something is missing"
@@ -291,8 +291,9 @@ def _by_inputs(fit: Fit, missed: list[ModelError], noisy: list[NoisyInput]) -> l
     step = float(np.median(np.diff(fit.record.t)))
     made = diffusion_by_noise(models, replace(fit.record, states=fit.states)) / np.sqrt(step)
     found = [float(made[models[0].state_names.index(one.state)]) for one in missed]
-    enough = all(one.needed <= _BY_INPUT * by for one, by in zip(missed, found, strict=True))
-    return found if enough else []
+    # Were that noise real the model could not miss by far less.
+    pairs = [(one.needed, by) for one, by in zip(missed, found, strict=True) if by > 0.0]
+    return found if pairs and all(by / _BY_INPUT <= needed <= _BY_INPUT * by for needed, by in pairs) else []
 
 
 def _missed(fit: Fit) -> list[ModelError]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from udd.effects import Effect
 from udd.errors import FitError
@@ -27,6 +28,7 @@ from .solve import SolveError, solve
 from .units import ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
+_LEVELS_APART = 3.5  # times between the levels of a model's error
 _FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
 #: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
 UNEXPLAINED = 2.5
@@ -141,7 +143,8 @@ def fit_record(
         written = [own for own in models if isinstance(own, FormulaModel)]
         if search and written[0].inputs:  # a fit finds out by itself how tightly the model is held
             noise = diffusion_by_noise(written, record)
-            schedule = tuple(tuple(np.hypot(level, noise).tolist()) for level in schedule)
+            if noise.any() and _is_likely(noise, measurements, record, models, parameters, schedule):
+                schedule = tuple(tuple(np.hypot(level, noise).tolist()) for level in schedule)
     else:
         schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
@@ -150,6 +153,25 @@ def fit_record(
         for own, film in zip(models, measurements, strict=True)
     )
     return _anneal(measurements, problem, Point(record.states, sets))
+
+
+def _is_likely(
+    noise: NDArray[np.float64],
+    measurements: tuple[Measurement, ...],
+    record: Record,
+    models: tuple[Model, ...],
+    parameters: tuple[Free, ...],
+    schedule: tuple[tuple[float, ...], ...],
+) -> bool:
+    """Whether the inputs may have that noise: else the model's likeliest error is far below what it makes."""
+    problem = Problem(models, record, parameters, stated(record), schedule, schedule[0])
+    sets = tuple(FilmParameters(list(own.parameters.values()), [], 0.0) for own in models)
+    try:
+        found = _anneal(measurements, problem, Point(record.states, sets))
+    except SolveError:
+        return True
+    moved = noise > 0.0
+    return bool((np.array(found.problem.diffusion)[moved] >= noise[moved] / _LEVELS_APART).all())
 
 
 def astray(fitted: Fit) -> bool:

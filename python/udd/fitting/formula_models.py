@@ -105,7 +105,8 @@ def _off_the_edge(
 
     They are as large as what is seen.
     """
-    size = float(np.median(np.abs(np.concatenate([np.asarray(one) for one in seen.values()]))))
+    columns = [np.abs(one) for one in seen.values()]
+    size = float(np.median(np.concatenate(columns))) if columns else 1.0
     hidden = [k for k, name in enumerate(model.state_names) if name not in seen and not states[:, k].any()]
     result = {}
     for k in hidden:
@@ -206,14 +207,14 @@ def levels_of(
     rates = np.median(np.abs(model.rates(t, states)), axis=0) * step
     change = np.where(change > 0, change, rates)
     change = np.where(change > 0, change, float(change.max()) or 1.0)
-    noise = _state_noise(model, t, states, sigma)
+    noise = state_noise(model, t, states, sigma)
     seen = np.isfinite(noise)
     # Held by less than its noise a state that is seen would follow every frame.
     loosest = np.where(seen, np.clip(_OF_NOISE * noise, _OF_CHANGE * change, change), _UNSEEN * change)
     return tuple(tuple((level * loosest / np.sqrt(step)).tolist()) for level in _LEVELS)
 
 
-def _state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> Array:
+def state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> Array:
     """The noise of each state as sensors show it, (d,); infinite of those that they do not show."""
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(sigma).any(axis=0))
     typical = np.full(len(seen), np.inf)

@@ -23,6 +23,7 @@ _TOLD = 0.01
 _ORDERS = (4, 8)  # of the differences of samples
 _WHITE = 0.8  # of the noise by the lower order that the higher one must show
 _SHORTEST = 50  # samples
+_LEVELS = 20  # different values of a drive that may be noisy
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,11 @@ def noise_of(signal: InputSignal) -> float:
     """The noise of an input's samples; 0 where none is told from what the input does itself.
 
     Differences of a high order show what is left near the highest frequency that the samples hold. Noise of
-    a sensor is white there: orders agree. A drive that reaches up to there is not, and they do not.
+    a sensor is white there: orders agree. Of a drive that falls off before they do not. A drive that is white
+    itself cannot be told from noise by its samples: a held one, which a controller put out, and one of few
+    levels count as exact.
     """
-    if len(signal) < _SHORTEST:
+    if len(signal) < _SHORTEST or signal.hold == "zero" or len(np.unique(signal.values)) < _LEVELS:
         return 0.0
     lower, higher = (_by_differences(signal.values, order) for order in _ORDERS)
     return higher if higher > _WHITE * lower else 0.0

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.errors import FitError
 from udd.models.formula_model import FormulaModel
 
 Array = NDArray[np.float64]
@@ -64,6 +65,13 @@ def inverted(
     for k in range(n):
         for _ in range(_NEXT if k else _FIRST):
             around = model.observed(t[k], now + np.vstack([np.zeros(d), steps]))[:, columns]
+            if not np.isfinite(around).all():
+                asked = ", ".join(f"'{name}': ..." for name in model.state_names)
+                where = ", ".join(f"{n} = {x:.3g}" for n, x in zip(model.state_names, now, strict=True))
+                raise FitError(
+                    f"what the sensors see has no value around {where}: say where the motion starts, "
+                    f"state0={{{asked}}}"
+                )
             jacobian = (around[1 : d + 1] - around[d + 1 :]).T / (2.0 * _STEP) * weights[:, None]
             inverse = np.linalg.pinv(jacobian, rcond=_SINGULAR)
             change = inverse @ (weights * (values[k] - around[0]))

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 #: A frame is odd that lies farther off than this times what is typical; honest noise does in 1 of 1e8.
 _ODD = 9.0
+_FEWEST = 10  # frames of a fit
 _LEAP = 0.5  # of the steps before and after, which a bend of the motion does not reach
 _CLEANED = 8  # times odd frames are looked for: those that come close together spoil each other's look
 
@@ -156,9 +157,15 @@ def record_of(
         raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
     if own and own.inputs:
         (own,) = driven((own,), (measurement,))
+    counts = np.isfinite(measurement.values).sum(axis=0)
+    if own and len(measurement.names) > 1 and counts.min() < _FEWEST:
+        name, count = measurement.names[int(np.argmin(counts))], int(counts.min())
+        raise FitError(f"{name} was seen in {count} rows; a column needs at least {_FEWEST}: leave it out")
     values, seen = measurement.values, measurement.seen & (np.arange(len(measurement)) < moving(measurement))
-    if seen.sum() < 10:
-        raise FitError(f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least 10")
+    if seen.sum() < _FEWEST:
+        raise FitError(
+            f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least {_FEWEST}"
+        )
     origin = float(measurement.t[0])
     times = measurement.t[seen] - origin
     step = float(np.median(np.diff(times)))

@@ -78,11 +78,13 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
     names = list(dict.fromkeys(free.name.partition("[")[0] for free in fit.problem.free))
     priors = {free.name: (free.mean, free.sd) for free in fit.problem.free if np.isfinite(free.sd)}
     each = list(dict.fromkeys(f.name.partition("[")[0] for f in fit.problem.free if f.film is not None))
+    firsts = [int(np.argmax(fit.record.film == film)) for film in range(len(fit.measurements))]
+    starts = [dict(zip(fit.model.state_names, fit.states[k].tolist(), strict=True)) for k in firsts]
     found: list[list[list[float]]] = [[] for _ in _TIMES]
     for k in range(draws * len(_TIMES)):
         noised = [_noised(one, _TIMES[k % len(_TIMES)], random) for one in fit.measurements]
         try:
-            again = fit_again(noised, list(fit.models), names, priors=priors, each=each)
+            again = fit_again(noised, list(fit.models), names, priors=priors, each=each, state0=starts)
         except SolveError:
             continue
         found[k % len(_TIMES)].append([again.parameters[name] for name in fit.parameters])

@@ -15,6 +15,7 @@ from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .estimator_input import EstimatorInput, FilmParameters, Observations
+from .formula_models import state_noise
 from .problem import Fit, Point, Problem
 from .record import Record
 
@@ -96,9 +97,8 @@ def _said(error: ValueError, problem: Problem) -> str:
         )
     model = problem.models[0]
     if "do not determine the state" in str(error) and isinstance(model, FormulaModel):
-        sigma = dict(zip(model.channels, problem.record.sigma.T, strict=True))
-        seen = {name for name, own in sigma.items() if np.isfinite(own).any()}
-        hidden = [name for name in model.state_names if name not in seen]
+        noise = state_noise(model, problem.record.t, problem.record.states, problem.record.sigma)
+        hidden = [name for name, own in zip(model.state_names, noise, strict=True) if not np.isfinite(own)]
         asked = ", ".join(f"'{name}': ..." for name in hidden)
         if hidden:
             is_not = "is" if len(hidden) == 1 else "are"

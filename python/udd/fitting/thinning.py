@@ -67,7 +67,8 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
     """
     n = int(measurement.seen.sum())
     many = MANY_DRIVEN if measurement.inputs else MANY
-    if n <= many:
+    gaps = not np.isfinite(measurement.values[measurement.seen]).all()
+    if n <= many or gaps:  # sensors with rates of their own have no blocks in common
         return Thinned(measurement, 1, n, {})
     t = measurement.t[measurement.seen]
     values = measurement.values[measurement.seen].copy()
