@@ -51,6 +51,7 @@ class Case:
     additive: bool
     told: bool
     draw: int
+    spread: float | None
     limit: float
 
 
@@ -65,6 +66,7 @@ def main() -> int:
     parser.add_argument("--told", action="store_true", help="udd is told each sample's standard deviation")
     parser.add_argument("--only", default="missing,hidden,library", help=f"of {', '.join(QUESTIONS)}")
     parser.add_argument("--draw", type=int, default=0, help="the number of the noise's draw")
+    parser.add_argument("--spread", type=float, help="for udd.prune: of the factors' prior")
     parser.add_argument("--limit", type=float, default=180.0, help="s of the processor for a record")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, help="write every record's score there too")
@@ -77,7 +79,7 @@ def main() -> int:
     except ValueError as wrong:
         parser.error(str(wrong))
     cases = [
-        Case(question, number, noise, given.additive, given.told, given.draw, given.limit)
+        Case(question, number, noise, given.additive, given.told, given.draw, given.spread, given.limit)
         for question in questions
         for noise in given.noise
         for number in numbers
@@ -141,7 +143,7 @@ def score(case: Case) -> dict[str, Any]:
                 return missing.search(own, case.noise).to_dict() | {"question": case.question}
             import library
 
-            return library.find(case.question, own, case.noise).to_dict()
+            return library.find(case.question, own, case.noise, case.spread).to_dict()
     except Exception as raised:  # a sentence of udd's is an answer, anything else is not
         refused = "UddError" in [kind.__name__ for kind in type(raised).__mro__]
         return {

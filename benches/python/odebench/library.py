@@ -83,13 +83,13 @@ def rates(system: System, factors: Array) -> Rates:
     return right
 
 
-def find(method: str, record: Record, noise: float) -> Library:
-    """Fit and select by a method, and compare with the truth."""
+def find(method: str, record: Record, noise: float, spread: float | None = None) -> Library:
+    """Fit and select by a method, and compare with the truth; `spread` is for :func:`prune`."""
     system = record.system
     true = truth(system)
     result = Library(method, system.number, system.title, noise, true is not None)
     begin = time.process_time()
-    factors = {"library": prune, "pysindy": pysindy}[method](record)
+    factors = prune(record, spread) if method == "library" else pysindy(record)
     result.seconds = time.process_time() - begin
     kept = factors != 0
     listed = texts(system)
@@ -109,8 +109,8 @@ def find(method: str, record: Record, noise: float) -> Library:
     return result
 
 
-def prune(record: Record) -> Array:
-    """By `udd.prune`, all factors zero at first; from all states, with every setting as it is."""
+def prune(record: Record, spread: float | None = None) -> Array:
+    """By `udd.prune`, all factors zero at first."""
     import udd
 
     system = record.system
@@ -123,7 +123,9 @@ def prune(record: Record) -> Array:
         {n: 0.0 for own in names for n in own},
         angles=list(system.angles),
     )
-    found = udd.prune(udd.Measurement(record.t, record.columns, sigma=record.sigma), model).model
+    found = udd.prune(
+        udd.Measurement(record.t, record.columns, sigma=record.sigma), model, spread=spread
+    ).model
     return np.array([[found.parameters[n] for n in own] for own in names]).T
 
 
