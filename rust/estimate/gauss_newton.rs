@@ -95,7 +95,7 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The inverse variance of the model's error over each link; that of idle states is of no account.
+    /// The inverse variance of the model's error over each link; that of idle states plays no part.
     pub fn precision(&self) -> Vec<SVector<f64, D>> {
         let t = &self.record.t;
         let live = self.live();

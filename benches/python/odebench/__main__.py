@@ -13,7 +13,7 @@ hidden    the same, but a state, drawn too, is not seen; udd is told where it st
 library   nothing is known but a library of terms: does `udd.prune` leave the true ones?
 pysindy   the same question to PySINDy with its defaults; in an environment that has it, which needs no udd.
 
-Shares no code with udd; all draws are from seeds that were fixed before the first run.
+The truth is computed without udd; all draws are from seeds that were fixed before the first run.
 """
 
 from __future__ import annotations

@@ -234,7 +234,7 @@ class Discovery:
         support that moves, explain the data about as well: the effects are not identified then.
     held_out : tuple of int
         The numbers of the measurements that were held out whole; none where the last part of each was. Then
-        `split` is but where pictures of the first measurement let the models go.
+        `split` is the time in the first measurement from which pictures show free runs.
     """
 
     verdict: str
