@@ -193,3 +193,56 @@ def test_what_is_wrong_is_told(options: dict[str, Any], told: str) -> None:
 def test_a_column_that_no_sensor_has_is_told() -> None:
     with pytest.raises(FitError, match="columns theta, gyro, but the model's sensors are volts, gyro"):
         udd.fit(udd.Measurement(T, {"theta": np.sin(T), "gyro": np.cos(T)}), SWING)
+
+
+def test_a_late_sensor_of_a_driven_machine_sees_through_the_steps_of_its_input() -> None:
+    rng = np.random.default_rng(0)
+    held = udd.InputSignal(np.arange(0, 10.05, 0.05), rng.normal(size=201), hold="zero")
+    cart = udd.Model(
+        ["x", "v"],
+        ["v", "-4*x - 0.5*v + 20*u"],
+        {"d": 0.12},
+        inputs=["u"],
+        observe={"g": "v"},
+        delays={"g": "d"},
+    )
+    t = np.arange(1.0, 9.0, 0.0137)
+    now, before = (
+        udd.simulate(
+            cart, [0.0, *at], [0.2, 0.0], inputs={"u": held}, method="dop853", rtol=1e-11, atol=1e-12
+        )
+        for at in (t, t - 0.12)
+    )
+    seen = cart.with_inputs({"u": held}).observed(t, now.state[1:])[:, 0]
+    # The way back is followed to 1e-8.
+    assert np.abs(seen - before.v[1:]).max() < 1e-6
+
+
+def test_columns_with_gaps_are_not_averaged_in_blocks() -> None:
+    t = np.arange(0.0, 90.0, 0.01)
+    swing = udd.Model(["a", "b"], ["b", "-k*a"], {"k": 4.0})
+    rng = np.random.default_rng(0)
+    a = np.cos(2 * t) + 1e-3 * rng.normal(size=len(t))
+    b = -2 * np.sin(2 * t) + 1e-3 * rng.normal(size=len(t))
+    b[::7] = np.nan
+    found = udd.discover(udd.Measurement(t, {"a": a, "b": b}), swing)
+    assert found.verdict == "nothing missing" and not found.thinned
+
+
+@pytest.mark.parametrize("few", [0, 1, 9])
+def test_a_column_that_is_hardly_there_is_told(few: int) -> None:
+    values = np.cos(T)
+    other = np.where(np.arange(len(T)) < few, -np.sin(T), np.nan)
+    swing = udd.Model(["a", "b"], ["b", "-k*a"], {"k": 1.0})
+    with pytest.raises(FitError, match=f"b was seen in {few} rows; a column needs at least 10"):
+        udd.fit(udd.Measurement(T, {"a": values, "b": other}), swing)
+
+
+def test_where_a_sensor_has_no_value_a_start_is_asked_for() -> None:
+    level = udd.Model(["h", "w"], ["w", "-k*(h - 2)"], {"k": 4.0}, observe={"p": "sqrt(h)"})
+    run = udd.simulate(level, T, [2.5, 0.0])
+    seen = level.observed(T, run.state)[:, 0] + 1e-3 * np.random.default_rng(0).normal(size=len(T))
+    measured = udd.Measurement(T, {"p": seen})
+    with pytest.raises(FitError, match="no value around h = 0, w = 0: say where the motion starts"):
+        udd.fit(measured, level)
+    assert abs(udd.fit(measured, level, state0={"h": 2.0}).parameters["k"] - 4.0) < 1e-3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -55,3 +57,20 @@ def test_a_model_without_inputs_has_no_such_bias() -> None:
     fit = udd.fit(udd.Measurement(t, {"q": np.cos(2 * t) + 1e-3 * np.sin(77 * t)}), swing)
     with pytest.raises(FitError, match="the model has no inputs whose noise could bias it"):
         udd.input_bias(fit)
+
+
+@pytest.mark.parametrize("hold", ["zero", "linear"])
+def test_a_drive_that_is_white_itself_is_not_taken_for_noise(hold: Any) -> None:
+    """As of a pseudo-random binary signal, or of noise that was put in on purpose and is known."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 20.0, 0.02)
+    values = np.sign(rng.normal(size=len(t))) if hold == "zero" else rng.normal(size=len(t))
+    drive = udd.InputSignal(t, 3.0 * values, hold=hold)
+    known = udd.Model(["x", "v"], ["v", "-k*x - c*v + u"], {"k": 4.0, "c": 0.3}, inputs=["u"])
+    run = udd.simulate(
+        known.with_term("v", "x^3", q=-3.0), t[:-5], [0.5, 0.0], inputs={"u": drive}, method="auto"
+    )
+    measured = udd.Measurement(t[:-5], {"x": run.x + 1e-3 * rng.normal(size=len(run.x))}, inputs={"u": drive})
+    assert udd.fit(measured, known).doubts.missing
+    found = udd.discover(measured, known)
+    assert any("x^3" in effect.expression for effect in found.effects)

@@ -15,6 +15,9 @@ from .problem import Fit
 Array = NDArray[np.float64]
 
 
+_FEWEST = 2  # innovations of a channel that say anything
+
+
 @dataclass(frozen=True, eq=False)
 class Innovations:
     """Innovations of a fitted model in units of their own standard deviation.
@@ -64,6 +67,7 @@ def innovations(fit: Fit) -> Innovations:
     problem = replace(fit.problem, noise=fit.noise)
     vague = np.ptp(fit.states, axis=0).tolist()
     values = _core.innovations(replace(problem.at(fit.point), free=()), vague)
-    seen = [k for k, name in enumerate(fit.channels) if name in fit.measurement.names]
+    told = np.isfinite(values).sum(axis=0) >= _FEWEST
+    seen = [k for k, name in enumerate(fit.channels) if name in fit.measurement.names and told[k]]
     names = tuple(fit.channels[k] for k in seen)
     return Innovations(names, float(np.median(np.diff(fit.record.t))), values[:, seen])
