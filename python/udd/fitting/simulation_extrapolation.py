@@ -71,6 +71,19 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
     References
     ----------
     Cook and Stefanski, "Simulation-extrapolation estimation in parametric measurement error models", 1994.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import udd
+    >>> t, rng = np.arange(0.0, 15.0, 0.02), np.random.default_rng(0)
+    >>> cart = udd.Model(["x", "v"], ["v", "g*u - 4*x - v"], {"g": 2.0}, inputs=["u"])
+    >>> drive = np.sin(1.3 * t) + 0.5 * np.sin(3.7 * t)
+    >>> x = udd.simulate(cart, t, [0.0, 0.0], inputs={"u": drive}).x + 1e-3 * rng.normal(size=len(t))
+    >>> noisy = drive + 0.3 * rng.normal(size=len(t))
+    >>> fit = udd.fit(udd.Measurement(t, {"x": x}, inputs={"u": noisy}), cart)
+    >>> fit.parameters["g"] < 2.0, udd.input_bias(fit).bias["g"] < 0.0
+    (True, True)
     """
     if not fit.model.inputs:
         raise FitError("the model has no inputs whose noise could bias it")
