@@ -97,7 +97,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     place, signs = found[square]
     size = square**0.5
     errors = location_error(
-        new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "minus"
+        new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
     )
     own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
     # What the secant method passed beyond the doubling is left out.
