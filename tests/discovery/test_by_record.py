@@ -60,7 +60,7 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
     assert "Whole records, by number 1, were held back." in page
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_only_one_record_wants_is_told_apart() -> None:
     found = udd.discover(records([0.0, 0.12, 0.0]), oscillator())
     assert found.verdict == "effect present, form not identified" and not found.effects
