@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd import _core
-from udd.models.formula_model import FormulaModel
 
-from .input_noise import NoisyInput, diffusion_by_noise, noisy_inputs
+from .input_noise import LEVELS_APART, NoisyInput, diffusion_by_noise, noisy_inputs
 from .parameters import Free
 from .sensor import is_film, lattice, moving
 
@@ -25,7 +24,6 @@ _COLOURED = 1e-8
 #: last itself.
 _NEARLY = 1
 _OFF = 3.0  # standard deviations from what was stated
-_BY_INPUT = 3.5  # times what the inputs' noise makes that the model's error may be: levels are as far apart
 _LEAST = 30  # frames of which innovations tell anything
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
@@ -285,15 +283,15 @@ def rate_of(state: str) -> str:
 
 def _by_inputs(fit: Fit, missed: list[ModelError], noisy: list[NoisyInput]) -> list[float]:
     """What the inputs' noise makes of the rates that are missed; empty where that is not all of it."""
-    models = [model for model in fit.models if isinstance(model, FormulaModel)]
-    if not noisy or not models:
+    if not noisy:
         return []
     step = float(np.median(np.diff(fit.record.t)))
-    made = diffusion_by_noise(models, replace(fit.record, states=fit.states)) / np.sqrt(step)
-    found = [float(made[models[0].state_names.index(one.state)]) for one in missed]
+    made = diffusion_by_noise(fit.models, replace(fit.record, states=fit.states)) / np.sqrt(step)
+    found = [float(made[fit.model.state_names.index(one.state)]) for one in missed]
     # Were that noise real the model could not miss by far less.
     pairs = [(one.needed, by) for one, by in zip(missed, found, strict=True) if by > 0.0]
-    return found if pairs and all(by / _BY_INPUT <= needed <= _BY_INPUT * by for needed, by in pairs) else []
+    near = all(by / LEVELS_APART <= needed <= LEVELS_APART * by for needed, by in pairs)
+    return found if pairs and near else []
 
 
 def _missed(fit: Fit) -> list[ModelError]:

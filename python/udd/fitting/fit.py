@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from udd.effects import Effect
 from udd.errors import FitError
@@ -17,7 +16,7 @@ from udd.models.formula_model import FormulaModel
 
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
-from .input_noise import diffusion_by_noise
+from .input_noise import LEVELS_APART, diffusion_by_noise
 from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
@@ -28,7 +27,6 @@ from .solve import SolveError, solve
 from .units import ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
-_LEVELS_APART = 3.5  # times between the levels of a model's error
 _FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
 #: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
 UNEXPLAINED = 2.5
@@ -140,11 +138,6 @@ def fit_record(
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], FormulaModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
-        written = [own for own in models if isinstance(own, FormulaModel)]
-        if search and written[0].inputs:  # a fit finds out by itself how tightly the model is held
-            noise = diffusion_by_noise(written, record)
-            if noise.any() and _is_likely(noise, measurements, record, models, parameters, schedule):
-                schedule = tuple(tuple(np.hypot(level, noise).tolist()) for level in schedule)
     else:
         schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
@@ -152,26 +145,29 @@ def fit_record(
         FilmParameters(list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
         for own, film in zip(models, measurements, strict=True)
     )
-    return _anneal(measurements, problem, Point(record.states, sets))
+    point = Point(record.states, sets)
+    if search and models[0].inputs:  # a fit finds out by itself how tightly the model is held
+        problem = _with_input_noise(measurements, problem, point)
+    return _anneal(measurements, problem, point)
 
 
-def _is_likely(
-    noise: NDArray[np.float64],
-    measurements: tuple[Measurement, ...],
-    record: Record,
-    models: tuple[Model, ...],
-    parameters: tuple[Free, ...],
-    schedule: tuple[tuple[float, ...], ...],
-) -> bool:
-    """Whether the inputs may have that noise: else the model's likeliest error is far below what it makes."""
-    problem = Problem(models, record, parameters, stated(record), schedule, schedule[0])
-    sets = tuple(FilmParameters(list(own.parameters.values()), [], 0.0) for own in models)
-    try:
-        found = _anneal(measurements, problem, Point(record.states, sets))
-    except SolveError:
-        return True
+def _with_input_noise(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Problem:
+    """The problem with the noise of inputs as a part of the model's error.
+
+    Not where the inputs have none: then the model's likeliest error is far below what it would make.
+    """
+    noise = diffusion_by_noise(problem.models, problem.record)
     moved = noise > 0.0
-    return bool((np.array(found.problem.diffusion)[moved] >= noise[moved] / _LEVELS_APART).all())
+    if not moved.any():
+        return problem
+    try:
+        found = _anneal(measurements, replace(problem, likeliest=True), point)
+        if (np.array(found.problem.diffusion)[moved] < noise[moved] / LEVELS_APART).any():
+            return problem
+    except SolveError:
+        pass  # which says nothing of the noise
+    schedule = tuple(tuple(np.hypot(level, noise).tolist()) for level in problem.schedule)
+    return replace(problem, schedule=schedule, diffusion=schedule[0])
 
 
 def astray(fitted: Fit) -> bool:

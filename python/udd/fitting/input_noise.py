@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import InputSignal, Measurement
+from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .record import Record
 
-__all__ = ["NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
+__all__ = ["LEVELS_APART", "NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
 
 Array = NDArray[np.float64]
 
+#: Times by which a model's error may differ from what the inputs' noise makes: its levels are as far apart.
+LEVELS_APART = 3.5
 #: Of an input's variance, from which on its noise is told: as much too small a factor of it may come out.
 _TOLD = 0.01
 _ORDERS = (4, 8)  # of the differences of samples
@@ -76,7 +79,7 @@ def noisy_inputs(measurements: tuple[Measurement, ...], names: tuple[str, ...]) 
     return found
 
 
-def diffusion_by_noise(models: Sequence[FormulaModel], record: Record) -> Array:
+def diffusion_by_noise(models: Sequence[Model], record: Record) -> Array:
     """What the noise of inputs adds to the states' model error, per square root of the unit of time, (d,).
 
     Errors of samples that are independent add up as a random walk does, to first order.
@@ -85,6 +88,7 @@ def diffusion_by_noise(models: Sequence[FormulaModel], record: Record) -> Array:
     there = np.unique(record.film)  # a part of a record may lack some measurements
     for film in there:
         model, own = models[film], record.film == film
+        assert isinstance(model, FormulaModel)  # no other has inputs
         t, states = record.t[own], record.states[own]
         plain = model.rates(t, states)
         for name in model.inputs:
