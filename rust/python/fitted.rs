@@ -162,22 +162,11 @@ pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
 
 /// With idle states up to a number that the estimator is compiled for, which is as many as channels at least.
 fn filled(model: AnyModel) -> AnyModel {
-    match model {
-        AnyModel::One(family, values) if family.observation().len() > 1 => {
-            AnyModel::Twelve(family.filled(), values)
-        }
-        AnyModel::Two(Either::Second(family), values) if family.observation().len() > 2 => {
-            AnyModel::Twelve(family.filled(), values)
-        }
-        AnyModel::Three(Either::Second(family), values) if family.observation().len() > 3 => {
-            AnyModel::Twelve(family.filled(), values)
-        }
-        AnyModel::Four(Either::Second(family), values) if family.observation().len() > 4 => {
-            AnyModel::Twelve(family.filled(), values)
-        }
-        AnyModel::Five(Either::Second(family), values) => AnyModel::Twelve(family.filled(), values),
-        AnyModel::Six(family, values) => AnyModel::Twelve(family.filled(), values),
-        other => other,
+    let Some(family) = model.widest() else { return model };
+    let (states, channels) = (family.states().len(), family.observation().len());
+    match states {
+        1..=4 if channels <= states => model,
+        _ => AnyModel::Twelve(family, model.values().to_vec()),
     }
 }
 

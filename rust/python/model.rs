@@ -242,6 +242,20 @@ impl AnyModel {
         }
     }
 
+    /// The family of a user's own model with idle states up to the most that there are.
+    pub fn widest(&self) -> Option<FormulaFamily<MAX_STATES>> {
+        Some(match self {
+            AnyModel::One(family, _) => family.filled(),
+            AnyModel::Two(Either::Second(family), _) => family.filled(),
+            AnyModel::Three(Either::Second(family), _) => family.filled(),
+            AnyModel::Four(Either::Second(family), _) => family.filled(),
+            AnyModel::Five(Either::Second(family), _) => family.filled(),
+            AnyModel::Six(family, _) => family.filled(),
+            AnyModel::Twelve(family, _) => family.clone(),
+            _ => return None,
+        })
+    }
+
     /// Why it is not for what was asked.
     pub fn too_much(&self) -> PyErr {
         if self.is_own() {
@@ -550,16 +564,7 @@ fn observed<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let parsed = AnyModel::from_python(model)?;
     let (t, flat, values) = (t.as_slice()?, states.as_slice()?, parsed.values());
-    let family: FormulaFamily<MAX_STATES> = match &parsed {
-        AnyModel::One(family, _) => family.filled(),
-        AnyModel::Two(Either::Second(family), _) => family.filled(),
-        AnyModel::Three(Either::Second(family), _) => family.filled(),
-        AnyModel::Four(Either::Second(family), _) => family.filled(),
-        AnyModel::Five(Either::Second(family), _) => family.filled(),
-        AnyModel::Six(family, _) => family.filled(),
-        AnyModel::Twelve(family, _) => family.clone(),
-        _ => return Err(ModelError::new_err("a udd.Model is needed")),
-    };
+    let family = parsed.widest().ok_or_else(|| ModelError::new_err("a udd.Model is needed"))?;
     let (system, live) = (family.build(values), family.states().len());
     let sensor = FormulaSensor::of(&family);
     let mut out = Vec::with_capacity(t.len() * sensor.channels());
