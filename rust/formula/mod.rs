@@ -213,6 +213,28 @@ impl Expression {
             .any(|op| matches!(op, Op::Push(Leaf::Rate(_) | Leaf::State(_) | Leaf::Time | Leaf::Input(_))))
     }
 
+    /// Whether it is a linear function of the state and a constant, with factors that neither time nor inputs change.
+    pub fn is_affine(&self) -> bool {
+        // Of each number on the stack: its degree in the state, 2 for all that is neither constant nor linear.
+        let mut degrees: Vec<u8> = Vec::new();
+        for op in &self.ops {
+            let of = degrees.split_off(degrees.len() - op.takes());
+            let most = of.iter().copied().max().unwrap_or(0);
+            let degree = match *op {
+                Op::Push(Leaf::State(_)) => 1,
+                Op::Push(Leaf::Number(_) | Leaf::Parameter(_)) => 0,
+                Op::Push(_) | Op::On(..) | Op::Where => 2,
+                Op::Unary(Unary::Neg) | Op::Binary(Binary::Add | Binary::Sub) => most,
+                Op::Binary(Binary::Mul) => of.iter().sum::<u8>().min(2),
+                Op::Binary(Binary::Div) if of[1] == 0 => of[0],
+                _ if most == 0 => 0,
+                _ => 2,
+            };
+            degrees.push(degree);
+        }
+        degrees == [1]
+    }
+
     /// Its value.
     ///
     /// # Panics

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{Family, Inputs, Observation, Parameter, Piece, Sides, Signals, System, parameter};
+use super::sliding_mode::{self, SlidingSurface};
+use super::{
+    Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System, choose, parameter,
+};
 use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
 use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::vector;
@@ -23,11 +26,13 @@ enum InputValues<S> {
     Constant(Vec<S>),
 }
 
-/// The equations `x' = f(t, x, u(t))` with their numbers. Their kinks are switching surfaces.
+/// The equations `x' = f(t, x, u(t))` with their numbers. Their kinks are switching surfaces; after these come those
+/// between [sliding](sliding_mode) and not, and the clock of the inputs.
 #[derive(Clone, Debug)]
 pub struct Own<S, const D: usize> {
     equations: Arc<[Expression; D]>,
     kinks: Arc<Kinks>,
+    sliding: Vec<SlidingSurface<S, D>>,
     deep: bool,
     parameters: Vec<S>,
     inputs: InputValues<S>,
@@ -71,7 +76,7 @@ impl<S: Scalar, const D: usize> Own<S, D> {
             InputValues::Measured(inputs) => {
                 room = [S::zero(); MAX_INPUTS];
                 for (k, value) in room[..inputs.len()].iter_mut().enumerate() {
-                    *value = inputs.piece(k, t.real(), sides[self.kinks.surfaces.len()]).at(t);
+                    *value = inputs.piece(k, t.real(), sides[self.knots()]).at(t);
                 }
                 &room
             }
@@ -80,6 +85,22 @@ impl<S: Scalar, const D: usize> Own<S, D> {
         for (formula, value) in formulas.iter().zip(values) {
             *value = formula.value_on(&place, sides, stack);
         }
+    }
+
+    /// The number of the clock's surface, where there is one.
+    fn knots(&self) -> usize {
+        self.kinks.surfaces.len() + self.sliding.len()
+    }
+
+    /// The rates on given sides, on none of which the law slides.
+    #[inline(always)]
+    fn law(&self, t: S, x: &[S; D]) -> impl Fn(&Sides<S>) -> [S; D] {
+        move |sides| self.values(&self.equations[..], t, x, sides)
+    }
+
+    /// The number, among those that it slides on, of the surface `j` or of that which surface `j` is the mode of.
+    fn sliding_on(&self, j: usize) -> Option<usize> {
+        self.sliding.iter().position(|own| own.surface == j || own.mode == j)
     }
 
     /// The values of some of its formulas.
@@ -104,14 +125,16 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
             self.lane_by_lane(t, x)
-        } else {
+        } else if self.sliding.is_empty() {
             self.values(&self.equations[..], t, x, sides)
+        } else {
+            sliding_mode::rates(&self.sliding, sides, &self.law(t, x))
         }
     }
 
     #[inline]
     fn surfaces(&self) -> usize {
-        self.kinks.surfaces.len()
+        self.knots()
     }
 
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
@@ -119,33 +142,60 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         if const { S::Real::LANES > 1 } {
             return S::one();
         }
-        if let (InputValues::Measured(inputs), true) = (&self.inputs, j == self.kinks.surfaces.len()) {
+        if let (InputValues::Measured(inputs), true) = (&self.inputs, j == self.knots()) {
             return inputs.surface(t, sides[j]);
+        }
+        if let Some(i) = self.sliding_on(j) {
+            let own = &self.sliding[i];
+            if own.mode == j {
+                return sliding_mode::margin(&self.sliding, i, sides, &self.law(t, x));
+            } else if own.slides(sides).any() {
+                return -S::one();
+            }
         }
         let [value] = self.values(&self.kinks.surfaces[j..=j], t, x, sides);
         value
     }
 
-    fn surface_name(&self, j: usize, _side: bool) -> &'static str {
-        if self.kinks.jumps[j] { "jump" } else { "kink" }
+    fn surface_name(&self, j: usize, side: bool) -> &'static str {
+        match (self.kinks.jumps.get(j), side) {
+            (Some(true), _) => "jump",
+            (Some(false), _) => "kink",
+            (None, true) => "stick",
+            (None, false) => "slip",
+        }
+    }
+
+    fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
+        sliding_mode::settle(&self.sliding, x, sides, &self.law(t, x));
+    }
+
+    fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        if let Some(i) = self.sliding_on(j) {
+            let start = *x;
+            sliding_mode::switch(&self.sliding, i, x, sides, here, &self.law(t, &start));
+        } else {
+            sides[j] = choose(here, sides[j].not(), sides[j]);
+        }
     }
 
     fn jumps(&self, j: usize) -> bool {
         match (self.kinks.jumps.get(j), &self.inputs) {
             (Some(&jumps), _) => jumps,
-            (None, InputValues::Measured(inputs)) => inputs.jumps(),
+            // What is let go starts with the rates that it had: that switch is continuous.
+            (None, InputValues::Measured(inputs)) => j == self.knots() && inputs.jumps(),
             (None, _) => false,
         }
     }
 
     #[inline]
     fn clock(&self) -> Option<usize> {
-        matches!(self.inputs, InputValues::Measured(_)).then_some(self.kinks.surfaces.len())
+        matches!(self.inputs, InputValues::Measured(_)).then_some(self.knots())
     }
 
     fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64> {
         let InputValues::Measured(inputs) = &self.inputs else { return None };
-        inputs.next_knot(t.lane(0), sides[self.kinks.surfaces.len()].lane(0), end.lane(0))
+        inputs.next_knot(t.lane(0), sides[self.knots()].lane(0), end.lane(0))
     }
 
     fn clock_side(&self, t: S::Real, forwards: bool) -> bool {
@@ -155,7 +205,7 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
         let InputValues::Measured(inputs) = &self.inputs else { unreachable!("only asked of these") };
-        inputs.piece(k, t, sides[self.kinks.surfaces.len()])
+        inputs.piece(k, t, sides[self.knots()])
     }
 }
 
@@ -274,7 +324,32 @@ impl<const D: usize> FormulaFamily<D> {
 
     fn built<S: Scalar>(&self, values: &[S], inputs: InputValues<S>) -> Own<S, D> {
         let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
-        Own { equations, kinks, deep: self.deep, parameters: values.to_vec(), inputs }
+        let sliding = self.sliding_surfaces(values);
+        Own { equations, kinks, sliding, deep: self.deep, parameters: values.to_vec(), inputs }
+    }
+
+    /// Where the law may slide: where it jumps as a linear function of the states passes a constant.
+    fn sliding_surfaces<S: Scalar>(&self, values: &[S]) -> Vec<SlidingSurface<S, D>> {
+        let kinks = &self.kinks.surfaces;
+        let room = MAX_SURFACES - kinks.len() - usize::from(self.kinks.clocked);
+        let jumps = (0..kinks.len()).filter(|&j| self.kinks.jumps[j] && kinks[j].is_affine());
+        let mut surfaces = Vec::new();
+        for (i, surface) in jumps.take(room.min(sliding_mode::MAX_SLIDING)).enumerate() {
+            let at = |x: &[S; D]| {
+                let place = Place { t: S::zero(), x, rates: &[], parameters: values, inputs: &[] };
+                kinks[surface].value(&place, &mut [S::zero(); DEEP])
+            };
+            let mut x = [S::zero(); D];
+            let offset = at(&x);
+            let mut gradient = x;
+            for n in 0..D {
+                x[n] = S::one();
+                gradient[n] = at(&x) - offset;
+                x[n] = S::zero();
+            }
+            surfaces.push(SlidingSurface { surface, mode: kinks.len() + i, offset, gradient });
+        }
+        surfaces
     }
 
     /// The right-hand sides.

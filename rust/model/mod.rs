@@ -15,6 +15,7 @@ mod inputs;
 mod lugre;
 mod observation;
 mod pendulum;
+mod sliding_mode;
 pub mod stick_slip;
 
 pub use any::AnySystem;
@@ -33,7 +34,7 @@ use crate::integrate::{Probes, StepStart, TARGETS, beyond};
 use crate::scalar::{Mask, Scalar};
 
 /// The most switching surfaces a model can have.
-pub const MAX_SURFACES: usize = 4;
+pub const MAX_SURFACES: usize = 6;
 
 /// On which side of each switching surface the law is taken: true where its function is positive.
 pub type Sides<S> = [<S as Scalar>::Mask; MAX_SURFACES];

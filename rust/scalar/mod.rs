@@ -63,6 +63,8 @@ pub trait Scalar:
     /// The same for a factor without derivatives.
     fn fused_times(self, a: Self, b: Self::Real) -> Self;
 
+    /// Whether it records what is done with it: then all branches are taken, and none is known.
+    const SYMBOLIC: bool = false;
     /// The derivatives of a number that has a few of them: up to three make a [`DerivativeLanes`], four a [`Spread`] number, which
     /// are faster.
     const DERIVATIVES: usize = 0;

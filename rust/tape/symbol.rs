@@ -330,6 +330,8 @@ fn apply(function: Function, a: Symbol) -> Symbol {
 impl Scalar for Symbol {
     type Real = Symbol;
     type Mask = SurfaceSideRef;
+
+    const SYMBOLIC: bool = true;
     type Register = Self;
 
     fn register(self, _i: usize) -> Self {

@@ -66,8 +66,8 @@ def test_derivatives_pass_through_the_kinks(name: str) -> None:
 
 
 def test_more_kinks_than_surfaces_are_compared() -> None:
-    text = " + ".join(f"abs(x - {k / 10})" for k in range(6))
-    model = udd.Model(["x"], [f"cos(3*t) - ({text})/6"])
+    text = " + ".join(f"abs(x - {k / 10})" for k in range(8))
+    model = udd.Model(["x"], [f"cos(3*t) - ({text})/8"])
     assert not _core.has_series(model)
     ends = [udd.simulate(model, [0, 5], [0.3], method=method).state[-1, 0] for method in ("auto", "dopri5")]
     # Steps over a kink are rejected until they are short, not short enough for the tolerance's sake.

@@ -97,6 +97,7 @@ def pendulum_chain(
     inertias: Sequence[float],
     *,
     friction: Sequence[float] | None = None,
+    dry: Sequence[float] | None = None,
     rotors: Sequence[float] | None = None,
     g: float = 9.81,
     motors: bool = False,
@@ -118,6 +119,8 @@ def pendulum_chain(
         Moments of inertia about the upper joints [kg m^2], parameters ``I1, ...``.
     friction : sequence of float, shape (n,), optional
         Viscous friction of the joints [N m s], parameters ``b1, ...``.
+    dry : sequence of float, shape (n,), optional
+        Dry friction of the joints [N m], parameters ``F1, ...``: set-valued, so that joints stick.
     rotors : sequence of float, shape (n,), optional
         Moments of inertia of the motors' rotors as the joints feel them, that is times the square of the gear
         ratio [kg m^2], parameters ``J1, ...``.
@@ -161,6 +164,8 @@ def pendulum_chain(
     columns = {"m": masses, "l": lengths, "r": centres, "I": inertias}
     if friction is not None:
         columns["b"] = friction
+    if dry is not None:
+        columns["F"] = dry
     if rotors is not None:
         columns["J"] = rotors
     if not 1 <= n <= _MOST_LINKS or any(len(values) != n for values in columns.values()):
@@ -192,14 +197,16 @@ def pendulum_chain(
         parts = [f"-g*{moment(i)}*sin(a{i})"]
         parts += [f"-{coefficient(i, j)}*sin(a{i} - a{j})*w{j}^2" for j in links if j != i]
         # A joint's torque turns the link below it and turns the one above back.
-        for joint, sign, speed in ((i, "", f"(w{i} - w{i - 1})"), (i + 1, "-", f"(w{i + 1} - w{i})")):
+        for joint, sign, back in ((i, "", "-"), (i + 1, "-", "")):
             if joint > n:
                 continue
+            speed = f"(w{joint} - w{joint - 1})" if joint > 1 else "w1"
             if motors:
                 parts.append(f"{sign}tau{joint}")
             if friction is not None:
-                speed = f"w{joint}" if joint == 1 else speed
-                parts.append(f"{'' if sign else '-'}b{joint}*{speed}")
+                parts.append(f"{back}b{joint}*{speed}")
+            if dry is not None:
+                parts.append(f"{back}F{joint}*sign({speed.strip('()')})")
         forces.append(" + ".join(f"({part})" for part in parts))
     values = {
         f"{name}{i}": float(v) for name, own in columns.items() for i, v in zip(links, own, strict=True)
