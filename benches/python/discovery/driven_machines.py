@@ -51,11 +51,14 @@ def arm(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Mac
     dry = 0.15 * push * rng.uniform(0.6, 1.4) if "dry" in lacks else 0.0
     offset = 0.12 * push * rng.choice([-1, 1]) if "offset" in lacks else 0.0
     drag = 0.25 * push / speed**2 * rng.uniform(0.6, 1.4) if "quadratic" in lacks else 0.0
+    late = rng.uniform(0.02, 0.06) if "late" in lacks else 0.0
+    band = 0.2 * push * rng.uniform(0.6, 1.4) if "dead zone" in lacks else 0.0
     t = np.arange(0, 20, 0.01)
 
     def smooth(now: float, x: float, v: float) -> float:
-        torque = push * float(drive(now)) - weight * np.sin(x) - viscous * v - drag * abs(v) * v + offset
-        return torque / J
+        motor = push * float(drive(now - late))
+        motor -= min(max(motor, -band), band)
+        return (motor - weight * np.sin(x) - viscous * v - drag * abs(v) * v + offset) / J
 
     theta = driven_one_degree(smooth, dry / J, 0.0, 0.0, t)
     sensor = Sensor(step=2 * np.pi / rng.choice([2048, 4096]))
@@ -64,10 +67,10 @@ def arm(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Mac
     known = udd.Model(
         ["q", "v"],
         {"q": "v", "v": "(torque - weight*sin(q) - viscous*v)/J"},
-        {"J": 1.1 * J, "weight": 0.95 * weight, "viscous": viscous, "late": 0.0},
+        {"J": 1.1 * J, "weight": 0.95 * weight, "viscous": viscous} | ({} if late else {"late": 0.0}),
         angles=["q"],
         inputs=["torque"],
-        delays={"torque": "late"},
+        delays={} if late else {"torque": "late"},
     )
     return _machine(known, t, {"q": theta}, sensor, {"torque": torque}, lacks, rng)
 
@@ -79,10 +82,15 @@ def cart(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Ma
     drive = waves(rng, 0.1, 1.0)
     dry = 0.2 * gain * rng.uniform(0.6, 1.4) if "dry" in lacks else 0.0
     cubic = 0.4 * w**2 / 0.1**2 * rng.uniform(0.6, 1.4) if "cubic spring" in lacks else 0.0
+    stiff, play = 1.5 * w**2 * rng.uniform(0.6, 1.4), 0.04 * rng.uniform(0.6, 1.4)
+    stiff = stiff if "play" in lacks else 0.0
     t = np.arange(0, 30, 0.01)
-    x = driven_one_degree(
-        lambda now, x, v: gain * float(drive(now)) - w**2 * x - damping * v - cubic * x**3, dry, 0.0, 0.0, t
-    )
+
+    def smooth(now: float, x: float, v: float) -> float:
+        further = cubic * x**3 + stiff * (x - min(max(x, -play), play))
+        return gain * float(drive(now)) - w**2 * x - damping * v - further
+
+    x = driven_one_degree(smooth, dry, 0.0, 0.0, t)
     fine = np.arange(0, 30, 0.001)
     volts = slow(drive(fine), 0.001, 0.002)[::10] + 0.003 * rng.standard_normal(len(t))
     known = udd.Model(
@@ -212,6 +220,9 @@ KINDS: dict[str, Kind] = {
     "driven arm: dry": (arm, ("dry",), True),
     "driven arm: dry + offset": (arm, ("dry", "offset"), True),
     "driven arm: quadratic": (arm, ("quadratic",), True),
+    "driven arm: late": (arm, ("late",), True),
+    "driven arm: dead zone": (arm, ("dead zone",), True),
+    "driven cart: play": (cart, ("play",), True),
     "driven cart: dry": (cart, ("dry",), True),
     "driven cart: cubic spring": (cart, ("cubic spring",), True),
     "driven crane: quadratic": (crane, ("quadratic",), True),

@@ -26,6 +26,9 @@ _MEANS = {
     "quadratic": r"quadratic_drag|abs_v_v_in_v|v2_in_v",
     "cubic": r"cubic_drag|v3_in_v",
     "cubic spring": r"[xy]3_in_v",
+    "late": r"delay_of_torque",
+    "dead zone": r"dead_zone_of_torque_in_v",
+    "play": r"dead_zone_of_x_in_v",
 }
 
 

@@ -66,7 +66,8 @@ class Machine:
     Attributes
     ----------
     lacks : tuple of str
-        Kinds of the missing terms: "dry", "viscous", "joints", "quadratic", "cubic", "cubic spring".
+        Kinds of the missing terms: "dry", "viscous", "joints", "quadratic", "cubic", "cubic spring", "late",
+        "dead zone", "play".
     """
 
     known: Any

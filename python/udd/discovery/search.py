@@ -555,13 +555,14 @@ class Search:
         foretelling = Foretelling(current.whole.record, wholes, self.unit)
         near = self._foretelling(near, costs, foretelling)
         # Where the best form fails a test, a clearly worse one is not named instead.
-        for trial in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
+        for chosen in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
+            trial = self._in_other_widths(current, chosen, scores.library)
             judged = self._judged(current, trial, scores)
             if judged is None or judged.witness is None:
                 continue
             errors = self._errors_or_none(trial.fit)
             if errors is not None and not self._worse(current.errors, errors):
-                others = self._alternatives(trial, trials, scores.library, costs, foretelling)
+                others = self._alternatives(chosen, trials, scores.library, costs, foretelling)
                 step = Step(
                     candidates=trial.candidates,
                     curve=trial.curve,
@@ -574,6 +575,25 @@ class Search:
                 )
                 return step, SearchState(trial.fit, judged.whole, errors)
         return None
+
+    def _in_other_widths(self, current: SearchState, trial: TrialFit, scanned: Scan) -> TrialFit:
+        """Several effects at once, with every width of those that turn over one: a fit may be stuck at it.
+
+        Around a model that lacks two of them the width that scores best need not be near that of the fit.
+        """
+        if len(trial.candidates) < 2:
+            return trial
+        groups = [
+            [other if c is mine else c for c in trial.candidates]
+            for mine in trial.candidates
+            for other in (s.candidate for s in scanned.scored)
+            if other.effect.name == mine.effect.name and other is not mine
+        ]
+        if not groups:
+            return trial
+        others = [t for t in self._together(current, groups) if t.fit.level >= trial.fit.level and t.needed]
+        compared = [(at_level(t.fit, trial.fit.level).chi2, k, t) for k, t in enumerate([trial, *others])]
+        return min(compared)[2]
 
     def _once(self, near: list[TrialFit]) -> list[TrialFit]:
         """Without formulas that are one of the library's laws in other words."""

@@ -191,7 +191,8 @@ def formula(
         lateral velocity u or its vertical velocity W_c [m/s]. Of a user's own model, the rate of a state:
         ``"v'"``; its formula may use the model's states and parameters. Where that model has a mass matrix,
         also a force along a coordinate, ``"force(x)"``, or between two, ``"force(b - a)"``: on b, and its
-        reaction on a.
+        reaction on a. Where it has measured inputs, the delay of one, ``"delay(u)"``: the formula is then
+        one parameter.
     expression : str or SymPy expression
         Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
         friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
@@ -442,6 +443,8 @@ def _described(
     left, _unit, meaning = known or (f"{slot} = ... + ", "", f"the rate {slot} has one more term")
     if along_of(slot):
         left, meaning = f"{slot} = ", "a force that enters every acceleration through the mass matrix"
+    if delayed_by(slot):
+        left, meaning = f"{slot} = ", "the input is felt later than it was measured"
     names = [p.name for p in parameters]
     linear = [p.name for p in parameters if p.role == "amplitude"]
     # Of a user's own model only the model knows the states.
@@ -451,16 +454,22 @@ def _described(
 
 def _slot(slot: str) -> None:
     rate = isinstance(slot, str) and slot.endswith("'") and slot[:-1].isidentifier()
-    if slot not in _SLOTS and not rate and not along_of(slot):
+    if slot not in _SLOTS and not rate and not along_of(slot) and not delayed_by(slot):
         raise ModelError(
             f"the slot must be one of {', '.join(_SLOTS)}, or for a model of your own the rate of a state as "
-            f'in "v\'" or a force as in "force(x)", not {slot!r}'
+            f'in "v\'", a force as in "force(x)" or a delay as in "delay(u)", not {slot!r}'
         )
 
 
 def along_of(slot: object) -> str | None:
     """What a slot that is a force acts along: a coordinate, or the difference of two; None for any other."""
     match = re.fullmatch(r"force\((\w+(?: - \w+)?)\)", slot) if isinstance(slot, str) else None
+    return match[1] if match else None
+
+
+def delayed_by(slot: object) -> str | None:
+    """The input that a slot lets be felt later; None for any other."""
+    match = re.fullmatch(r"delay\((\w+)\)", slot) if isinstance(slot, str) else None
     return match[1] if match else None
 
 

@@ -337,7 +337,11 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
         return found
     more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
     problem = replace(problem, free=problem.free + more)
-    return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[found.level :])
+    shaped = reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[found.level :])
+    if shaped.converged:
+        return shaped
+    # Far from its shape a model that is held that tightly does not find the way.
+    return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[1:])
 
 
 def as_stated(fitted: Fit) -> Fit:

@@ -14,7 +14,7 @@ from udd import _core
 from udd._util.expressions import Expression, text_of
 from udd._util.validation import number
 from udd.effects import Effect
-from udd.effects.user_defined import along_of
+from udd.effects.user_defined import along_of, delayed_by
 from udd.errors import ModelError
 from udd.measurement.input_signal import InputSignal
 
@@ -328,7 +328,8 @@ class FormulaModel(Model):
                 texts[state] = f"{texts[state]} + ({term})" + (f"*({factor})" if factor else "")
         # A point is no part of a name there.
         names = [name.replace(".", _POINT) for name in self.parameters]
-        delays = {name: parameter.replace(".", _POINT) for name, parameter in self.delays}
+        late = dict(self.delays) | {delayed_by(e.slots[0]): f"{e.name}.{e.amplitudes[0]}" for e in self._late}
+        delays = {name: parameter.replace(".", _POINT) for name, parameter in late.items()}
         return FormulaText(
             states=list(self.state_names),
             equations=list(texts.values()),
@@ -341,9 +342,16 @@ class FormulaModel(Model):
             observe=[(name, text, delays.get(name), name in self.turning) for name, text in self.observe],
         )
 
+    @property
+    def _late(self) -> list[Effect]:
+        """Those of its effects that are delays of inputs."""
+        return [effect for effect in self.effects if delayed_by(effect.slots[0])]
+
     def _entered(self, slot: str) -> dict[str, str]:
         """The states whose rates a slot adds to, and the factor in front of each; none for a rate itself."""
         along = along_of(slot)
+        if delayed_by(slot):
+            return {}
         return self.accelerations(along) if along else {slot.removesuffix("'"): ""}
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
@@ -484,8 +492,12 @@ class FormulaModel(Model):
                     "with_term, or udd.effects.formula with the rate of a state for its slot"
                 )
         result = super()._effects(given)
+        late = [name for name, _parameter in self.delays]
         for effect in result:
             slot = effect.slots[0]
+            if delayed := delayed_by(slot):
+                _check_delay(effect, delayed, self.inputs, late)
+                late.append(delayed)
             if any(state not in self.state_names for state in self._entered(slot)):
                 known = ", ".join(f"{name}'" for name in self.state_names)
                 raise ModelError(f"{effect.name} adds to {slot}, but the model's rates are {known}")
@@ -532,6 +544,17 @@ FormulaModel.profile = ModelProfile(
     fit=FitProfile(stated=("W", "length"), ahead=10.0, window=1.0, valid_error=0.2),  # of each state's spread
     discovery=DiscoveryProfile(horizons=(0.2, 0.4, 1.0, 2.0, 4.0), filter_window=1.0, filter_level=2),
 )
+
+
+def _check_delay(effect: Effect, delayed: str, inputs: Sequence[str], late: Sequence[str]) -> None:
+    """Whether an effect can be the delay of an input."""
+    if delayed not in inputs:
+        known = ", ".join(inputs) or "none"
+        raise ModelError(f"{effect.name} delays {delayed}, but the model's inputs are {known}")
+    if delayed in late:
+        raise ModelError(f"the input {delayed} has a delay already: {effect.name} would be a second one")
+    if effect.spec.own is None or [effect.spec.own[1]] != list(effect.amplitudes):
+        raise ModelError(f"the delay {effect.name} must be one parameter, not a formula")
 
 
 def _written(effect: Effect) -> str:

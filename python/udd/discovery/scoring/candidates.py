@@ -40,11 +40,11 @@ def library(
     free parameters absorb are not sorted out here: that shows in the data.
     """
     if isinstance(model, FormulaModel):
-        from .term_library import dry, terms
+        from .term_library import delays, dry, terms, thresholds
 
         there = {effect.name for effect in model.effects}
-        sticking = [] if states is None else dry(model, states)
-        listed = [c for c in (*given, *terms(model), *sticking) if c.effect.name not in there]
+        turning = [] if states is None else [*dry(model, states), *thresholds(model, states)]
+        listed = [c for c in (*given, *terms(model), *delays(model), *turning) if c.effect.name not in there]
         return list({(c.effect.name, c.effect.values): c for c in listed}.values())
     result = []
     for spec in effects.library():

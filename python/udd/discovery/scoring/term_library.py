@@ -29,6 +29,8 @@ _MOST = 200  # terms of an equation; beyond it sines and cosines are not multipl
 #: Widths over which dry friction turns, in units of the speed's root mean square. As narrow as the last it
 #: holds a body at rest for hundreds of swings.
 _WIDTHS = (0.3, 0.03, 0.002)
+#: The same of what has a threshold, in units of its own root mean square.
+_BOUNDS = (0.7, 0.2)
 
 
 def terms(model: FormulaModel) -> list[Candidate]:
@@ -55,6 +57,19 @@ def terms(model: FormulaModel) -> list[Candidate]:
             machine = not usual or one[2] in usual or one in moving
             if not (along and one[2] in usual):  # there already
                 result.append(replace(_candidate(model, slot.name, *one), usual=machine))
+    return result
+
+
+def delays(model: FormulaModel) -> list[Candidate]:
+    """The delay of every measured input that has none: felt later, or seen later where it is negative."""
+    late = {name for name, _parameter in model.delays}
+    (tau,) = _unused(model, "tau")
+    result = []
+    for name in model.inputs:
+        if name not in late:
+            title = f"delay of {name}"
+            spec = written(f"delay({name})", tau, _name(title), title, [tau], None, (tau,))
+            result.append(Candidate(effects.Effect(spec.name, (0.0,), made=spec), title))
     return result
 
 
@@ -167,8 +182,39 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
             low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
             name, title = f"dry_{_name(said)}_in_{state}", f"dry friction of {said} in {state}'"
             inner = text if text.isidentifier() else f"({text})"
-            made = (model, f"{state}'", inner, name, title, typical, low_high)
-            result += _dry(*made) if typical > 0 else []
+            made = (model, f"{state}'", f"tanh({inner}/{{b}})", name, title, typical, low_high)
+            result += _turning(*made) if typical > 0 else []
+    return result
+
+
+def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
+    """Forces with a threshold in a displacement or an input: dead zones and saturations, of a few widths.
+
+    Beside the force in proportion that a model has, a dead zone is that of a spring or a gear with play, or
+    of a motor that does not answer to little; with the other sign it is a stop, or a motor that gives no
+    more. ``tanh`` is a saturation without corners.
+    """
+    rates = _speeds(model)
+    along = {v: x for x, v in model.speeds.items()} if model.mass else {}
+    sizes = {x: states[:, model.state_names.index(x)] for x in rates if x not in model.angles}
+    for name in model.inputs:
+        if read := [np.asarray(record[name].values) for record in model.records]:
+            sizes[name] = np.concatenate(read)
+    result = []
+    for state in dict.fromkeys(rates.values()):
+        if state in model.kinematic:
+            continue
+        slot = f"force({along[state]})" if state in along else f"{state}'"
+        for x, values in sizes.items():
+            typical = float(np.sqrt(np.nanmean(values**2)))
+            for kind, term in (
+                ("dead zone", "(max({x} - {b}, 0) + min({x} + {b}, 0))"),
+                ("saturation", "tanh({x}/{b})"),
+            ):
+                title = f"{kind} of {x} in {slot}"
+                name = f"{_name(kind.replace(' ', '_'))}_of_{x}_in_{_place(slot)}"
+                made = (model, slot, term.replace("{x}", x), name, title, typical, (-np.inf, np.inf))
+                result += _turning(*made, _BOUNDS, "shape") if typical > 0 else []
     return result
 
 
@@ -179,8 +225,8 @@ def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candid
         columns = [states[:, model.state_names.index(model.speeds[x])] for x in along.split(" - ")]
         typical = float(np.sqrt((reduce(np.subtract, columns) ** 2).mean()))
         name, title = _name(f"dry {where}"), f"dry friction {where}"
-        made = (model, f"force({along})", v, name, title, typical, (-np.inf, 0.0))
-        result += [replace(c, form="dry") for c in _dry(*made)] if typical > 0 else []
+        made = (model, f"force({along})", f"tanh({v}/{{b}})", name, title, typical, (-np.inf, 0.0))
+        result += [replace(c, form="dry") for c in _turning(*made)] if typical > 0 else []
     return result
 
 
@@ -189,16 +235,25 @@ def _said(own: dict[str, str], name: str) -> str:
     return own.get(name, f"{name}'")
 
 
-def _dry(
-    model: FormulaModel, slot: str, v: str, name: str, title: str, typical: float, limits: tuple[float, float]
+def _turning(
+    model: FormulaModel,
+    slot: str,
+    term: str,
+    name: str,
+    title: str,
+    typical: float,
+    limits: tuple[float, float],
+    widths: tuple[float, ...] = _WIDTHS,
+    role: str = "width",
 ) -> list[Candidate]:
-    """Dry friction of a speed, with each of the widths in units of what that speed typically is."""
-    c, eps = _unused(model, "c", "eps")
-    ranges = {c: limits, eps: (0.0, np.inf)}
-    spec = written(slot, f"{c}*tanh({v}/{eps})", name, title, [c], ranges, (c, eps))
-    listed = tuple(replace(p, role="width") if p.name == eps else p for p in spec.parameters)
+    """A term that turns over within a width ``{b}``, with each of these in units of what is typical."""
+    c, b = _unused(model, "c", "eps" if role == "width" else "b")
+    ranges = {c: limits, b: (0.0, np.inf)}
+    spec = written(slot, f"{c}*{term.replace('{b}', b)}", name, title, [c], ranges, (c, b))
+    values = tuple(w * typical for w in widths)
+    listed = tuple(replace(p, role=role, grid=values) if p.name == b else p for p in spec.parameters)
     spec = replace(spec, parameters=listed)
-    return [Candidate(effects.Effect(name, (0.0, w * typical), made=spec), title) for w in _WIDTHS]
+    return [Candidate(effects.Effect(name, (0.0, value), made=spec), title) for value in values]
 
 
 def given_terms(model: FormulaModel, given: Iterable[tuple[str, Expression]]) -> list[Candidate]:

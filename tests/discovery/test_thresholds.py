@@ -1,0 +1,91 @@
+"""What a machine with a measured input may lack beside forces that are products: a delay, a dead zone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+from udd.discovery.scoring.candidates import library
+from udd.errors import ModelError
+
+ARM = udd.Model(
+    ["q", "v"],
+    ["v", "(torque - weight*sin(q) - viscous*v)/J"],
+    {"J": 0.05, "weight": 1.0, "viscous": 0.05},
+    angles=["q"],
+    inputs=["torque"],
+)
+
+
+def drive(t: np.ndarray, seed: int) -> np.ndarray:
+    """Six waves from 0.15 to 1.2 Hz."""
+    rng = np.random.default_rng(seed)
+    f, phase = rng.uniform(0.15, 1.2, 6), rng.uniform(0, 2 * np.pi, 6)
+    return np.asarray(np.sin(2 * np.pi * np.multiply.outer(t, f) + phase).sum(axis=1))
+
+
+def test_a_delay_is_found() -> None:
+    t = np.arange(0, 15, 0.01)
+    late = ARM.with_effects([udd.effects.formula("delay(torque)", "tau", name="late", tau=0.03)])
+    torque = 0.4 * drive(t, 1)
+    run = udd.simulate(late, t, [0.3, 0.0], inputs={"torque": torque})
+    seen = run.q + 1e-3 * np.random.default_rng(2).normal(size=len(t))
+    known = ARM.replace(J=0.055, weight=0.95)
+    found = udd.discover(udd.Measurement(t, {"q": seen}, inputs={"torque": torque}), known)
+    assert found.verdict == "effect identified"
+    (added,) = found.effects
+    assert added.title == "delay of torque"
+    (tau,) = added.effect.values
+    error = found.fit.errors["delay_of_torque.tau"]
+    # A pull of more than four standard errors happens by chance in 6 of 100,000 draws.
+    assert abs(tau - 0.03) < 4 * error
+    assert error < 1e-3
+
+
+def test_a_spring_with_play_is_found() -> None:
+    t = np.arange(0, 20, 0.01)
+    known = udd.Model(
+        ["x", "v"], ["v", "gain*u - k*x - c*v"], {"gain": 1.0, "k": 5.0, "c": 0.4}, inputs=["u"]
+    )
+    true = known.with_term("v", "max(x - 0.08, 0) + min(x + 0.08, 0)", stiff=-12.0)
+    u = 0.8 * drive(t, 3)
+    run = udd.simulate(true, t, [0.05, 0.0], inputs={"u": u})
+    seen = run.x + 5e-4 * np.random.default_rng(4).normal(size=len(t))
+    found = udd.discover(udd.Measurement(t, {"x": seen}, inputs={"u": u}), known.replace(gain=1.1, k=6.0))
+    (added,) = found.effects
+    assert added.title == "dead zone of x in v'"
+    stiffness, play = added.effect.values
+    assert abs(stiffness + 12.0) < 4 * found.fit.errors["dead_zone_of_x_in_v.c1"]
+    assert abs(play - 0.08) < 4 * found.fit.errors["dead_zone_of_x_in_v.b"]
+
+
+def test_a_delay_that_is_an_effect_is_the_parameter_s() -> None:
+    t = np.linspace(0, 3, 301)
+    named = ARM.replace(parameters=dict(ARM.parameters) | {"late": 0.03}, delays={"torque": "late"})
+    added = ARM.with_effects([udd.effects.formula("delay(torque)", "tau", name="late", tau=0.03)])
+    torque = drive(t, 0)
+    runs = [udd.simulate(m, t, [0.3, 0.0], inputs={"torque": torque}).state for m in (named, added)]
+    np.testing.assert_array_equal(*runs)
+    titles = [c.title for c in library(named)]
+    assert "delay of torque" in [c.title for c in library(ARM)]
+    assert "delay of torque" not in titles
+
+
+@pytest.mark.parametrize(
+    ("slot", "text", "said"),
+    [
+        ("delay(u)", "tau", "late delays u, but the model's inputs are torque"),
+        ("delay(torque)", "2*tau", "the delay late must be one parameter, not a formula"),
+    ],
+)
+def test_what_is_no_delay(slot: str, text: str, said: str) -> None:
+    with pytest.raises(ModelError, match=said):
+        ARM.with_effects([udd.effects.formula(slot, text, name="late", tau=0.01)])
+
+
+def test_an_input_has_one_delay() -> None:
+    late = udd.effects.formula("delay(torque)", "tau", name="late", tau=0.01)
+    later = udd.effects.formula("delay(torque)", "tau", name="later", tau=0.01)
+    with pytest.raises(ModelError, match="torque has a delay already"):
+        ARM.with_effects([late, later])
