@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import udd
-from udd.errors import MeasurementError
+from udd.errors import FitError, MeasurementError, ModelError
 
 T = np.linspace(0.0, 4.0, 9)
 
@@ -62,3 +62,31 @@ def test_rates_of_signals() -> None:
     assert np.abs(smooth(t)[5:-5] - np.cos(t)[5:-5]).max() < 1e-5
     with pytest.raises(MeasurementError, match="an input that is held jumps and has no rate"):
         udd.InputSignal(t, np.sin(t), hold="zero").rate()
+
+
+def test_a_pendulum_with_a_gyroscope() -> None:
+    plain = udd.Pendulum(0.5, inertia=0.3, k0=0.02)
+    model = plain.with_gyroscope(angle=True)
+    states = np.random.default_rng(0).normal(size=(50, 2))
+    # The same sum, but for the order of its factors.
+    np.testing.assert_allclose(model.rates(0.0, states), plain.rates(0.0, states), rtol=1e-14)
+    seen = model.replace(bias=0.1, theta0=-0.2).observed(0.0, states)
+    np.testing.assert_allclose(seen, states + np.array([0.1, -0.2]), rtol=1e-15)
+    with pytest.raises(ModelError, match="cannot have coulomb"):
+        udd.Pendulum(0.5, effects=udd.effects.coulomb(c=0.1)).with_gyroscope()
+    rates = udd.Measurement(np.arange(20) * 0.1, {"Omega": np.zeros(20)})
+    with pytest.raises(FitError, match="with_gyroscope"):
+        udd.fit(rates, plain)
+
+
+def test_what_a_gyroscope_shows_is_enough_to_find_drag() -> None:
+    t = np.arange(0, 25, 0.02)
+    drag = udd.effects.quadratic_drag(c=0.02)
+    rate = udd.simulate(udd.Pendulum(0.5, k0=0.002, effects=drag), t, [0.0, 1.2]).Omega
+    seen = rate + 0.05 + 0.01 * np.random.default_rng(3).normal(size=len(t))
+    known = udd.Pendulum(0.5, k0=0.002).with_gyroscope()
+    found = udd.discover(udd.Measurement(t, {"Omega": seen}), known)
+    assert [added.title for added in found.effects] == ["abs(Omega)*Omega in Omega'"]
+    (c,) = found.effects[0].effect.values
+    # Over the inertia, 0.25 m^2.
+    assert abs(c + 0.02 / 0.25) < 4 * found.fit.errors["abs_Omega_Omega_in_Omega.c"]

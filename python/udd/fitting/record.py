@@ -154,7 +154,11 @@ def record_of(
         raise FitError(f"the measurement has columns {given}, but the model's {what} are {wanted}")
     if not own and profile_of(measurement.kind).written:
         given = ", ".join(measurement.names)
-        raise FitError(f"the measurement has columns {given}, which are neither a disk's nor a pendulum's")
+        hint = ": a pendulum with a gyroscope is udd.Pendulum(...).with_gyroscope()"
+        raise FitError(
+            f"the measurement has columns {given}, which are neither a disk's nor a pendulum's"
+            f"{hint if 'Omega' in measurement.names else ''}"
+        )
     if own and own.inputs:
         (own,) = driven((own,), (measurement,))
     counts = np.isfinite(measurement.values).sum(axis=0)

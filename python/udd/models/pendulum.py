@@ -11,8 +11,10 @@ import numpy as np
 
 from udd._util.validation import number
 from udd.effects import Effect
+from udd.errors import ModelError
 
 from .compiled import CompiledModel, plain_friction
+from .formula_model import FormulaModel
 from .profile import (
     CurveSlot,
     DiscoveryProfile,
@@ -93,6 +95,55 @@ class Pendulum(CompiledModel):
         object.__setattr__(self, "k0", number("k0", k0, least=0.0))
         object.__setattr__(self, "effects", self._effects(effects))
         self._add_bristles()
+
+    def with_gyroscope(self, *, angle: bool = False) -> FormulaModel:
+        """The same pendulum as a model whose rate of turn is measured, as by a phone on it.
+
+        ::
+
+            Omega_seen = Omega + bias        theta_seen = theta + theta0
+
+        Parameters
+        ----------
+        angle : bool
+            Whether the angle is measured too.
+
+        Returns
+        -------
+        Model
+            With the sensors ``Omega`` [rad/s] and, with `angle`, ``theta`` [rad]; ``length, k0, bias`` and
+            ``theta0`` are its parameters. Gravity and the inertia stand in its equation as numbers: with the
+            length free they would say the same.
+
+        Raises
+        ------
+        ModelError
+            The pendulum has effects: add what is missing to the new model instead.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import udd
+        >>> t = np.arange(0, 20, 0.02)
+        >>> rate = udd.simulate(udd.Pendulum(0.5, k0=0.01), t, [0.0, 0.6]).Omega
+        >>> noise = 0.01 * np.random.default_rng(1).normal(size=len(t))
+        >>> seen = udd.Measurement(t, {"Omega": rate + 0.03 + noise})
+        >>> fit = udd.fit(seen, udd.Pendulum(0.52).with_gyroscope())
+        >>> bool(abs(fit.parameters["bias"] - 0.03) < 4 * fit.errors["bias"])
+        True
+        """
+        if self.effects:
+            names = ", ".join(effect.name for effect in self.effects)
+            raise ModelError(f"a pendulum with a gyroscope is a model of your own, which cannot have {names}")
+        rate = f"(-{self.g!r}*length*sin(theta) - k0*Omega)/{self.inertia!r}"
+        zero = {"theta0": 0.0} if angle else {}
+        return FormulaModel(
+            ["Omega", "theta"],
+            {"Omega": rate, "theta": "Omega"},
+            {"length": self.length, "k0": self.k0, "bias": 0.0} | zero,
+            angles=["theta"],
+            observe={"Omega": "Omega + bias"} | ({"theta": "theta + theta0"} if angle else {}),
+        )
 
 
 def _crossing_rate(p: Parameters) -> Floats:
