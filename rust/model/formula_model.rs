@@ -32,7 +32,7 @@ enum InputValues<S> {
 pub struct Own<S, const D: usize> {
     equations: Arc<[Expression; D]>,
     kinks: Arc<Kinks>,
-    sliding: Vec<SlidingSurface<S, D>>,
+    sliding: Vec<SlidingSurface<S>>,
     deep: bool,
     parameters: Vec<S>,
     inputs: InputValues<S>,
@@ -93,9 +93,11 @@ impl<S: Scalar, const D: usize> Own<S, D> {
     }
 
     /// The rates on given sides, on none of which the law slides.
-    #[inline(always)]
-    fn law(&self, t: S, x: &[S; D]) -> impl Fn(&Sides<S>) -> [S; D] {
-        move |sides| self.values(&self.equations[..], t, x, sides)
+    fn law(&self, t: S, x: &[S; D]) -> impl Fn(&Sides<S>, &mut [S]) {
+        move |sides, rates| {
+            let own: [S; D] = self.values(&self.equations[..], t, x, sides);
+            rates.copy_from_slice(&own);
+        }
     }
 
     /// The number, among those that it slides on, of the surface `j` or of that which surface `j` is the mode of.
@@ -128,7 +130,9 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         } else if self.sliding.is_empty() {
             self.values(&self.equations[..], t, x, sides)
         } else {
-            sliding_mode::rates(&self.sliding, sides, &self.law(t, x))
+            let mut rates = [S::zero(); D];
+            sliding_mode::rates(&self.sliding, sides, &self.law(t, x), &mut rates);
+            rates
         }
     }
 
@@ -167,10 +171,16 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     }
 
     fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
-        sliding_mode::settle(&self.sliding, x, sides, &self.law(t, x));
+        if const { S::Real::LANES == 1 } {
+            sliding_mode::settle(&self.sliding, x, sides, &self.law(t, x));
+        }
     }
 
     fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
+        // Packets have no kinks.
+        if const { S::Real::LANES > 1 } {
+            return;
+        }
         if let Some(i) = self.sliding_on(j) {
             let start = *x;
             sliding_mode::switch(&self.sliding, i, x, sides, here, &self.law(t, &start));
@@ -329,7 +339,7 @@ impl<const D: usize> FormulaFamily<D> {
     }
 
     /// Where the law may slide: where it jumps as a linear function of the states passes a constant.
-    fn sliding_surfaces<S: Scalar>(&self, values: &[S]) -> Vec<SlidingSurface<S, D>> {
+    fn sliding_surfaces<S: Scalar>(&self, values: &[S]) -> Vec<SlidingSurface<S>> {
         let kinks = &self.kinks.surfaces;
         let room = MAX_SURFACES - kinks.len() - usize::from(self.kinks.clocked);
         let jumps = (0..kinks.len()).filter(|&j| self.kinks.jumps[j] && kinks[j].is_affine());
@@ -347,7 +357,12 @@ impl<const D: usize> FormulaFamily<D> {
                 gradient[n] = at(&x) - offset;
                 x[n] = S::zero();
             }
-            surfaces.push(SlidingSurface { surface, mode: kinks.len() + i, offset, gradient });
+            surfaces.push(SlidingSurface {
+                surface,
+                mode: kinks.len() + i,
+                offset,
+                gradient: gradient.to_vec(),
+            });
         }
         surfaces
     }

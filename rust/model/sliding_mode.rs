@@ -7,41 +7,46 @@
 
 use super::{MAX_SURFACES, Sides, choose};
 use crate::scalar::{Mask, Scalar};
-use crate::unroll::vector;
 
 /// The most surfaces that a law slides on: each takes a second one, between sliding and not.
 pub const MAX_SLIDING: usize = MAX_SURFACES / 2;
+/// The most states of a law that slides.
+const MOST: usize = 12;
 
 /// A start is on a surface where its function is below this part of the terms that it is the sum of.
 const ON: f64 = 1e-14;
+
+/// A law: the rates on given sides, on none of which it slides. For any number of states, so that what is here is
+/// compiled once for each kind of number.
+pub type Law<'a, S> = &'a dyn Fn(&Sides<S>, &mut [S]);
 
 /// A surface `offset + gradient x = 0` on which a law may slide.
 ///
 /// Its side is true where the function is positive. While the law slides it is false and that of `mode` true,
 /// which tells this from the sides of a start, which are all true until they are known.
-#[derive(Clone, Copy, Debug)]
-pub struct SlidingSurface<S, const D: usize> {
+#[derive(Clone, Debug)]
+pub struct SlidingSurface<S> {
     /// The numbers of the surface and of the one between sliding and not.
     pub surface: usize,
     pub mode: usize,
     pub offset: S,
-    pub gradient: [S; D],
+    pub gradient: Vec<S>,
 }
 
 /// The rates on all surfaces that the law slides on.
-struct Balance<S, const D: usize> {
-    rates: [S; D],
+struct Balance<S> {
+    rates: [S; MOST],
     /// Where between its two sides the law is taken, from -1 to 1.
     between: [S; MAX_SLIDING],
     /// How the difference of a surface's two sides moves the state away from it; negative where it brings it back.
     away: [S; MAX_SLIDING],
 }
 
-impl<S: Scalar, const D: usize> SlidingSurface<S, D> {
-    fn along(&self, rates: &[S; D]) -> S {
+impl<S: Scalar> SlidingSurface<S> {
+    fn along(&self, rates: &[S]) -> S {
         let mut sum = S::zero();
-        for n in 0..D {
-            sum += self.gradient[n] * rates[n];
+        for (&slope, &rate) in self.gradient.iter().zip(rates) {
+            sum += slope * rate;
         }
         sum
     }
@@ -51,58 +56,56 @@ impl<S: Scalar, const D: usize> SlidingSurface<S, D> {
         sides[self.mode].and(sides[self.surface].not())
     }
 
-    /// The state moved onto the surface, by the shortest way.
-    fn projected(&self, x: &[S; D]) -> [S; D] {
-        let by = (self.offset + self.along(x)) / self.along(&self.gradient);
-        vector!(S, D; n => x[n] - self.gradient[n] * by)
+    /// Takes from these numbers, where the mask is true, so much along the gradient.
+    fn take(&self, numbers: &mut [S], amount: S, here: S::Mask) {
+        let part = amount / self.along(&self.gradient);
+        for (own, &slope) in numbers.iter_mut().zip(&self.gradient) {
+            *own = S::select(here, *own - slope * part, *own);
+        }
     }
 
     /// Whether a state is on the surface to rounding.
-    fn holds(&self, x: &[S; D]) -> S::Mask {
+    fn holds(&self, x: &[S]) -> S::Mask {
         let size = |a: S| S::select(a.less(S::zero()), -a, a);
         let mut terms = size(self.offset);
-        for n in 0..D {
-            terms += size(self.gradient[n] * x[n]);
+        for (&slope, &own) in self.gradient.iter().zip(x) {
+            terms += size(slope * own);
         }
         terms.scale(ON).less(size(self.offset + self.along(x))).not()
     }
 }
 
-/// The rates of a law that may slide; `law` has those on given sides.
-pub fn rates<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
-    sides: &Sides<S>,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
-) -> [S; D] {
-    let mut rates = law(sides);
+/// The rates of a law that may slide.
+pub fn rates<S: Scalar>(surfaces: &[SlidingSurface<S>], sides: &Sides<S>, law: Law<'_, S>, result: &mut [S]) {
+    law(sides, result);
     if !S::SYMBOLIC && !surfaces.iter().any(|own| sides[own.mode].any()) {
-        return rates;
+        return;
     }
     let balance = balance(surfaces, sides, law);
     for own in surfaces {
-        rates = vector!(S, D; n => S::select(sides[own.mode], balance.rates[n], rates[n]));
+        for (rate, &held) in result.iter_mut().zip(&balance.rates) {
+            *rate = S::select(sides[own.mode], held, *rate);
+        }
     }
-    rates
 }
 
 /// The weights with which the law stays on every surface whose mode is on (Utkin's equivalent control).
-fn balance<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
-    sides: &Sides<S>,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
-) -> Balance<S, D> {
-    let count = surfaces.len();
+fn balance<S: Scalar>(surfaces: &[SlidingSurface<S>], sides: &Sides<S>, law: Law<'_, S>) -> Balance<S> {
+    let (count, states) = (surfaces.len(), surfaces[0].gradient.len());
     let mut above = *sides;
     for own in surfaces {
         above[own.surface] = S::mask(true);
     }
-    let mut rates = law(&above);
-    let mut halves = [[S::zero(); D]; MAX_SLIDING];
+    let mut rates = [S::zero(); MOST];
+    law(&above, &mut rates[..states]);
+    let mut halves = [[S::zero(); MOST]; MAX_SLIDING];
     for (half, own) in halves.iter_mut().zip(surfaces) {
         let mut below = above;
         below[own.surface] = S::mask(false);
-        let other = law(&below);
-        *half = vector!(S, D; n => (rates[n] - other[n]).scale(0.5));
+        law(&below, &mut half[..states]);
+        for (part, &rate) in half.iter_mut().zip(&rates) {
+            *part = (rate - *part).scale(0.5);
+        }
     }
     // What goes from each upper side towards the lower one: nothing or all where the law does not slide.
     let mut matrix = [[S::zero(); MAX_SLIDING]; MAX_SLIDING];
@@ -119,13 +122,15 @@ fn balance<S: Scalar, const D: usize>(
         down[i] = S::select(slides, -own.along(&rates), stays);
     }
     solve(count, &mut matrix, &mut down);
-    for (j, half) in halves[..count].iter().enumerate() {
-        rates = vector!(S, D; n => rates[n] + down[j] * half[n]);
+    for (&part, half) in down.iter().zip(&halves[..count]) {
+        for (rate, &own) in rates.iter_mut().zip(half) {
+            *rate += part * own;
+        }
     }
     // Without what rounding leaves.
     for own in surfaces {
-        let left = own.along(&rates) / own.along(&own.gradient);
-        rates = vector!(S, D; n => S::select(sides[own.mode], rates[n] - own.gradient[n] * left, rates[n]));
+        let left = own.along(&rates);
+        own.take(&mut rates, left, sides[own.mode]);
     }
     Balance { rates, between: down.map(|part| part + S::one()), away }
 }
@@ -155,12 +160,7 @@ fn solve<S: Scalar>(
 
 /// The function of the surface between sliding and not: what is left of the jump that keeps the state on
 /// surface `i`.
-pub fn margin<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
-    i: usize,
-    sides: &Sides<S>,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
-) -> S {
+pub fn margin<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides<S>, law: Law<'_, S>) -> S {
     let slides = surfaces[i].slides(sides);
     if !slides.any() {
         return -S::one();
@@ -174,12 +174,7 @@ pub fn margin<S: Scalar, const D: usize>(
 }
 
 /// Completes the sides of a start: on surfaces the law slides, or leaves them to where it points.
-pub fn settle<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
-    x: &[S; D],
-    sides: &mut Sides<S>,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
-) {
+pub fn settle<S: Scalar>(surfaces: &[SlidingSurface<S>], x: &[S], sides: &mut Sides<S>, law: Law<'_, S>) {
     // All that it is on may hold one another.
     for own in surfaces {
         let here = own.holds(x);
@@ -195,12 +190,12 @@ pub fn settle<S: Scalar, const D: usize>(
 }
 
 /// What becomes of the sides where a run gets to surface `i`, in the lanes `here`; returns those that slide.
-fn land<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
+fn land<S: Scalar>(
+    surfaces: &[SlidingSurface<S>],
     i: usize,
     sides: &mut Sides<S>,
     here: S::Mask,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
+    law: Law<'_, S>,
 ) -> S::Mask {
     let SlidingSurface { surface, mode, .. } = surfaces[i];
     let mut sliding = *sides;
@@ -216,37 +211,33 @@ fn land<S: Scalar, const D: usize>(
 }
 
 /// How fast the mean of both sides leaves surface `i`.
-fn midway<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
-    i: usize,
-    sides: &Sides<S>,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
-) -> S {
+fn midway<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides<S>, law: Law<'_, S>) -> S {
     let own = &surfaces[i];
     let mut sum = S::zero();
     for side in [true, false] {
         let mut on = *sides;
         on[own.surface] = S::mask(side);
         on[own.mode] = S::mask(false);
-        sum += own.along(&rates(surfaces, &on, law));
+        let mut here = [S::zero(); MOST];
+        rates(surfaces, &on, law, &mut here[..own.gradient.len()]);
+        sum += own.along(&here);
     }
     sum
 }
 
 /// Passes surface `i`, or that of its mode, in the lanes `here`: the law begins to slide, goes through, or is let go.
-pub fn switch<S: Scalar, const D: usize>(
-    surfaces: &[SlidingSurface<S, D>],
+pub fn switch<S: Scalar>(
+    surfaces: &[SlidingSurface<S>],
     i: usize,
-    x: &mut [S; D],
+    x: &mut [S],
     sides: &mut Sides<S>,
     here: S::Mask,
-    law: &dyn Fn(&Sides<S>) -> [S; D],
+    law: Law<'_, S>,
 ) {
     let own = &surfaces[i];
     let was = own.slides(sides);
     let arrives = here.and(was.not());
     let leaves = here.and(was);
-    let onto = own.projected(x);
     if leaves.any() {
         let up = S::zero().less(midway(surfaces, i, sides, law));
         sides[own.mode] = sides[own.mode].and(leaves.not());
@@ -256,5 +247,6 @@ pub fn switch<S: Scalar, const D: usize>(
     if arrives.any() {
         stays = land(surfaces, i, sides, arrives, law);
     }
-    *x = vector!(S, D; n => S::select(stays.or(leaves), onto[n], x[n]));
+    let off = own.offset + own.along(x);
+    own.take(x, off, stays.or(leaves));
 }
