@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -34,6 +35,23 @@ def has_units(ax: Axes) -> bool:
     return all("[" in label and label.endswith("]") for label in labels)
 
 
+@functools.cache
+def sensors() -> udd.Fit:
+    """A fit of a model of one's own, seen by two sensors at rates of their own."""
+    model = udd.Model(
+        ["q", "w"],
+        ["w", "-k*sin(q) - c*w"],
+        {"k": 20.0, "c": 0.2, "bias": 0.0},
+        angles=["q"],
+        observe={"volts": "2*q", "gyro": "w + bias"},
+    )
+    t = np.arange(0, 8, 0.02)
+    seen = model.observed(t, udd.simulate(model, t, [1.0, 0.0]).state)
+    seen += 0.02 * np.random.default_rng(1).normal(size=seen.shape)
+    seen[::3, 1] = np.nan
+    return udd.fit(udd.Measurement(t, {"volts": seen[:, 0], "gyro": seen[:, 1]}), model)
+
+
 DRAWN: dict[str, Callable[[], Axes]] = {
     "series of a run": lambda: udd.plot.time_series(run()),
     "series of a measurement": lambda: udd.plot.time_series(discovered.disk().measurement),
@@ -54,6 +72,8 @@ DRAWN: dict[str, Callable[[], Axes]] = {
     "residuals": lambda: udd.plot.residuals(discovered.disk().baseline),
     "residuals of a pendulum": lambda: udd.plot.residuals(discovered.pendulum().baseline),
     "residuals in time": lambda: udd.plot.residuals(discovered.disk().fit, equation="Z", against="t"),
+    "residuals of an own model": lambda: udd.plot.residuals(sensors()),
+    "misfit of a sensor": lambda: udd.plot.misfit(sensors(), channel="gyro"),
     "misfit": lambda: udd.plot.misfit(discovered.disk().fit),
     "misfit of the orientation": lambda: udd.plot.misfit(discovered.disk().fit, channel="beta"),
     "misfit of a pendulum": lambda: udd.plot.misfit(discovered.pendulum().fit),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from udd.errors import UddError
 
 from .inputs import first_film, require_fit
-from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, label, new_axes, scale, tidy
+from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, axis_of, label, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,8 +63,9 @@ def residuals(
         raise UddError(f"a residual can be drawn against {', '.join(places)}, not {against}")
     if equation is None or against is None:
         equation, against = clearest(fit, equation, against)
-    words, unit, factor = EQUATIONS[equation]
-    x, y = scale(against) * places[against], factor * fit.defect[:, names.index(equation)]
+    words, unit, factor = EQUATIONS.get(equation, (f"{equation}'", "1", 1.0))
+    along, times = axis_of(fit.model, against)
+    x, y = times * places[against], factor * fit.defect[:, names.index(equation)]
     ax = new_axes(ax)
     ax.plot(x, y, ".", color=MEASURED, alpha=0.35, markersize=2.5, rasterized=True)
     centre, mean, error = binned(x, y)
@@ -80,7 +81,7 @@ def residuals(
         label="mean ± 2 s.e.",
     )
     ax.axhline(0, color="black", linewidth=0.8)
-    ax.set_xlabel(label(against))
+    ax.set_xlabel(along)
     ax.set_ylabel(f"residual of {words} [{unit}]")
     tidy(ax)
     return ax
@@ -94,7 +95,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     fit : Fit
     ax : Axes, optional
     channel : str, optional
-        One of the measurement's columns; by default the first.
+        One of the measurement's columns, or of a model's sensors; by default the first.
 
     Returns
     -------
@@ -110,8 +111,8 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     channel = names[0] if channel is None else channel
     if channel not in names:
         raise UddError(f"the measurement has {', '.join(names)}, not {channel}")
-    words, unit, factor = CHANNELS[channel]
-    k = names.index(channel)
+    words, unit, factor = CHANNELS.get(channel, (channel, "1", 1.0))
+    k = fit.channels.index(channel)
     sd = fit.noise.sd(fit.record, fit.states[:, 0])[:, k]
     there = np.isfinite(sd)
     ax = new_axes(ax)
