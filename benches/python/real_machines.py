@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import least_squares
 
 import udd
 
@@ -161,48 +159,11 @@ def pendulums(folder: Path) -> list[dict[str, Any]]:
                 "ratio": found.ratio,
                 "before": 1e3 * found.error_before.whole,
                 "after": 1e3 * found.error_after.whole,
-                "shooting": [shot(measured, length, power) for power in (1, 2, 3)],
                 "unit": "mrad",
                 "seconds": time.perf_counter() - since,
             }
         )
-        print(rows[-1]["machine"], [f"{one:.3g}" for one in rows[-1]["shooting"]], flush=True)
     return rows
-
-
-def shot(measured: udd.Measurement, length: float, power: int) -> float:
-    """Single shooting without udd: a pendulum with viscous friction and one of this power of the speed.
-
-    Fitted to the first 60 % of the rows, seen with an unknown zero; r.m.s. on the rest, mrad.
-    """
-    rows = measured.seen
-    t, seen = measured.t[rows] - measured.t[rows][0], np.unwrap(measured["theta"][rows])
-    first = int(0.6 * len(t))
-
-    def motion(p: np.ndarray, times: np.ndarray) -> np.ndarray:
-        w2, viscous, other, start, speed, zero = p
-
-        def rates(_t: float, x: np.ndarray) -> list[float]:
-            drag = viscous * x[1] + (other * np.sign(x[1]) * abs(x[1]) ** power if power > 1 else 0.0)
-            return [x[1], -w2 * np.sin(x[0]) - drag]
-
-        run = solve_ivp(
-            rates, (0.0, times[-1]), [start, speed], "DOP853", times, rtol=1e-8, atol=1e-10, max_step=0.5
-        )
-        return np.asarray(run.y[0] + zero)
-
-    speed = (seen[2] - seen[0]) / (t[2] - t[0])
-    fits = []
-    for viscous in (0.003, 0.03):
-        p = np.array([9.81 / length, viscous, viscous, seen[0], speed, 0.0])
-        for share in (0.05, 0.1, 0.2, 0.4, 1.0):  # ever longer stretches: the phase is lost otherwise
-            own = t[: max(int(share * first), 20)]
-            p = least_squares(
-                lambda p, own=own: motion(p, own) - seen[: len(own)], p, x_scale=np.maximum(np.abs(p), 1e-3)
-            ).x
-        fits.append((float(np.sum((motion(p, t[:first]) - seen[:first]) ** 2)), p))
-    _cost, best = min(fits, key=lambda fit: fit[0])
-    return 1e3 * float(np.sqrt(np.mean((motion(best, t) - seen)[first:] ** 2)))
 
 
 MACHINES: dict[str, Callable[[Path], list[dict[str, Any]]]] = {
