@@ -265,6 +265,37 @@ def test_lorenz63_is_recovered_from_thirty_percent_noise() -> None:
         udd.prune(record, full, spread=0.0)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_terms_that_an_orbit_does_not_determine_go_first(noise: float) -> None:
+    powers = ["1", "x", "v", "x^2", "x*v", "v^2", "x^3", "x^2*v", "x*v^2", "v^3"]
+    text = " + ".join(f"k{k}*{power}" for k, power in enumerate(powers))
+    full = udd.Model(["x", "v"], ["a*v", text], {"a": 1.0} | {f"k{k}": 0.0 for k in range(len(powers))})
+    t = np.linspace(0, 10, 512)
+    pace = np.sqrt(2.1)
+    states = np.column_stack([np.cos(pace * t), -pace * np.sin(pace * t)])
+    scatter = np.random.default_rng(3).standard_normal(states.shape)
+    record = udd.Measurement(t, dict(zip("xv", (states + noise * scatter).T, strict=True)))
+    found = udd.prune(record, full)
+    assert found.kept == ["a", "k1"]
+    if noise:
+        return
+    # v^2 + 2.1 x^2 is constant: three terms are combinations of the others.
+    assert found.undetermined == ["k5", "k8", "k9"] and set(found.undetermined) < set(found.removed)
+    assert found.fit.parameters["k1"] == pytest.approx(-2.1, rel=1e-8)
+    with pytest.raises(FitError, match="can change together"):
+        udd.prune(record, full, among=["k0", "k1"])
+
+
+def test_computed_motion_has_no_noise_and_keeps_its_terms() -> None:
+    # Every fit of it is exact to the last digits, and the noise that it shows is zero.
+    t = np.linspace(0, 10, 512)
+    full = udd.Model(["x"], ["a + b*x + c*x^2 + d*x^3"], dict.fromkeys("abcd", 0.0))
+    found = udd.prune(udd.Measurement(t, {"x": logistic(t)}), full)
+    assert found.kept == ["b", "c"] and not found.undetermined
+    assert found.fit.parameters["b"] == pytest.approx(0.8, rel=1e-9)
+    assert found.fit.parameters["c"] == pytest.approx(-0.01, rel=1e-9)
+
+
 def test_effects_belong_to_own_models_as_terms_do() -> None:
     swing = udd.Model(["x", "v"], ["v", "-k*x"], {"k": 1.0})
     drag = udd.effects.formula("v'", "c*abs(v)*v*k", name="drag", c=-0.1)
