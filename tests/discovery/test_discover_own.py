@@ -286,6 +286,25 @@ def test_terms_that_an_orbit_does_not_determine_go_first(noise: float) -> None:
         udd.prune(record, full, among=["k0", "k1"])
 
 
+def test_noise_that_grows_with_what_is_seen_is_weighed_by_it() -> None:
+    # Predator and prey: one is hundreds of times rarer at times, and then known as many times better.
+    truth = {"a": 1.84, "b": -1.45, "c": -3.0, "d": 1.62}
+    t = np.linspace(0, 10, 512)
+    known = udd.Model(["x", "y"], ["a*x + b*x*y", "c*y + d*x*y"], truth)
+    states = udd.simulate(known, t, [8.3, 3.4]).state
+    noisy = states * (1 + 0.01 * np.random.default_rng(1).standard_normal(states.shape))
+    record = udd.Measurement(t, dict(zip("xy", noisy.T, strict=True)))
+    powers = ["1", "x", "y", "x^2", "x*y", "y^2"]
+    names = [[f"k{own}{k}" for k in range(len(powers))] for own in "xy"]
+    texts = [" + ".join(f"{n}*{p}" for n, p in zip(own, powers, strict=True)) for own in names]
+    full = udd.Model(["x", "y"], texts, {n: 0.0 for own in names for n in own})
+    found = udd.prune(record, full)
+    assert found.kept == ["kx1", "kx4", "ky2", "ky4"]
+    for name, value in zip(found.kept, truth.values(), strict=True):
+        assert abs(found.fit.parameters[name] - value) < 4 * found.fit.errors[name]
+    assert found.fit.scatter == pytest.approx(1.0, abs=0.2)
+
+
 def test_computed_motion_has_no_noise_and_keeps_its_terms() -> None:
     # Every fit of it is exact to the last digits, and the noise that it shows is zero.
     t = np.linspace(0, 10, 512)

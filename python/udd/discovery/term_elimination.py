@@ -286,10 +286,10 @@ class _Pruning:
             return False
         return self.criterion(after) - self.criterion(before) < by
 
-    def _order(self, fitted: Fit) -> list[tuple[str, float]]:
-        """The terms in the order in which they would go, with what each does to the criterion."""
+    def _order(self, fitted: Fit, kept: str | None = None) -> list[tuple[str, float]]:
+        """The terms but one in the order in which they would go, with what each does to the criterion."""
         free = list(fitted.parameters)
-        left = [free.index(name) for name in self.names if name in fitted.parameters]
+        left = [free.index(name) for name in self.names if name in fitted.parameters and name != kept]
         gone: list[int] = []
         result, total = [], 0.0
         while left:
@@ -361,8 +361,9 @@ class _Pruning:
         return None
 
     def _hope(self, fitted: Fit, kept: str) -> float:
-        """The criterion without the term that is needed least beside one, to first order."""
-        names = list(fitted.parameters)
-        others = [names.index(name) for name in self.names if name in fitted.parameters and name != kept]
-        least = min((self._change(fitted, [k]) for k in others), default=0.0)
-        return self.criterion(fitted) + min(least, 0.0)
+        """The criterion without the terms that are not needed beside one, to first order."""
+        total = least = 0.0
+        for _name, change in self._order(fitted, kept):
+            total += change
+            least = min(least, total)
+        return self.criterion(fitted) + least
