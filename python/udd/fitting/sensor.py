@@ -22,8 +22,9 @@ _MOVES = 3.0  # standard errors by which a frame differs from the one before whe
 _STILL = 10  # frames of a film that shows no motion any more, at least
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 _CLOSE = 1e-3  # relative, within which a number is a round one
-_WHITE = -0.6  # below it the third differences of neighbours are correlated by noise, -3/4, not by motion
-_GROWS = 30.0  # nats that noise growing with what was read has to gain: third differences go together
+_WHITE = -0.8  # of neighbours' correlation in differences of noise from which on they are taken for noise
+_GROWS = 30.0  # nats that noise growing with what was read has to gain: differences go together
+_ABOVE = 10.0  # times the noise's variance that the mean square of readings is, for their size to be known
 _TURNS = 5
 _NEAR = 5  # frames whose mean square is a frame's size
 
@@ -97,8 +98,8 @@ def frame_noise(values: Array) -> Array:
 def noise_by_size(values: Array) -> Array:
     """The noise of each frame of one channel (n,), which may grow with the size of what was read.
 
-    Variance a + b x^2 of the third differences, fitted by their likelihood; one for all frames where that is
-    not much likelier, or where the differences show motion.
+    Variance a + b x^2 of differences, of the lowest order that shows noise alone, fitted by their likelihood;
+    one for all frames where that is not much likelier, or where every order shows motion.
 
     Examples
     --------
@@ -113,14 +114,19 @@ def noise_by_size(values: Array) -> Array:
     same = np.full(len(values), float(roughness(values[:, None])[0]))
     if len(values) < 10 * _NEAR:
         return same
-    shown = np.diff(values, 3) ** 2 / 20.0
-    neighbours = float(np.diff(values, 3)[1:] @ np.diff(values, 3)[:-1]) / 20.0
-    mean = float(shown.mean())
-    if mean == 0.0 or neighbours > _WHITE * float(shown.sum()):
+    for order in _ORDERS:
+        weights = np.array([math.comb(order, k) ** 2 for k in range(order + 1)]) / math.comb(2 * order, order)
+        rough = np.diff(values, order)
+        shown = rough**2 / math.comb(2 * order, order)
+        mean = float(shown.mean())
+        if mean > 0.0 and rough[1:] @ rough[:-1] < _WHITE * order / (order + 1) * (rough @ rough):
+            break
+    else:
         return same
+    if float((values**2).mean()) < _ABOVE * mean:
+        return same
+    own = np.convolve(values**2, weights, "valid")
     size = uniform_filter1d(values**2, _NEAR, mode="nearest")
-    binomial = np.array([1.0, 9.0, 9.0, 1.0]) / 20.0
-    own = np.convolve(values**2, binomial, "valid")
     variance = np.full(len(shown), mean)
     for _ in range(_TURNS):  # the scatter of a squared difference grows with its own expectation
         terms = np.column_stack([np.ones(len(own)), own]) / variance[:, None]
