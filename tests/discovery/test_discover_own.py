@@ -115,6 +115,19 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
         within(found, name, value)
 
 
+def test_what_a_later_effect_makes_needless_is_left_out_together() -> None:
+    # At first two other terms together do the missing one's work; beside it neither is needed.
+    known = udd.Model(["x", "y"], ["1 - a*x + b*x^2*y", "k*x"], {"a": 3.6, "b": 3.4, "k": 3.3})
+    truth = known.replace(a=4.03, b=3.1, k=3.03).with_term("y", "x^2*y", loss=-3.1)
+    t = np.linspace(0, 10, 512)
+    states = udd.simulate(truth, t, [0.7, -1.4]).state
+    for seed in (0, 1):
+        noisy = states * (1 + 0.05 * np.random.default_rng(seed).standard_normal(states.shape))
+        found = udd.discover(udd.Measurement(t, dict(zip("xy", noisy.T, strict=True))), known)
+        assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["x^2*y in y'"]
+        within(found, "x2_y_in_y.c", -3.1)
+
+
 #: Two bodies on a double pendulum's angles, the force of which goes through their mass matrix.
 COUPLED = [["2", "0.6*cos(x - y)"], ["0.6*cos(x - y)", "1"]]
 _F, _H = "(-k*sin(x) - 0.6*sin(x - y)*w^2)", "(-0.5*k*sin(y) + 0.6*sin(x - y)*v^2)"
