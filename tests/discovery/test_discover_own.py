@@ -128,6 +128,17 @@ def test_what_a_later_effect_makes_needless_is_left_out_together() -> None:
         within(found, "x2_y_in_y.c", -3.1)
 
 
+def test_a_model_that_cannot_follow_the_record_lacks_something() -> None:
+    # Without its growth the oscillator comes to rest; no candidate fits while y is not seen.
+    values = {"a": 3.37, "b": -3.37 / 3, "c": -1 / 3.37}
+    known = udd.Model(["x", "y"], ["a*y + b*x^3", "c*x"], {"a": 3.05, "b": -0.91, "c": -0.32})
+    t = np.linspace(0, 10, 512)
+    states = udd.simulate(known.replace(**values).with_term("x", "x", g=3.37), t, [0.7, 0.0]).state
+    found = udd.discover(udd.Measurement(t, {"x": states[:, 0]}), known, state0={"y": 0.0})
+    assert found.fit.scatter > 2.5 or found.effects
+    assert found.verdict != "nothing missing"
+
+
 #: Two bodies on a double pendulum's angles, the force of which goes through their mass matrix.
 COUPLED = [["2", "0.6*cos(x - y)"], ["0.6*cos(x - y)", "1"]]
 _F, _H = "(-k*sin(x) - 0.6*sin(x - y)*w^2)", "(-0.5*k*sin(y) + 0.6*sin(x - y)*v^2)"
