@@ -112,10 +112,10 @@ bench-states: .venv/.ready-user ## what steps and fits take by the number of sta
 bench-discovery: .venv/.ready-user ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(STEP) "bench-discovery" $(PY) benches/python/discovery $(ARGS)
 
-bench-odebench: .venv/.ready-user ## ODEBench's 63 systems: a missing term, a whole system (ARGS="--systems 1-23 --noise 0 0.01 --only missing")
+bench-odebench: .venv/.ready-user ## the systems of ODEBench (or dysts): a missing term, a whole system (ARGS="--from dysts --noise 0 0.01 --only missing")
 	$(STEP) "bench-odebench" $(PY) benches/python/odebench $(ARGS)
 
-bench-odebench-pysindy: .venv-peers/.deps ## whole systems of it by PySINDy with its defaults
+bench-odebench-pysindy: .venv-peers/.deps ## whole systems of these by PySINDy with its defaults
 	$(PEERS)/python benches/python/odebench --only pysindy $(ARGS)
 
 bench-tracker: .venv/.ready-user ## the tracker on films with every defect in turn (ARGS="--only clean,standard --trackers udd,fast,HSV")

@@ -115,6 +115,30 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
         within(found, name, value)
 
 
+def test_what_a_later_effect_makes_needless_is_left_out_together() -> None:
+    # At first two other terms together do the missing one's work; beside it neither is needed.
+    known = udd.Model(["x", "y"], ["1 - a*x + b*x^2*y", "k*x"], {"a": 3.6, "b": 3.4, "k": 3.3})
+    truth = known.replace(a=4.03, b=3.1, k=3.03).with_term("y", "x^2*y", loss=-3.1)
+    t = np.linspace(0, 10, 512)
+    states = udd.simulate(truth, t, [0.7, -1.4]).state
+    for seed in (0, 1):
+        noisy = states * (1 + 0.05 * np.random.default_rng(seed).standard_normal(states.shape))
+        found = udd.discover(udd.Measurement(t, dict(zip("xy", noisy.T, strict=True))), known)
+        assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["x^2*y in y'"]
+        within(found, "x2_y_in_y.c", -3.1)
+
+
+def test_a_model_that_cannot_follow_the_record_lacks_something() -> None:
+    # Without its growth the oscillator comes to rest; no candidate fits while y is not seen.
+    values = {"a": 3.37, "b": -3.37 / 3, "c": -1 / 3.37}
+    known = udd.Model(["x", "y"], ["a*y + b*x^3", "c*x"], {"a": 3.05, "b": -0.91, "c": -0.32})
+    t = np.linspace(0, 10, 512)
+    states = udd.simulate(known.replace(**values).with_term("x", "x", g=3.37), t, [0.7, 0.0]).state
+    found = udd.discover(udd.Measurement(t, {"x": states[:, 0]}), known, state0={"y": 0.0})
+    assert found.fit.scatter > 2.5 or found.effects
+    assert found.verdict != "nothing missing"
+
+
 #: Two bodies on a double pendulum's angles, the force of which goes through their mass matrix.
 COUPLED = [["2", "0.6*cos(x - y)"], ["0.6*cos(x - y)", "1"]]
 _F, _H = "(-k*sin(x) - 0.6*sin(x - y)*w^2)", "(-0.5*k*sin(y) + 0.6*sin(x - y)*v^2)"
@@ -263,6 +287,56 @@ def test_lorenz63_is_recovered_from_thirty_percent_noise() -> None:
         udd.prune(record, full, among=["w"])
     with pytest.raises(FitError, match="spread must be above 0"):
         udd.prune(record, full, spread=0.0)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_terms_that_an_orbit_does_not_determine_go_first(noise: float) -> None:
+    powers = ["1", "x", "v", "x^2", "x*v", "v^2", "x^3", "x^2*v", "x*v^2", "v^3"]
+    text = " + ".join(f"k{k}*{power}" for k, power in enumerate(powers))
+    full = udd.Model(["x", "v"], ["a*v", text], {"a": 1.0} | {f"k{k}": 0.0 for k in range(len(powers))})
+    t = np.linspace(0, 10, 512)
+    pace = np.sqrt(2.1)
+    states = np.column_stack([np.cos(pace * t), -pace * np.sin(pace * t)])
+    scatter = np.random.default_rng(3).standard_normal(states.shape)
+    record = udd.Measurement(t, dict(zip("xv", (states + noise * scatter).T, strict=True)))
+    found = udd.prune(record, full)
+    assert found.kept == ["a", "k1"]
+    if noise:
+        return
+    # v^2 + 2.1 x^2 is constant: three terms are combinations of the others.
+    assert found.undetermined == ["k5", "k8", "k9"] and set(found.undetermined) < set(found.removed)
+    assert found.fit.parameters["k1"] == pytest.approx(-2.1, rel=1e-8)
+    with pytest.raises(FitError, match="can change together"):
+        udd.prune(record, full, among=["k0", "k1"])
+
+
+def test_noise_that_grows_with_what_is_seen_is_weighed_by_it() -> None:
+    # Predator and prey: one is hundreds of times rarer at times, and then known as many times better.
+    truth = {"a": 1.84, "b": -1.45, "c": -3.0, "d": 1.62}
+    t = np.linspace(0, 10, 512)
+    known = udd.Model(["x", "y"], ["a*x + b*x*y", "c*y + d*x*y"], truth)
+    states = udd.simulate(known, t, [8.3, 3.4]).state
+    noisy = states * (1 + 0.01 * np.random.default_rng(1).standard_normal(states.shape))
+    record = udd.Measurement(t, dict(zip("xy", noisy.T, strict=True)))
+    powers = ["1", "x", "y", "x^2", "x*y", "y^2"]
+    names = [[f"k{own}{k}" for k in range(len(powers))] for own in "xy"]
+    texts = [" + ".join(f"{n}*{p}" for n, p in zip(own, powers, strict=True)) for own in names]
+    full = udd.Model(["x", "y"], texts, {n: 0.0 for own in names for n in own})
+    found = udd.prune(record, full)
+    assert found.kept == ["kx1", "kx4", "ky2", "ky4"]
+    for name, value in zip(found.kept, truth.values(), strict=True):
+        assert abs(found.fit.parameters[name] - value) < 4 * found.fit.errors[name]
+    assert found.fit.scatter == pytest.approx(1.0, abs=0.2)
+
+
+def test_computed_motion_has_no_noise_and_keeps_its_terms() -> None:
+    # Every fit of it is exact to the last digits, and the noise that it shows is zero.
+    t = np.linspace(0, 10, 512)
+    full = udd.Model(["x"], ["a + b*x + c*x^2 + d*x^3"], dict.fromkeys("abcd", 0.0))
+    found = udd.prune(udd.Measurement(t, {"x": logistic(t)}), full)
+    assert found.kept == ["b", "c"] and not found.undetermined
+    assert found.fit.parameters["b"] == pytest.approx(0.8, rel=1e-9)
+    assert found.fit.parameters["c"] == pytest.approx(-0.01, rel=1e-9)
 
 
 def test_effects_belong_to_own_models_as_terms_do() -> None:

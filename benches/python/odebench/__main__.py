@@ -1,11 +1,11 @@
-"""ODEBench's 63 systems: a term that is missing, and whole systems from a library of terms.
+"""ODEBench's 63 systems and those of dysts: a missing term, and whole systems from a library of terms.
 
-    python benches/python/odebench [--systems 1-23,54] [--noise 0 0.01] [--only missing,hidden,library]
-                                   [--jobs 2] [--json out.json]
+    python benches/python/odebench [--from dysts] [--systems 1-23,54] [--noise 0 0.01]
+                                   [--only missing,hidden,library] [--jobs 2] [--json out.json]
 
-Each record is the motion from the system's first published start, 512 samples over t = 0 to 10 by SciPy's
-DOP853, with multiplicative white noise as ODEFormer's authors have it (`--additive`: a share of each state's
-standard deviation). Questions:
+Each record is the motion from the system's first start, 512 samples over t = 0 to 10 (of dysts, over five
+periods) by SciPy's DOP853, with multiplicative white noise as ODEFormer's authors have it (`--additive`: a
+share of each state's standard deviation). Questions:
 
 missing   a term, drawn from all terms, is taken out of the known model, and each constant of the rest starts
           at 0.8 to 1.25 times its value: does `udd.discover` name that term? All states are seen.
@@ -24,7 +24,7 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -35,9 +35,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # the jobs are what runs in paral
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import table
+from dysts import DYSTS
 from records import record
-from systems import SYSTEMS
+from systems import SYSTEMS, System
 
+SOURCES = {"odebench": SYSTEMS, "dysts": DYSTS}
 QUESTIONS = ("missing", "hidden", "library", "pysindy")
 
 
@@ -45,6 +47,7 @@ QUESTIONS = ("missing", "hidden", "library", "pysindy")
 class Case:
     """A question to a record, and the seconds of the processor after which it is given up."""
 
+    source: str
     question: str
     number: int
     noise: float
@@ -60,7 +63,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="odebench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--systems", default="1-63", help="numbers and ranges, as in 1-23,54")
+    parser.add_argument("--from", dest="source", choices=SOURCES, default="odebench")
+    parser.add_argument("--systems", help="numbers and ranges, as in 1-23,54")
     parser.add_argument("--noise", type=float, nargs="+", default=[0.0, 0.01, 0.05, 0.1])
     parser.add_argument("--additive", action="store_true", help="noise of a share of the standard deviation")
     parser.add_argument("--told", action="store_true", help="udd is told each sample's standard deviation")
@@ -75,15 +79,26 @@ def main() -> int:
     if unknown := set(questions) - set(QUESTIONS):
         parser.error(f"there is no question {', '.join(sorted(unknown))}; there are {', '.join(QUESTIONS)}")
     try:
-        numbers = _numbers(given.systems)
+        systems = SOURCES[given.source]
+        numbers = _numbers(given.systems, systems) if given.systems else list(systems)
     except ValueError as wrong:
         parser.error(str(wrong))
     cases = [
-        Case(question, number, noise, given.additive, given.told, given.draw, given.spread, given.limit)
+        Case(
+            given.source,
+            question,
+            number,
+            noise,
+            given.additive,
+            given.told,
+            given.draw,
+            given.spread,
+            given.limit,
+        )
         for question in questions
         for noise in given.noise
         for number in numbers
-        if question != "hidden" or len(SYSTEMS[number].states) > 1
+        if question != "hidden" or len(systems[number].states) > 1
     ]
     rows: list[dict[str, Any]] = []
     with ProcessPoolExecutor(given.jobs) as pool:
@@ -98,7 +113,7 @@ def main() -> int:
     return int(any(row["outcome"] == "failed" for row in rows))
 
 
-def _numbers(text: str) -> list[int]:
+def _numbers(text: str, systems: Mapping[int, System]) -> list[int]:
     """The systems that are asked for."""
     result: list[int] = []
     for part in text.split(","):
@@ -106,8 +121,8 @@ def _numbers(text: str) -> list[int]:
         if not (first.isdigit() and (last or first).isdigit()):
             raise ValueError(f"systems are numbers and ranges, as in 1-23,54, not {text!r}")
         result += range(int(first), int(last or first) + 1)
-    if unknown := sorted(set(result) - set(SYSTEMS)):
-        raise ValueError(f"there is no system {unknown[0]}; there are 1 to {len(SYSTEMS)}")
+    if unknown := sorted(set(result) - set(systems)):
+        raise ValueError(f"there is no system {unknown[0]}; there are 1 to {len(systems)}")
     return result
 
 
@@ -132,7 +147,7 @@ def _at_most(seconds: float) -> Iterator[None]:
 
 def score(case: Case) -> dict[str, Any]:
     """Draw the record and put the question; a record's failure is a result too."""
-    system = SYSTEMS[case.number]
+    system = SOURCES[case.source][case.number]
     try:
         hidden = case.question == "hidden"
         own = record(system, case.noise, hidden, case.additive, case.told, case.draw)

@@ -23,7 +23,8 @@ class Library:
 
     `outcome` is "recovered" (exactly the true terms), "more" (these and others), "fewer" (some of these),
     "wrong", "refused" or "failed"; where the library does not hold every true term, "fits" or "wrong" by
-    whether R2 from the other start exceeds 0.9. `missed` and `extra` count terms.
+    whether R2 from the other start exceeds 0.9. `missed` and `extra` count terms, `undetermined` those that
+    are said not to be determined by the record beside others.
     """
 
     method: str
@@ -35,6 +36,7 @@ class Library:
     kept: list[str] = field(default_factory=list)
     missed: int = 0
     extra: int = 0
+    undetermined: int = 0
     off: float = np.nan
     r2: float = np.nan
     seconds: float = 0.0
@@ -89,7 +91,7 @@ def find(method: str, record: Record, noise: float, spread: float | None = None)
     true = truth(system)
     result = Library(method, system.number, system.title, noise, true is not None)
     begin = time.process_time()
-    factors = prune(record, spread) if method == "library" else pysindy(record)
+    factors, result.undetermined = prune(record, spread) if method == "library" else (pysindy(record), 0)
     result.seconds = time.process_time() - begin
     kept = factors != 0
     listed = texts(system)
@@ -109,8 +111,8 @@ def find(method: str, record: Record, noise: float, spread: float | None = None)
     return result
 
 
-def prune(record: Record, spread: float | None = None) -> Array:
-    """By `udd.prune`, all factors zero at first."""
+def prune(record: Record, spread: float | None = None) -> tuple[Array, int]:
+    """By `udd.prune`, all factors zero at first; and the number of those that were not determined."""
     import udd
 
     system = record.system
@@ -123,10 +125,9 @@ def prune(record: Record, spread: float | None = None) -> Array:
         {n: 0.0 for own in names for n in own},
         angles=list(system.angles),
     )
-    found = udd.prune(
-        udd.Measurement(record.t, record.columns, sigma=record.sigma), model, spread=spread
-    ).model
-    return np.array([[found.parameters[n] for n in own] for own in names]).T
+    found = udd.prune(udd.Measurement(record.t, record.columns, sigma=record.sigma), model, spread=spread)
+    factors = np.array([[found.model.parameters[n] for n in own] for own in names]).T
+    return factors, len(found.undetermined)
 
 
 def pysindy(record: Record) -> Array:

@@ -5,14 +5,15 @@ What is true is evaluated by NumPy from the table: no code is shared with udd.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from systems import System
 
-LAST, SAMPLES = 10.0, 512
+SAMPLES = 512
 SEED = 20240101
 _TOLERANCE = 1e-11
 _LONGEST = 100_000  # evaluations of a right-hand side
@@ -34,28 +35,49 @@ def function(text: str, system: System) -> Rates:
     return value
 
 
-def rates(system: System) -> Rates:
-    """The true right-hand side, of states (n, d)."""
-    equations = [[(c, function(text, system)) for c, text in own] for own in system.equations.values()]
-    return lambda states: np.stack([sum(c * f(states) for c, f in own) for own in equations], axis=1)
+def _single(system: System) -> Callable[[float, Array], Array]:
+    """The true right-hand side, of a time and a state (d,); NaN where it has no value."""
+    sums = (" + ".join(f"({c!r})*({text})" for c, text in own) for own in system.equations.values())
+    code = compile(f"({', '.join(sums)},)".replace("^", "**"), "rates", "eval")
+    known = {name: getattr(math, name) for name in ("sin", "cos", "exp", "log")} | dict(system.shapes)
+    scope = {"__builtins__": {}, "abs": abs} | known
+
+    def value(_t: float, state: Array) -> Array:
+        try:
+            values = eval(code, scope, dict(zip(system.states, state.tolist(), strict=True)))
+            return np.array(values, dtype=float)
+        except (ArithmeticError, TypeError, ValueError):  # TypeError: of a complex number
+            return np.full(len(state), np.nan)
+
+    return value
+
+
+def motion(system: System, start: Sequence[float], times: Array) -> Array | None:
+    """The true motion, (n, d); None where it ends before the last time."""
+    return _solved(_single(system), np.array(start), times, np.inf, _TOLERANCE)
 
 
 class _TooLongError(Exception):
     """A run takes more evaluations than any that is worth while."""
 
 
-def run(
-    right: Rates, start: Array, times: Array, limit: float = np.inf, tolerance: float = _TOLERANCE
+def run(right: Rates, start: Array, times: Array, limit: float, tolerance: float) -> Array | None:
+    """A motion by another right-hand side, as :func:`motion`; None too where a state exceeds a limit."""
+    return _solved(lambda _t, state: right(state[None])[0], start, times, limit, tolerance)
+
+
+def _solved(
+    single: Callable[[float, Array], Array], start: Array, times: Array, limit: float, tolerance: float
 ) -> Array | None:
-    """A motion by DOP853, (n, d); None where it ends before the last time."""
+    """By DOP853."""
     left = _LONGEST
 
-    def single(_t: float, state: Array) -> Array:
+    def counted(t: float, state: Array) -> Array:
         nonlocal left
         left -= 1
         if not left:
             raise _TooLongError
-        return right(state[None])[0]
+        return single(t, state)
 
     def far(_t: float, state: Array) -> float:
         return limit - float(np.abs(state).max())
@@ -63,9 +85,11 @@ def run(
     far.terminal = True  # type: ignore[attr-defined]
     scale = tolerance * max(1.0, float(np.abs(start).max()))
     options = {"method": "DOP853", "t_eval": times, "rtol": tolerance, "atol": scale}
+    if np.isfinite(limit):
+        options["events"] = far
     try:
         with np.errstate(all="ignore"):
-            done = solve_ivp(single, (times[0], times[-1]), start, events=far, **options)
+            done = solve_ivp(counted, (times[0], times[-1]), start, **options)
     except _TooLongError:
         return None
     whole = done.status == 0 and np.isfinite(done.y).all()
@@ -111,7 +135,7 @@ class Record:
         NaN where the true motion ends there before the last time, -inf where the other one does.
         """
         start = np.array(self.system.starts[1])
-        truth = run(rates(self.system), start, self.t)
+        truth = motion(self.system, start, self.t)
         if truth is None:
             return float("nan")
         found = run(right, start, self.t, _FAR * max(1.0, float(np.abs(truth).max())), 1e-7)
@@ -134,10 +158,10 @@ def record(
     share of each state's standard deviation. `number` draws it anew. Of a record with a hidden state, which
     is drawn, all others are seen.
     """
-    t = np.linspace(0.0, LAST, SAMPLES)
-    clean = run(rates(system), np.array(system.starts[0]), t)
+    t = np.linspace(0.0, system.last, SAMPLES)
+    clean = motion(system, system.starts[0], t)
     if clean is None:
-        raise RuntimeError(f"the motion of system {system.number} ends before {LAST:g}")
+        raise RuntimeError(f"the motion of system {system.number} ends before {system.last:g}")
     drawn = np.random.default_rng([SEED, system.number, number]).standard_normal(clean.shape)
     size = noise * (clean.std(axis=0) if additive else np.abs(clean))
     seen = list(system.states)

@@ -19,7 +19,8 @@ Term = tuple[float, str]
 class System:
     """A system with its constants and its two starts.
 
-    `equations` has the terms of each state's rate, `angles` the states that are angles.
+    `equations` has the terms of each state's rate, `angles` the states that are angles; a record lasts from 0
+    to `last`.
     """
 
     number: int
@@ -28,6 +29,7 @@ class System:
     starts: tuple[tuple[float, ...], tuple[float, ...]]
     shapes: Mapping[str, float] = field(default_factory=dict)
     angles: str = ""
+    last: float = 10.0
 
     @property
     def states(self) -> tuple[str, ...]:

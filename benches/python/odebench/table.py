@@ -28,7 +28,8 @@ def line(row: Row) -> str:
         )
     return (
         f"{head} {'' if row['listed'] else '(not listed) '}-{row['missed']} +{row['extra']} "
-        f"{' | '.join(row['kept'])}; R2 {row['r2']:.3g}, {row['seconds']:.1f} s"
+        f"{' | '.join(row['kept'])}; {row['undetermined']} not determined, R2 {row['r2']:.3g}, "
+        f"{row['seconds']:.1f} s"
     )
 
 
@@ -71,6 +72,10 @@ def _numbers(done: Sequence[Row]) -> list[str]:
         sides = [_good(done, name) for name in ("r2_before", "r2_after")]
         lines.append(f"  R2 over 0.9 from the other start: {sides[0]} -> {sides[1]}")
     else:
+        told = Counter(row["outcome"] for row in done if row["undetermined"])
+        if told:
+            counted = ", ".join(f"{n} {outcome}" for outcome, n in told.most_common())
+            lines.append(f"  terms said not to be determined: {counted}")
         lines.append(f"  R2 over 0.9 from the other start: {_good(done, 'r2')}")
     return lines
 

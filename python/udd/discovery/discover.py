@@ -193,7 +193,7 @@ def discover(
     # Random forces foretell nothing: what makes free runs so much better is a law.
     random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
     lost = not found and misses_the_motion(before, record, ~train)
-    unexplained = not found and (baseline.scatter > UNEXPLAINED or lost)
+    unexplained = not found and (max(baseline.scatter, final.scatter) > UNEXPLAINED or lost)
     rejected: list[RejectedEffect] = end.unconfirmed
     stopped = end.stopped
     if unexplained and not rejected and end.rounds:

@@ -513,25 +513,32 @@ class Search:
                 return
 
     def _leave_out(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
-        """Leave out effects of the library that chance explains beside those found after them."""
+        """Leave out effects of the library that chance explains beside those found after them.
+
+        All of them at once first: of two that are not needed neither is missed, but the other still fails.
+        """
         whole = states[-1].whole
-        for k, step in enumerate(accepted[:-1]):
-            for one in step.candidates:
-                later = accepted[k:]
-                if any(s.curve for s in later) or needed_in(whole, one.amplitude_names):
-                    continue
-                self.tell(f"trying without {one.title}")
-                kept = [c for s in later for c in s.candidates if c is not one]
-                values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
-                trial = of_library(states[k].part, kept, values)
-                found = self._accept(states[k], fitted_ones([trial]), rounds[k])
-                if found is None or not _cheaper(found, later, states[k], states[-1]):
-                    continue
-                names = {c.effect.name for c in kept}
-                others = [a for s in later for a in s.alternatives if a.instead_of in names]
-                accepted[k:] = [replace(found[0], alternatives=others)]
-                states[k + 1 :], rounds[k + 1 :] = [found[1]], []
-                return
+        idle = [
+            (k, one)
+            for k, step in enumerate(accepted[:-1])
+            for one in step.candidates
+            if not any(s.curve for s in accepted[k:]) and not needed_in(whole, one.amplitude_names)
+        ]
+        for group in [idle, *([one] for one in idle)] if len(idle) > 1 else [idle] if idle else []:
+            k, names = group[0][0], {one.effect.name for _k, one in group}
+            later = accepted[k:]
+            self.tell(f"trying without {' and '.join(one.title for _k, one in group)}")
+            kept = [c for s in later for c in s.candidates if c.effect.name not in names]
+            values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
+            trial = of_library(states[k].part, kept, values)
+            found = self._accept(states[k], fitted_ones([trial]), rounds[k])
+            if found is None or not _cheaper(found, later, states[k], states[-1]):
+                continue
+            left = {c.effect.name for c in kept}
+            others = [a for s in later for a in s.alternatives if a.instead_of in left]
+            accepted[k:] = [replace(found[0], alternatives=others)]
+            states[k + 1 :], rounds[k + 1 :] = [found[1]], []
+            return
 
     def _accept(
         self, current: SearchState, trials: list[TrialFit], scores: ScoreRound

@@ -17,7 +17,8 @@ from udd.fitting import Fit, at_level, fit_record, record_of
 from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.model_error_schedule import reduce_model_error
 from udd.fitting.parameters import Free
-from udd.fitting.solve import solve
+from udd.fitting.record import Record
+from udd.fitting.solve import SolveError, solve
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -50,6 +51,10 @@ class Pruned:
         For each that was kept, by how much chi2 would rise without it.
     price : float
         What a parameter has to be worth, in chi2; with a `spread` beside what its prior makes it cost.
+    undetermined : list of str
+        Those of `removed` that the data do not determine beside the terms named before them: on the orbit
+        they are combinations of these, so that they may as well stand in their place. A constant of the
+        motion makes such terms.
     """
 
     fit: Fit
@@ -58,6 +63,7 @@ class Pruned:
     removed: list[str]
     rise: dict[str, float]
     price: float
+    undetermined: list[str]
 
     @property
     def model(self) -> Model:
@@ -69,6 +75,7 @@ class Pruned:
         return {
             "kept": {name: {"rise": self.rise[name]} for name in self.kept},
             "removed": self.removed,
+            "undetermined": self.undetermined,
             "price": self.price,
             "fit": self.fit.to_dict(),
         }
@@ -118,7 +125,7 @@ def prune(
     Raises
     ------
     FitError
-        The model cannot be fitted with all its parameters, or a name is not a free parameter's.
+        The model cannot be fitted, or a name is not a free parameter's.
 
     Examples
     --------
@@ -148,15 +155,47 @@ def prune(
         if not 0.0 < spread < np.inf:
             raise FitError(f"spread must be above 0 and finite, not {spread!r}")
         priors = dict.fromkeys(names, (0.0, spread)) | dict(priors or {})
-    full = fit_record(measurement, record, model, free, priors=priors, search=True)
+    full, undetermined = _determined(measurement, record, model, known, names, priors or {})
+    if undetermined:
+        tell(f"not determined: {', '.join(undetermined)}")
     # Among n terms about one is expected to be needed, or each is priced against chance.
     n = max(len(names), 1)
     price = 2 * math.log(n) if spread is not None else float(chi_squared.isf(alpha / n, 1))
-    pruning = _Pruning(names, price, spread, full, tell)
+    pruning = _Pruning([name for name in names if name not in undetermined], price, spread, full, tell)
     end = pruning.run()
     kept = [name for name in names if name in end.parameters]
     rise = pruning.rises(end)
-    return Pruned(end, full, kept, [n for n in names if n not in kept], {n: rise[n] for n in kept}, price)
+    removed = [name for name in names if name not in kept]
+    return Pruned(end, full, kept, removed, {n: rise[n] for n in kept}, price, undetermined)
+
+
+def _determined(
+    measurement: Measurement | Sequence[Measurement],
+    record: Record,
+    model: Model | Sequence[Model],
+    free: Sequence[str],
+    names: Sequence[str],
+    priors: Mapping[str, tuple[float, float]],
+) -> tuple[Fit, list[str]]:
+    """The fit of all terms that the data determine together, and the names of the others.
+
+    Of terms that can change together without changing the fit the last one goes, until there are none.
+    """
+    gone: list[str] = []
+    while True:
+        left = [name for name in free if name not in gone]
+        own = {name: prior for name, prior in priors.items() if name not in gone}
+        try:
+            return fit_record(measurement, record, model, left, priors=own, search=True), [
+                name for name in names if name in gone
+            ]
+        except SolveError as error:
+            last = [name for name in names if name in error.undetermined]
+            if not last:
+                raise
+            gone.append(last[-1])
+            zero = dict.fromkeys(gone, 0.0)
+            model = model.replace(**zero) if isinstance(model, Model) else [m.replace(**zero) for m in model]
 
 
 class _Pruning:
@@ -247,10 +286,10 @@ class _Pruning:
             return False
         return self.criterion(after) - self.criterion(before) < by
 
-    def _order(self, fitted: Fit) -> list[tuple[str, float]]:
-        """The terms in the order in which they would go, with what each does to the criterion."""
+    def _order(self, fitted: Fit, kept: str | None = None) -> list[tuple[str, float]]:
+        """The terms but one in the order in which they would go, with what each does to the criterion."""
         free = list(fitted.parameters)
-        left = [free.index(name) for name in self.names if name in fitted.parameters]
+        left = [free.index(name) for name in self.names if name in fitted.parameters and name != kept]
         gone: list[int] = []
         result, total = [], 0.0
         while left:
@@ -322,8 +361,9 @@ class _Pruning:
         return None
 
     def _hope(self, fitted: Fit, kept: str) -> float:
-        """The criterion without the term that is needed least beside one, to first order."""
-        names = list(fitted.parameters)
-        others = [names.index(name) for name in self.names if name in fitted.parameters and name != kept]
-        least = min((self._change(fitted, [k]) for k in others), default=0.0)
-        return self.criterion(fitted) + min(least, 0.0)
+        """The criterion without the terms that are not needed beside one, to first order."""
+        total = least = 0.0
+        for _name, change in self._order(fitted, kept):
+            total += change
+            least = min(least, total)
+        return self.criterion(fitted) + least

@@ -24,6 +24,7 @@ _LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
 _OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
 #: Samples of an input that may be missing at a measurement's ends, where the nearest one holds.
 _LATE = 2.0
+_NOISIER = 0.9  # of the frames are not noisier than what is taken for a channel's noise
 _SAMPLED = 50  # frames that tell how noise enters the states
 
 
@@ -219,7 +220,7 @@ def state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> A
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(sigma).any(axis=0))
     typical = np.full(len(seen), np.inf)
     for k in np.flatnonzero(seen):
-        typical[k] = np.median(sigma[np.isfinite(sigma[:, k]), k])
+        typical[k] = np.quantile(sigma[np.isfinite(sigma[:, k]), k], _NOISIER)
     if not model.observe:
         return typical
     frames = np.linspace(0, len(t) - 1, _SAMPLED).astype(int)

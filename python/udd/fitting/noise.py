@@ -21,6 +21,8 @@ _HONEST = 0.99
 _SURE, _MOTION = 4.0, 0.8
 #: Frequencies over which the misfits' power is averaged.
 _BAND = 17
+#: Share of a channel's largest number below which a computed motion has no digits: no noise is smaller.
+_EXACT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -120,13 +122,15 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
         variance = assumed[use, m] ** 2
         leverage = seen_variance[use, m] / variance
         power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)
+        least = _EXACT * np.abs(record.seen[use, m]).max()
         terms = np.column_stack([record.sigma[use, m] ** 2, omega[use] ** 2])
         for _ in range(3):  # the scatter of a squared misfit grows with its own expectation
             scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
             share, _residual = nnls(terms / scale / variance[:, None], power / variance)
-            variance = np.maximum(terms / scale @ share, 1e-6 * power.mean() + 1e-300)
+            variance = np.maximum(terms / scale @ share, 1e-6 * power.mean() + least**2 + 1e-300)
         factor[m], blur[m] = np.sqrt(share / scale)
-        factor[m] = max(factor[m], 1e-3 * np.sqrt(power.mean() / (record.sigma[use, m] ** 2).mean()))
+        smallest = np.sqrt((1e-6 * power.mean() + least**2) / (record.sigma[use, m] ** 2).mean())
+        factor[m] = max(factor[m], smallest)
     return Noise(factor, blur, weight, before.memory)
 
 

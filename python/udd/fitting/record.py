@@ -18,7 +18,7 @@ from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .formula_models import checked_start, driven, guessed, slope, typical_noise
-from .sensor import frame_noise, is_encoder, lattice, moving
+from .sensor import frame_noise, is_encoder, lattice, moving, noise_by_size
 
 Array = NDArray[np.float64]
 
@@ -236,7 +236,7 @@ def _noise_of(measurement: Measurement, values: Array) -> Array:
         columns = [column[np.isfinite(column)] for column in values.T]
         typical = np.array([typical_noise(column[:, None])[0] for column in columns])
         if not any(lattice(column) for column in columns):
-            return typical
+            return _growing(values, typical)
         steps = np.full(values.shape, np.inf)
         for own, column in zip(steps.T, values.T, strict=True):
             own[np.isfinite(column)] = frame_noise(column[np.isfinite(column)])
@@ -245,6 +245,16 @@ def _noise_of(measurement: Measurement, values: Array) -> Array:
     if profile_of(measurement.kind).sensor.zero is not None and is_encoder(measurement):
         return frame_noise(values[:, 0])[:, None]
     return np.array(profile_of(measurement.kind).sensor.sigma)
+
+
+def _growing(values: Array, typical: Array) -> Array:
+    """The typical noise of each column, or of each frame where a column's grows with what was read."""
+    least = 1e-6 * np.array([np.ptp(column[np.isfinite(column)]) for column in values.T])
+    result = np.tile(typical, (len(values), 1))
+    for own, column, smallest in zip(result.T, values.T, least, strict=True):
+        present = np.isfinite(column)
+        own[present] = np.maximum(noise_by_size(column[present]), smallest)
+    return result if (np.ptp(result, axis=0) > 0.0).any() else typical
 
 
 def _joined(records: Sequence[Record]) -> Record:

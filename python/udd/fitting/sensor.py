@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import nnls
 
 from udd.measurement import Measurement
 from udd.models import profile_of
@@ -20,6 +22,11 @@ _MOVES = 3.0  # standard errors by which a frame differs from the one before whe
 _STILL = 10  # frames of a film that shows no motion any more, at least
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 _CLOSE = 1e-3  # relative, within which a number is a round one
+_WHITE = -0.8  # of neighbours' correlation in differences of noise from which on they are taken for noise
+_GROWS = 30.0  # nats that noise growing with what was read has to gain: differences go together
+_ABOVE = 10.0  # times the noise's variance that the mean square of readings is, for their size to be known
+_TURNS = 5
+_NEAR = 5  # frames whose mean square is a frame's size
 
 
 def lattice(values: Array) -> float:
@@ -86,6 +93,49 @@ def frame_noise(values: Array) -> Array:
     own = step**2 / 12.0
     result: Array = np.sqrt(noise**2 - own + np.repeat(lengths, lengths) * own)
     return result
+
+
+def noise_by_size(values: Array) -> Array:
+    """The noise of each frame of one channel (n,), which may grow with the size of what was read.
+
+    Variance a + b x^2 of differences, of the lowest order that shows noise alone, fitted by their likelihood;
+    one for all frames where that is not much likelier, or where every order shows motion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from udd.fitting.sensor import noise_by_size
+    >>> x, white = np.cos(np.arange(0, 20, 0.05)), np.random.default_rng(0).standard_normal(400)
+    >>> noise_by_size(x * (1 + 0.1 * white))[[0, 31]].round(2)
+    array([0.1 , 0.01])
+    >>> float(np.ptp(noise_by_size(x + 0.1 * white)))
+    0.0
+    """
+    same = np.full(len(values), float(roughness(values[:, None])[0]))
+    if len(values) < 10 * _NEAR:
+        return same
+    for order in _ORDERS:
+        weights = np.array([math.comb(order, k) ** 2 for k in range(order + 1)]) / math.comb(2 * order, order)
+        rough = np.diff(values, order)
+        shown = rough**2 / math.comb(2 * order, order)
+        mean = float(shown.mean())
+        if mean > 0.0 and rough[1:] @ rough[:-1] < _WHITE * order / (order + 1) * (rough @ rough):
+            break
+    else:
+        return same
+    if float((values**2).mean()) < _ABOVE * mean:
+        return same
+    own = np.convolve(values**2, weights, "valid")
+    size = uniform_filter1d(values**2, _NEAR, mode="nearest")
+    variance = np.full(len(shown), mean)
+    for _ in range(_TURNS):  # the scatter of a squared difference grows with its own expectation
+        terms = np.column_stack([np.ones(len(own)), own]) / variance[:, None]
+        scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
+        (a, b), _residual = nnls(terms / scale, shown / variance)
+        a, b = max(a / scale[0], 1e-6 * mean), b / scale[1]
+        variance = a + b * own
+    gain = 0.5 * float((np.log(mean / variance) + shown / mean - shown / variance).sum())
+    return np.sqrt(a + b * size) if b > 0.0 and gain > _GROWS else same
 
 
 def is_film(measurement: Measurement) -> bool:

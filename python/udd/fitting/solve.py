@@ -26,7 +26,15 @@ DONE = 0.01
 
 
 class SolveError(FitError):
-    """A fit that could not be solved, as against one that was not put right."""
+    """A fit that could not be solved, as against one that was not put right.
+
+    Attributes
+    ----------
+    undetermined : tuple of str
+        Parameters that can change together without changing the fit.
+    """
+
+    undetermined: tuple[str, ...] = ()
 
 
 def solve(
@@ -43,7 +51,10 @@ def solve(
     try:
         found = _core.solve(problem.at(point), iterations, decrease)
     except ValueError as error:
-        raise SolveError(_said(error, problem)) from error
+        unsolved = SolveError(_said(error, problem))
+        if len(error.args) == 2:
+            unsolved.undetermined = tuple(problem.free[k].name for k in error.args[1])
+        raise unsolved from error
     record = problem.record
     names = [f.name for f in problem.free]
     sets = tuple(FilmParameters(*own) for own in found["sets"])
