@@ -73,6 +73,7 @@ def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
     # Nothing of the library passes, but the model loses the motion.
     monkeypatch.setattr("udd.discovery.validation.confirmation.ALPHA", 0.0)
     monkeypatch.setattr("udd.discovery.search.ALPHA", 0.0)
+    monkeypatch.setattr("udd.discovery.acceptance.ALPHA", 0.0)
     monkeypatch.setattr("udd.discovery.score_rounds.ALPHA", 0.0)
     monkeypatch.setattr(held_out_errors, "_LOST", 0.0)
     said = udd.discover(measured, known)
