@@ -200,6 +200,7 @@ class Acceptance:
 
     def _once(self, near: list[TrialFit]) -> list[TrialFit]:
         """Without formulas that are one of the library's laws in other words."""
+        # Without this "friction = a |Omega| |Omega|" is told as an alternative to quadratic drag.
         known = [t for t in near if t.curve is None]
         return [
             t
@@ -211,6 +212,7 @@ class Acceptance:
         self, near: list[TrialFit], costs: dict[int, float], foretelling: Foretelling
     ) -> list[TrialFit]:
         """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
+        # Without this a cubic drag stands for a pendulum's quadratic drag and dry friction.
         best = near[0] if near else None
         for other in near[1:]:
             tied = costs[id(other)] - costs[id(near[0])] <= _TIED
@@ -293,6 +295,7 @@ class Acceptance:
 
     def _says_less(self, formula: TrialFit, chosen: TrialFit, nats: float) -> bool:
         """Whether a formula is the chosen law in other words, or has more constants for nothing."""
+        # Without this a formula beside dry friction leaves the verdict at "form not identified".
         return same_law(formula.compared, chosen.compared) or (
             nats > 0 and len(formula.names) > len(chosen.names)
         )

@@ -298,6 +298,7 @@ def _begin(search: Search, known: SearchState) -> SearchState:
     """
     if not (ran_away(known.part) or ran_away(known.whole)):
         return known
+    # Without this a strong cubic drag is taken for a formula of the friction.
     try:
         part, whole = both(as_stated, known.part, known.whole)
         return SearchState(part, whole, search.tests.errors(part))

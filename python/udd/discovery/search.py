@@ -208,6 +208,7 @@ class Search:
         A camera may well be farther off than is usual: held-out data that are foretold better beyond doubt
         with what it came to say that it is.
         """
+        # Without this a strong cubic drag is followed by an eccentric mass and a curve that are not there.
         names = set(state.part.parameters)
         if all(f.name in names for f in self.free):
             return state
