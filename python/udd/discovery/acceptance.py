@@ -48,7 +48,7 @@ _EQUALS = 10  # forms between which all data decide
 
 @dataclass(frozen=True)
 class Step:
-    """An addition that was accepted: one candidate, two or three together, or a curve.
+    """An addition that was accepted: one candidate, two together, or a curve.
 
     Attributes
     ----------

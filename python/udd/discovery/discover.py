@@ -67,7 +67,7 @@ def discover(
 
     *Candidates.* The model is fitted to the first 60 % of the record. A score test (Rao) ranks all effects of
     the library around that fit, and penalised splines of every coordinate. The best are fitted in full.
-    Effects that fail alone are tried in twos and threes.
+    Effects that fail alone are tried in twos.
 
     *Acceptance.* An effect is added if it passes these tests:
 

@@ -266,7 +266,7 @@ class Search:
         return [replace(best, why="records"), *(r for r in near if r is not best)]
 
     def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
-        """The best addition of the library that passes: an effect, or some of them together.
+        """The best addition of the library that passes: an effect, or two of them together.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
@@ -285,11 +285,7 @@ class Search:
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
             singles += self._pairs(current, scores, loose)
-        return (
-            self.tests.best(current, singles, scores)
-            or self._group(current, scores, 2, loose)
-            or self._group(current, scores, 3, loose)
-        )
+        return self.tests.best(current, singles, scores) or self._two_together(current, scores, loose)
 
     def _located(
         self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
@@ -354,15 +350,15 @@ class Search:
         self._trying([" with ".join(c.title for c in group) for group in groups])
         return fitted_ones(self._each(tried, groups))
 
-    def _group(
-        self, current: SearchState, scores: ScoreRound, size: int, loose: set[str]
+    def _two_together(
+        self, current: SearchState, scores: ScoreRound, loose: set[str]
     ) -> tuple[Step, SearchState] | None:
-        """Several effects at once that pass only together."""
-        best, number = scores.library.groups(size, _TRIED)
+        """Two effects at once that pass only together."""
+        best, number = scores.library.pairs(_TRIED)
         likely = [
             [s.candidate for s in group]
             for group, fall in best
-            if len({s.candidate.effect.name for s in group} - loose) == size
+            if len({s.candidate.effect.name for s in group} - loose) == 2
             and fall > scores.fit.faults
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
