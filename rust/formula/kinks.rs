@@ -36,6 +36,17 @@ impl Kink {
         }
     }
 
+    /// What it is called in a formula's text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kink::Abs => "abs",
+            Kink::Sign => "sign",
+            Kink::Min => "min",
+            Kink::Max => "max",
+            Kink::Where => "where",
+        }
+    }
+
     /// Whether its value jumps at the surface.
     fn jumps(self) -> bool {
         matches!(self, Kink::Sign | Kink::Where)

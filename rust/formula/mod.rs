@@ -122,6 +122,43 @@ impl Op {
             Op::On(kink, _) => kink.takes(),
         }
     }
+
+    /// What it is called in a formula's text; where it stands for what is pushed, what that is.
+    pub fn name(self) -> &'static str {
+        match self {
+            Op::Push(Leaf::Number(_)) => "number",
+            Op::Push(Leaf::Time) => "t",
+            Op::Push(Leaf::State(_)) => "state",
+            Op::Push(Leaf::Rate(_)) => "rate",
+            Op::Push(Leaf::Parameter(_)) => "parameter",
+            Op::Push(Leaf::Input(_)) => "input",
+            Op::Unary(Unary::Neg) | Op::Binary(Binary::Sub) => "-",
+            Op::Unary(Unary::Power(_)) | Op::Binary(Binary::Power) => "^",
+            Op::Binary(Binary::Add) => "+",
+            Op::Binary(Binary::Mul) => "*",
+            Op::Binary(Binary::Div) => "/",
+            Op::Unary(function) => name_in(&parse::FUNCTIONS, function),
+            Op::Binary(function) => name_in(&parse::BINARY, function),
+            Op::Spline(spline) => parse::SPLINES[usize::from(spline.periodic)],
+            Op::Where => parse::WHERE,
+            Op::On(kink, _) => kink.name(),
+        }
+    }
+
+    /// The number that it holds: a number pushed, which of its kind is pushed, or a whole exponent.
+    pub fn number(self) -> f64 {
+        match self {
+            Op::Push(Leaf::Number(value)) => value,
+            Op::Push(Leaf::State(n) | Leaf::Rate(n) | Leaf::Parameter(n) | Leaf::Input(n)) => n as f64,
+            Op::Unary(Unary::Power(n)) => f64::from(n),
+            _ => 0.0,
+        }
+    }
+}
+
+/// The name of a function in the grammar's list.
+fn name_in<F: PartialEq>(list: &[(&'static str, F)], function: F) -> &'static str {
+    list.iter().find(|(_, own)| *own == function).map_or("", |(name, _)| name)
 }
 
 /// Where a formula is evaluated.

@@ -5,6 +5,7 @@ mod ensemble;
 mod errors;
 mod estimate;
 mod fitted;
+mod formula;
 mod image;
 mod interrupt;
 mod jobs;
@@ -28,6 +29,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     effects::register(module)?;
     model::register(module)?;
+    formula::register(module)?;
     simulate::register(module)?;
     lyapunov::register(module)?;
     section::register(module)?;

@@ -111,6 +111,9 @@ macro_rules! with_wide_model {
 }
 pub(crate) use with_wide_model;
 
+/// The kinds of models that are compiled, beside the user's own; `udd.models` has a file of that name for each.
+const KINDS: [&str; 3] = ["dle", "disk", "pendulum"];
+
 /// The slot of a user's own effect, its formula, its parameters' names, and those of the amplitudes.
 type FormulaSpec = (String, String, Vec<String>, Vec<String>);
 /// An effect's name, momentum and treatment, and its formula where it is a user's own.
@@ -514,6 +517,12 @@ fn has_series(model: &Bound<'_, PyAny>) -> PyResult<bool> {
     Ok(with_model!(&model, |family, values| tape(family, &[values.to_vec()]).is_some()))
 }
 
+/// The kinds of models that are compiled.
+#[pyfunction]
+fn model_kinds() -> Vec<&'static str> {
+    KINDS.to_vec()
+}
+
 /// Names and units of a model's parameters, in order.
 #[pyfunction]
 fn model_parameters(model: &Bound<'_, PyAny>) -> PyResult<Vec<(String, &'static str)>> {
@@ -581,6 +590,7 @@ fn observed<'py>(
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(formula_bodies, module)?)?;
     module.add_function(wrap_pyfunction!(has_series, module)?)?;
+    module.add_function(wrap_pyfunction!(model_kinds, module)?)?;
     module.add_function(wrap_pyfunction!(model_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(observed, module)?)?;
     module.add_function(wrap_pyfunction!(rates, module)?)

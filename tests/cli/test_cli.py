@@ -195,7 +195,7 @@ def test_discover_tells_the_verdict_first(
     assert out.startswith("effect ")
     assert "quadratic drag" in out
     assert "noise floor" in out
-    assert "\n  noise: theta 0.0" in out
+    assert "\n  A frame is good to: theta 0.0" in out
     assert out.isascii()  # for terminals of every locale
     assert err == ""  # no progress where nobody watches
     written = page.read_text(encoding="utf-8")
@@ -208,6 +208,47 @@ def test_discover_as_json(swing: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert found["verdict"] == discovered.pendulum().verdict
     assert found["effects"]
     assert [one["name"] for one in found["noise"]] == ["theta"]
+
+
+def test_a_record_is_held_out_by_its_name_or_number(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(0, 30, 0.06)
+    files = [tmp_path / f"{name}.csv" for name in "abc"]
+    for k, file in enumerate(files):
+        truth = udd.Model(["x", "v"], {"x": "v", "v": "-4*x - 0.1*v - 0.08*abs(v)*v"}, {})
+        x = udd.simulate(truth, t, [1.0 + k, 0.0]).state[:, 0]
+        udd.Measurement(t, {"x": x + 2e-3 * rng.standard_normal(len(t))}).to_csv(file)
+    model = tmp_path / "m.json"
+    equations = {"x": "v", "v": "-k*x - c*v"}
+    model.write_text(
+        json.dumps({"states": ["x", "v"], "equations": equations, "parameters": {"k": 4.0, "c": 0.1}})
+    )
+    argv = ["discover", *files, "--model", model, "--report", tmp_path / "page.html", "--held-out"]
+    found = data([*argv, files[0]], capsys)
+    assert found["held_out_records"] == [0]
+    assert found["verdict"] == "effect identified" and len(found["effects"]) == 1
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Whole records, by number 0, were held back." in page
+    assert "b.csv" in page  # what is shown
+
+    # It is what Python's is, and a number says the same.
+    records = [udd.read_measurement(file, states=["x"]) for file in files]
+    by_hand = udd.discover(
+        records, udd.Model(["x", "v"], equations, {"k": 4.0, "c": 0.1}), held_out=[0], budget=0.01
+    )
+    short = data([*argv, "0", "--budget", "0.01"], capsys)
+    assert short["held_out_records"] == [0] and short["verdict"] == by_hand.verdict
+    assert short["held_out_from_s"] == by_hand.to_dict()["held_out_from_s"]
+
+    assert "is none of the files" in failed([*argv, "d.csv"], capsys)
+    assert "number from 0 to 2" in failed([*argv, "3"], capsys)
+    assert "none is left to fit" in failed([*argv, "0", "--held-out", "1", "--held-out", "2"], capsys)
+    assert "does not go with --each" in failed([*argv, "0", "--each", "k"], capsys)
+    assert "takes several files" in failed(
+        ["discover", files[0], "--model", model, "--held-out", "0"], capsys
+    )
 
 
 # --- bad input: one sentence, exit code 1, nothing written

@@ -7,10 +7,10 @@ import pytest
 
 import udd
 from test_confirmed import in_air
-from udd.cli.discover import describe
 from udd.discovery import time_budget
 from udd.errors import FitError
 from udd.fitting.thinning import thinned
+from udd.report import as_text, summary_of
 
 
 def test_a_search_without_time_says_so_and_claims_nothing(tmp_path):
@@ -19,7 +19,7 @@ def test_a_search_without_time_says_so_and_claims_nothing(tmp_path):
     assert found.effects == [] and found.scans == []
     assert found.stopped == "scoring candidates" and found.to_dict()["stopped"] == found.stopped
     assert found.verdict != "nothing missing"
-    assert "The search ended after 1e-06 s, as asked" in describe(found).splitlines()[0]
+    assert "The search ended after 1e-06 s, as asked" in as_text(summary_of(found)).splitlines()[0]
     assert said == ["fitting the known model", "fitting the model as found"]
     found.report(tmp_path / "page.html")
     assert "as asked" in (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -30,7 +30,9 @@ def test_a_search_whose_model_explains_its_data_is_not_finished_without_time():
     right = model.with_effects([udd.effects.quadratic_drag(c=0.02)])
     found = udd.discover(measured, right, budget=1e-6)
     assert found.verdict == "search not finished"
-    assert describe(found).startswith("search not finished: Whether something is missing is not known yet")
+    assert as_text(summary_of(found)).startswith(
+        "search not finished: Whether something is missing is not known yet"
+    )
 
 
 def test_what_passed_before_the_time_was_up_stands(monkeypatch):
@@ -45,7 +47,7 @@ def test_what_passed_before_the_time_was_up_stands(monkeypatch):
     found = udd.discover(*in_air(), budget=100.0)
     assert [f.title for f in found.effects] == ["quadratic drag"]
     assert found.stopped == "scoring candidates for a further effect"
-    assert "what else may be missing was not tried" in describe(found).splitlines()[0]
+    assert "what else may be missing was not tried" in as_text(summary_of(found)).splitlines()[0]
 
 
 @pytest.mark.parametrize("budget", [0.0, -1.0, "soon", float("nan")])

@@ -12,12 +12,11 @@ import pytest
 
 import discovered
 import udd
-from udd.cli.discover import describe
-from udd.discovery.search import Search
+from udd.discovery.acceptance import Acceptance
 from udd.discovery.validation import held_out_errors
 from udd.discovery.validation.held_out_errors import confirmed, misses_the_motion
 from udd.fitting import record_of
-from udd.report import wording
+from udd.report import as_text, summary_of, wording
 
 
 def in_air() -> tuple[udd.Measurement, udd.Pendulum]:
@@ -31,12 +30,12 @@ def in_air() -> tuple[udd.Measurement, udd.Pendulum]:
 
 @pytest.mark.parametrize("ratio", [(0.9, 0.8, 1.02), (1.2, 1.1, 1.3), (0.5, math.nan, math.nan)])
 def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path, ratio):
-    monkeypatch.setattr(Search, "improvement", lambda *_: ratio)
+    monkeypatch.setattr(Acceptance, "improvement", lambda *_: ratio)
     found = udd.discover(*in_air())
     assert found.verdict == "fits the first part, not confirmed"
     assert found.effects == [] and found.model.effects == ()
     assert [(near.title, near.why) for near in found.rejected] == [("quadratic drag", "unconfirmed")]
-    first = describe(found).splitlines()[0]
+    first = as_text(summary_of(found)).splitlines()[0]
     assert first.startswith(
         "fits the first part, not confirmed: Not confirmed: quadratic drag fits the first"
     )
@@ -72,8 +71,9 @@ def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
     disk = discovered.nothing()
     assert not misses_the_motion(disk.error_before, disk.fit.record, ~disk.fit.record.first(0.6))
     # Nothing of the library passes, but the model loses the motion.
-    monkeypatch.setattr("udd.discovery.validation.acceptance_tests.ALPHA", 0.0)
+    monkeypatch.setattr("udd.discovery.validation.confirmation.ALPHA", 0.0)
     monkeypatch.setattr("udd.discovery.search.ALPHA", 0.0)
+    monkeypatch.setattr("udd.discovery.acceptance.ALPHA", 0.0)
     monkeypatch.setattr("udd.discovery.score_rounds.ALPHA", 0.0)
     monkeypatch.setattr(held_out_errors, "_LOST", 0.0)
     said = udd.discover(measured, known)

@@ -12,11 +12,12 @@ import pytest
 
 import udd
 from udd.cli import main
+from udd.discovery.acceptance import SearchState
 from udd.discovery.discover import TRAIN
 from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.term_library import given_terms
-from udd.discovery.search import Search, SearchState
+from udd.discovery.search import Search
 from udd.discovery.time_budget import Clock
 from udd.discovery.trial_fits import fitted_ones, of_library
 from udd.errors import FitError, ModelError
@@ -204,12 +205,12 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
     train = frames.first(TRAIN)
     part, whole = (fit_record(record, some, known, search=True) for some in (frames.part(train), frames))
     search = Search(frames, ~train, Clock(None, lambda _text: None), motion_time_scale(part))
-    states, accepted, rounds = [SearchState(part, whole, search.errors(part))], [], []
+    states, accepted, rounds = [SearchState(part, whole, search.tests.errors(part))], [], []
     for title in ("v^3 in v'", "v in v'"):
         rounds.append(score_round(states[-1].part))
         (wanted,) = (s for s in rounds[-1].library.scored if s.candidate.title == title)
         trial = of_library(states[-1].part, [wanted.candidate], list(wanted.amplitudes))
-        step = search._accept(states[-1], fitted_ones([trial]), rounds[-1])
+        step = search.tests.best(states[-1], fitted_ones([trial]), rounds[-1])
         assert step
         accepted.append(step[0])
         states.append(step[1])

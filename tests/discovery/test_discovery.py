@@ -14,7 +14,7 @@ import simulated
 import udd
 from udd.discovery.scoring.candidates import ripples
 from udd.discovery.scoring.score_scan import scan, scan_ripples, strongest_ripple
-from udd.discovery.validation import acceptance_tests
+from udd.discovery.validation import confirmation
 from udd.errors import FitError
 from udd.fitting import extend, fit_record, record_of
 from udd.report import wording
@@ -102,8 +102,8 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     ],
 )
 def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, found):
-    monkeypatch.setattr(acceptance_tests, "held_out_ratio", lambda *_: ratio)
-    monkeypatch.setattr(acceptance_tests, "_expected", lambda *_: expected)
+    monkeypatch.setattr(confirmation, "held_out_ratio", lambda *_: ratio)
+    monkeypatch.setattr(confirmation, "_expected", lambda *_: expected)
     assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0).effects) == found
 
 
@@ -113,7 +113,7 @@ def test_both_halves_of_a_record_must_want_an_effect(c):
     measured, _states = simulated.film(truth, np.random.default_rng(12), 20.0)
     before = fit_record(measured, record_of(measured), udd.Disk(0.045), search=True)
     after = extend(before, [E.quadratic_drag()], [0.0])
-    assert acceptance_tests._split_half_test(acceptance_tests.same_level(before, after), 1.0) == (c > 0)
+    assert confirmation._split_half_test(confirmation.same_level(before, after), 1.0) == (c > 0)
 
 
 def test_a_shape_between_those_tried_is_found():
@@ -238,7 +238,7 @@ def test_what_comes_nearest_is_told_but_not_added():
     assert "quadratic drag" in [near.title for near in found.rejected]
     for near in found.rejected:
         assert near.why == "chance"
-        assert near.p >= acceptance_tests.ALPHA
+        assert near.p >= confirmation.ALPHA
         assert near.ratio[2] < 1.0
         assert near.errors.whole < found.error_before.whole
     assert [near["name"] for near in found.to_dict()["refused"]] == [n.effect.name for n in found.rejected]

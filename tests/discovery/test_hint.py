@@ -12,9 +12,9 @@ import pytest
 import discovered
 import udd
 from simulated import film
-from udd.cli.discover import describe
 from udd.discovery.experiment_design import SEPARATED, _films
 from udd.fitting import at_level, fit_record, record_of
+from udd.report import as_text, summary_of
 
 DRIVE = 0.042
 RELAXED = udd.Disk(DRIVE, effects=[udd.effects.relaxation(b=1.5)])
@@ -41,7 +41,7 @@ def test_a_second_drive_is_proposed_for_slip_or_relaxation():
     # Neither another start nor a longer film at the one drive would tell.
     telling = [hint for hint in found.hints if any("slip c Z" in title for title in hint.parts)]
     assert all("times the drive" in hint.design for hint in telling)
-    assert found.hint.text in describe(found)
+    assert found.hint.text in as_text(summary_of(found))
     json.dumps([hint.to_dict() for hint in found.hints])
 
 

@@ -1,4 +1,4 @@
-"""Candidates together: what a group explains follows from one solve's gradient and information."""
+"""Candidates together: what a pair explains follows from one solve's gradient and information."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ from udd.discovery.scoring import score_scan
 from udd.discovery.scoring.score_scan import Scan, Scored
 
 
-@pytest.mark.parametrize("size", [1, 2, 3])
-def test_a_group_lowers_chi2_as_least_squares_do(size: int) -> None:
+def test_a_pair_lowers_chi2_as_least_squares_do() -> None:
     rng = np.random.default_rng(4)
     columns = [[0], [1, 2], [3], [4], [5]]
     design = rng.standard_normal((60, 6))
     design[:, 5] = design[:, 4] + 1e-7 * rng.standard_normal(60)  # two candidates that act alike
     data = design @ [0.0, 2.0, -1.0, 0.5, 0.3, 0.0] + rng.standard_normal(60)
     scored = [Scored(str(k), 0.0, 1.0, (), (), k == 2, True) for k in range(5)]  # type: ignore[arg-type]
-    found, number = Scan(scored, design.T @ data, design.T @ design, columns, 2.0).groups(size)
+    found, number = Scan(scored, design.T @ data, design.T @ design, columns, 2.0).pairs()
     assert number == len(found)
 
     usable = [0, 1, 3, 4]  # the third is absorbed
     expected = {}
-    for group in itertools.combinations(usable, size):
+    for group in itertools.combinations(usable, 2):
         if {3, 4} <= set(group):
             continue
         own = design[:, [c for k in group for c in columns[k]]]
@@ -38,12 +37,12 @@ def test_a_group_lowers_chi2_as_least_squares_do(size: int) -> None:
     )
 
 
-def test_of_millions_of_groups_those_of_the_strongest_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(score_scan, "_MOST_GROUPS", 10)
+def test_of_millions_of_pairs_those_of_the_strongest_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(score_scan, "_MOST_PAIRS", 10)
     strength = [3.0, 9.0, 1.0, 7.0, 5.0, 8.0]
     scored = [Scored(str(k), chi2, 1.0, (), (), False, True) for k, chi2 in enumerate(strength)]  # type: ignore[arg-type]
     columns = [[k] for k in range(6)]
-    found, number = Scan(scored, np.sqrt(strength), np.eye(6), columns, 1.0).groups(2)
+    found, number = Scan(scored, np.sqrt(strength), np.eye(6), columns, 1.0).pairs()
     # Five candidates make ten pairs, six make fifteen, which all count.
     assert len(found) == 10 and number == 15
     assert [s.candidate for s in found[0][0]] == ["1", "5"]

@@ -11,8 +11,8 @@ import pytest
 import discovered
 import simulated
 import udd
-from udd.cli.discover import describe
 from udd.errors import FitError
+from udd.report import as_text, summary_of
 
 E = udd.effects
 DRIVE = 0.039
@@ -123,8 +123,8 @@ def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
     (remark,) = doubted.remarks
     assert remark.startswith("The fit leaves what was stated: W = 0.0084 m/s")
     # It stands beside the verdict, not instead of it.
-    assert describe(doubted).splitlines()[0] == describe(found).splitlines()[0]
-    assert f"  remark: {remark}" in describe(doubted)
+    assert as_text(summary_of(doubted)).splitlines()[0] == as_text(summary_of(found)).splitlines()[0]
+    assert f"  {remark}\n" in as_text(summary_of(doubted))
     doubted.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert f'<p class="warn">{remark}</p>' in page and "<strong>effect" in page

@@ -20,7 +20,7 @@ from udd.discovery.scoring.forcing import Score
 from udd.discovery.scoring.score_scan import _score
 from udd.discovery.scoring.term_library import waves
 from udd.discovery.trial_fits import TrialFit
-from udd.discovery.validation.acceptance_tests import _expected
+from udd.discovery.validation.confirmation import _expected
 
 
 def oscillator() -> udd.Discovery:

@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .discover import describe
 from .options import new
 from .output import CommandResult, is_terminal, status_line
 
@@ -24,9 +23,10 @@ def add(commands: Any) -> None:
 def run(args: argparse.Namespace) -> CommandResult:
     """Do it."""
     from udd.demo.pipeline import demo
+    from udd.report import as_text, summary_of
 
     with status_line() as tell:
         made = demo(args.out, null=args.null, progress=tell, bar=is_terminal())
-    text = f"{describe(made.discovery)}\nmeasurement: {made.measurement}\nreport: {made.report}"
+    text = f"{as_text(summary_of(made.discovery))}\nmeasurement: {made.measurement}\nreport: {made.report}"
     data = {"measurement": made.measurement, "report": made.report, **made.discovery.to_dict()}
     return CommandResult(text, data)

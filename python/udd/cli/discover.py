@@ -7,18 +7,16 @@ import gc
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from udd._util import background_import
+from udd.errors import UddError
 
 from .export import OutputFile
 from .fit import options
 from .inputs import add_input, check_early, inputs_of
 from .options import new
 from .output import CommandResult, status_line
-
-if TYPE_CHECKING:
-    from udd.discovery import Discovery
 
 
 def add(commands: Any) -> None:
@@ -30,6 +28,13 @@ def add(commands: Any) -> None:
         "Find the effect that the model lacks, from a film or a measurement, or from several jointly.",
     )
     add_input(parser, several=True)
+    parser.add_argument(
+        "--held-out",
+        action="append",
+        metavar="FILE",
+        help="of several files one that no fit sees, by its name or its number from 0, instead of the last "
+        "40 %% of each; repeatable",
+    )
     parser.add_argument(
         "--budget",
         type=float,
@@ -46,20 +51,26 @@ def run(args: argparse.Namespace) -> CommandResult:
     # Modules, fits and figures are many objects that stay: to search them for garbage takes a second.
     gc.set_threshold(100_000, 20, 100)
     from udd.discovery import discover
+    from udd.report import as_text, summary_of
 
     check_early(args)
+    held_out = held_out_of(args)
     given = inputs_of(args)
     if args.report is not None:
         background_import.importing(
             "matplotlib.figure", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_agg"
         )
     with status_line() as tell:
-        found = discover(*given.measured, budget=args.budget, progress=tell, **options(args))
+        found = discover(
+            *given.measured, held_out=held_out, budget=args.budget, progress=tell, **options(args)
+        )
         if args.report is not None:
             tell("writing the report")
             command = shlex.join(["udd", *sys.argv[1:]])
-            found.report(args.report, film=given.films[0], source=given.files[0], command=command)
-    text, data = describe(found), {**given.told, **found.to_dict()}
+            # The page shows the first record that was fitted.
+            shown = next(k for k in range(len(given.files)) if k not in found.held_out)
+            found.report(args.report, film=given.films[shown], source=given.files[shown], command=command)
+    text, data = as_text(summary_of(found)), {**given.told, **found.to_dict()}
     data["hints"] = [hint.to_dict() for hint in found.hints]
     if args.report is not None:
         text += f"\nreport: {args.report}"
@@ -67,41 +78,24 @@ def run(args: argparse.Namespace) -> CommandResult:
     return CommandResult(text, data)
 
 
-def describe(found: Discovery) -> str:
-    """A discovery in a few lines, the verdict first."""
-    from udd.report import wording
-
-    numbers = wording.headline(found)
-    lines = [f"{found.verdict}: {wording.verdict(found)}"]
-    lines += [f"  remark: {plain(remark)}" for remark in found.remarks]
-    for effect in found.effects:
-        unit = {p.name: p.unit for p in effect.effect.spec.parameters}
-        is_spline = wording.is_spline(effect.effect)
-        values = ", ".join(
-            " ".join(filter(None, [f"{name} = {_with_error(value, effect.errors.get(name))}", unit[name]]))
-            for name, value in effect.parameters.items()
-        )
-        lines.append(f"  {effect.title}: {effect.equation}" + ("" if is_spline else f", {values}"))
-    span, at = plain(numbers.span), plain(numbers.floor_at)
-    if found.effects:
-        lines.append(f"  held-out error {span}: {numbers.before} -> {numbers.after}")
-        lines.append(f"  ratio {numbers.ratio}, 95 % interval {numbers.interval}")
-    else:
-        lines.append(f"  held-out error {span}: {numbers.before}")
-    lines += [f"  nearest: {plain(sentence)}" for sentence in wording.rejected(found)]
-    lines.append(f"  noise floor after {at}: {numbers.floor}")
-    lines.append(f"  noise: {wording.noise(found)}")
-    for other in found.alternatives:
-        lines.append(f"  could equally be {other.title}: {other.effect.expression}. {wording.limit(other)}")
-    if found.hint is not None:
-        lines.append(f"  to tell: {found.hint.text}")
-    return "\n".join(lines)
-
-
-def plain(text: str) -> str:
-    """For terminals of any encoding."""
-    return text.replace("\u00a0", " ").replace("χ²", "chi2")
-
-
-def _with_error(value: float, error: float | None) -> str:
-    return f"{value:.5g}" if error is None else f"{value:.5g} +- {error:.2g}"
+def held_out_of(args: argparse.Namespace) -> list[int] | None:
+    """The numbers of the files that no fit sees; refused before films are tracked for it."""
+    if args.held_out is None:
+        return None
+    if args.each is not None:
+        raise UddError("--held-out does not go with --each: nothing would say what only a file held out has")
+    if len(args.files) == 1:
+        raise UddError("--held-out takes several files: of one its last part is held out")
+    names = [str(file) for file in args.files]
+    numbers = {str(k): k for k in range(len(names))} | {name: k for k, name in enumerate(names)}
+    held_out = set()
+    for text in args.held_out:
+        if str(Path(text)) not in numbers:
+            raise UddError(
+                f"--held-out {text} is none of the files {', '.join(names)}, "
+                f"nor a number from 0 to {len(names) - 1}"
+            )
+        held_out.add(numbers[str(Path(text))])
+    if len(held_out) == len(names):
+        raise UddError("--held-out names all files: none is left to fit")
+    return sorted(held_out)

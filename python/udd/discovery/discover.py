@@ -15,7 +15,7 @@ from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
 from udd.discovery.validation.by_record import by_record, contested
-from udd.discovery.validation.camera_faults import camera_shows
+from udd.discovery.validation.held_camera import camera_shows
 from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
 from udd.discovery.validation.sensor_drift import FORETELLS, as_random
 from udd.effects import Effect
@@ -38,8 +38,9 @@ from udd.measurement import Measurement
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
+from .acceptance import SearchState, Step
 from .results import AddedEffect, Discovery, RejectedEffect
-from .search import Search, SearchState, Step, both
+from .search import Search, both
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 
@@ -66,7 +67,7 @@ def discover(
 
     *Candidates.* The model is fitted to the first 60 % of the record. A score test (Rao) ranks all effects of
     the library around that fit, and penalised splines of every coordinate. The best are fitted in full.
-    Effects that fail alone are tried in twos and threes.
+    Effects that fail alone are tried in twos.
 
     *Acceptance.* An effect is added if it passes these tests:
 
@@ -174,7 +175,7 @@ def discover(
     base, *others_too = checked_units(measurement, model, options, fits)
     baseline = others_too[0] if others_too else base
     search = Search(record, ~train, clock, motion_time_scale(base), given, base.problem.free)
-    before = search.errors(base)
+    before = search.tests.errors(base)
     known = SearchState(base, baseline, before)
     begin = _begin(search, known)
     end = search.run(begin, known)
@@ -189,7 +190,7 @@ def discover(
     doubtful = [a for a in others if a.likeness < SAME]
     left = bool(found) and lacks_more(final, end.errors)
     excused = camera_shows(known.whole, end.whole) if found and not end.stopped else None
-    ratio = search.improvement(before, end.errors) if found else (1.0, 1.0, 1.0)
+    ratio = search.tests.improvement(before, end.errors) if found else (1.0, 1.0, 1.0)
     # Random forces foretell nothing: what makes free runs so much better is a law.
     random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
     lost = not found and misses_the_motion(before, record, ~train)
@@ -297,9 +298,10 @@ def _begin(search: Search, known: SearchState) -> SearchState:
     """
     if not (ran_away(known.part) or ran_away(known.whole)):
         return known
+    # Without this a strong cubic drag is taken for a formula of the friction.
     try:
         part, whole = both(as_stated, known.part, known.whole)
-        return SearchState(part, whole, search.errors(part))
+        return SearchState(part, whole, search.tests.errors(part))
     except FitError:
         return known
 

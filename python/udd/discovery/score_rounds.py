@@ -107,6 +107,7 @@ def states_first(curves: list[Curve]) -> list[Curve]:
     and Z do.
     """
 
+    # Without this an uneven grip is written as a function of atan2(Y, Z), not of Y.
     def prior_penalty(own: Coordinate) -> float:
         return (
             2 * EVIDENCE_MARGIN

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,101 +16,46 @@ from udd._util import chi_squared
 from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
-from udd.discovery.scoring.score_scan import Scan, Scored
+from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.symbolic.formulas import Formula, formulas_for
-from udd.discovery.validation.acceptance_tests import Pair, confirmed_by, same_level
 from udd.discovery.validation.by_record import by_record, contested
+from udd.discovery.validation.confirmation import same_level
 from udd.discovery.validation.held_out_errors import (
     Errors,
-    Ratio,
-    comparison_horizon,
     confirmed,
-    held_out_errors,
-    improvement,
-    whole_improvement,
 )
-from udd.discovery.validation.predictive_comparison import Foretelling
-from udd.discovery.validation.sensor_drift import as_random, drift_gain
+from udd.discovery.validation.sensor_drift import as_random
 from udd.effects.user_defined import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released
 from udd.fitting.parameters import Free
 
-from .results import Alternative, RejectedEffect
+from .acceptance import Acceptance, SearchState, Step
+from .results import RejectedEffect
 from .score_rounds import ScoreRound, score_round, states_first, with_surfaces
-from .thresholds import ALPHA, Confirmation, RejectionReason
+from .thresholds import ALPHA, RejectionReason
 from .time_budget import Clock, TimeUpError
 from .trial_fits import (
     TrialFit,
     fitted_ones,
+    from_none,
     needed_in,
     of_curve,
     of_formula,
     of_library,
     one_of_each,
-    same_law,
 )
 
 From = TypeVar("From")
 To = TypeVar("To")
 
-_SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
-_WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
-_DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion held, may be all there is
 _TRIED = 6  # of the best candidates, fitted in full
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
 _FORMULAS = 3  # for each, fitted in full
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
-_TIED = (
-    4 * EVIDENCE_MARGIN
-)  # in chi2: forms that differ by less are compared by all data and by what they foretell
-_FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
-_EQUALS = 10  # forms between which all data decide
-
-
-@dataclass(frozen=True)
-class Step:
-    """An addition that was accepted: one candidate, two or three together, or a curve.
-
-    Attributes
-    ----------
-    candidates : list of Candidate
-    curve : Curve or None
-        The curve that was located, where that is what was added or what a formula was found for.
-    chi2, p : float
-        By how much chi2 fell, and the probability of that by chance.
-    ratio : tuple of float
-        Cost of the held-out frames after over before, with its 95 % interval.
-    witness : {"held", "fitted", "halves"}
-        What bears it out, see :func:`udd.discovery.validation.acceptance_tests.confirmed_by`.
-    alternatives : list of Alternative
-    price : float
-        What its freedom costs, in chi2; more for a formula, and for a curve, than for what physics knows.
-    """
-
-    candidates: list[Candidate]
-    curve: Curve | None
-    chi2: float
-    p: float
-    ratio: Ratio
-    witness: Confirmation
-    alternatives: list[Alternative]
-    price: float
-
-
-@dataclass(frozen=True)
-class SearchState:
-    """Where the search stands: fits of the first part and of all data, and held-out errors.
-
-    Where whole records are held out both are one fit, of all other records.
-    """
-
-    part: Fit
-    whole: Fit
-    errors: Errors
 
 
 def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
@@ -132,18 +76,6 @@ def _cheaper(
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
 
 
-def _clearly(ratio: Ratio) -> bool:
-    """Whether one form foretells at less cost than another, beyond doubt and by an amount that matters."""
-    return ratio[0] < _FORETOLD and ratio[2] < 1.0
-
-
-def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tuple[Candidate, Candidate]]:
-    """Which effects of one list stand in the place of which of another, those in both left out."""
-    left = [c for c in mine if c.effect not in [o.effect for o in others]]
-    right = [o for o in others if o.effect not in [c.effect for c in mine]]
-    return list(zip(left, right, strict=False))
-
-
 def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
     """The best to be tried, of a machine the forces that machines have, each in the width that scores best.
 
@@ -156,39 +88,6 @@ def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
     for one in usual:
         first.setdefault(one.candidate.effect.name, one)
     return list(first.values())[:_TRIED]
-
-
-def _chance(pair: Pair, trial: TrialFit, scores: ScoreRound) -> tuple[float, float]:
-    """By how much chi2 fell from one fit of all data to another, and the probability of that by chance."""
-    from scipy.stats import ncx2  # takes half a second to import
-
-    before, after = pair
-    inflation = after.inflation(before)
-    fall = (before.chi2 - after.chi2) / inflation
-    # What a film's faults make up is no sum of squares of chance alone.
-    return fall, min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * scores.comparisons, 1.0)
-
-
-@dataclass(frozen=True)
-class TestResult:
-    """What the tests say of a trial.
-
-    Attributes
-    ----------
-    whole : Fit
-        Of all data.
-    chi2, p, ratio, witness
-        As of a :class:`Step`; a trial that chance explains is not asked for a witness.
-    drifts : bool
-        Whether a slow drift of the sensor's zero would explain more.
-    """
-
-    whole: Fit
-    chi2: float
-    p: float
-    ratio: Ratio
-    witness: Confirmation | None
-    drifts: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,25 +118,13 @@ class Search:
         given: Sequence[Candidate] = (),
         free: Sequence[Free] = (),
     ) -> None:
-        self.record, self.held_out, self.clock, self.tell = record, held_out, clock, clock.tell
-        self.unit, self.given, self.free = unit, given, free
+        self.clock, self.tell = clock, clock.tell
+        self.given, self.free = given, free
+        self.tests = Acceptance(record, held_out, clock, unit)
 
     def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
         """Independent pieces of work side by side, as long as there is time."""
         return parallel_map(self.clock.watched(work), pieces)
-
-    def errors(self, fitted: Fit) -> Errors:
-        """Held-out errors of a fit of the first part."""
-        return held_out_errors(fitted, self.record, self.held_out, unit=self.unit)
-
-    def improvement(self, before: Errors, after: Errors) -> Ratio:
-        """Held-out error after over before.
-
-        Of the disk, which is chaotic, at the horizon of comparison; of a pendulum over the whole run.
-        """
-        if before.unit == "rad":
-            return whole_improvement(before, after)
-        return improvement(before, after, comparison_horizon(before))
 
     def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
         """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
@@ -282,7 +169,7 @@ class Search:
                 break
             known.add(titles)
             # What no library has, and free runs contradict, is no ground to search on from.
-            contradicted = self.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
+            contradicted = self.tests.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
             if accepted[-1].curve is not None and contradicted:
                 break
 
@@ -290,8 +177,8 @@ class Search:
         """How many of the steps free runs on the held-out data confirm."""
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
-            one_more = self.improvement(states[number - 1].errors, errors)
-            ratio = self.improvement(known.errors, errors)
+            one_more = self.tests.improvement(states[number - 1].errors, errors)
+            ratio = self.tests.improvement(known.errors, errors)
             if not confirmed(known.errors, ratio) or one_more[1] > 1.0:
                 continue
             # Runs that are too short to show it do not confirm what forces at random do as well.
@@ -301,7 +188,7 @@ class Search:
 
     def _unconfirmed(self, known: SearchState, steps: list[Step], end: SearchState) -> list[RejectedEffect]:
         """What passed all other tests."""
-        ratio = self.improvement(known.errors, end.errors)
+        ratio = self.tests.improvement(known.errors, end.errors)
         return [
             RejectedEffect(
                 effect=next(e for e in end.whole.model.effects if e.name == c.effect.name),
@@ -322,6 +209,7 @@ class Search:
         A camera may well be farther off than is usual: held-out data that are foretold better beyond doubt
         with what it came to say that it is.
         """
+        # Without this a strong cubic drag is followed by an eccentric mass and a curve that are not there.
         names = set(state.part.parameters)
         if all(f.name in names for f in self.free):
             return state
@@ -329,13 +217,13 @@ class Search:
             part, whole = both(partial(released, free=self.free), state.part, state.whole)
             if not (part.converged and whole.converged):
                 return state
-            errors = self.errors(part)
+            errors = self.tests.errors(part)
             strayed = ran_away(part) or ran_away(whole)
-            if strayed and not self.improvement(state.errors, errors)[2] < 1.0:
+            if strayed and not self.tests.improvement(state.errors, errors)[2] < 1.0:
                 return state
         except FitError:
             return state
-        return state if self._worse(state.errors, errors) else SearchState(part, whole, errors)
+        return state if self.tests.worse(state.errors, errors) else SearchState(part, whole, errors)
 
     def rejected(
         self, base: SearchState, scores: ScoreRound, numbers: Sequence[int] = (0,)
@@ -353,7 +241,7 @@ class Search:
         for trial in self._tried(base, list(strongest.values())[:_NEAREST]):
             if trial.fit.level < base.part.level:
                 continue
-            judged, errors = self._judged(base, trial, scores), self._errors_or_none(trial.fit)
+            judged, errors = self.tests.judged(base, trial, scores), self.tests.errors_or_none(trial.fit)
             if judged is None or errors is None:
                 continue
             why: RejectionReason = "form"
@@ -363,9 +251,9 @@ class Search:
                 why = "drift"
             elif trial.candidates[0] not in shown:
                 why = "part"
-            elif judged.witness is None or self._worse(base.errors, errors):
+            elif judged.witness is None or self.tests.worse(base.errors, errors):
                 why = "held"
-            effect, ratio = judged.whole.model.effects[-1], self.improvement(base.errors, errors)
+            effect, ratio = judged.whole.model.effects[-1], self.tests.improvement(base.errors, errors)
             answers, chi2 = by_record(base.whole, judged.whole, effect, numbers)
             title = trial.candidates[0].title
             told = RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why, answers)
@@ -379,7 +267,7 @@ class Search:
         return [replace(best, why="records"), *(r for r in near if r is not best)]
 
     def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
-        """The best addition of the library that passes: an effect, or some of them together.
+        """The best addition of the library that passes: an effect, or two of them together.
 
         What physics knows comes first: as long as something else is missing too, a curve bends to explain a
         part of that. Once effects of the library explain the data, formulas compete with them.
@@ -398,11 +286,7 @@ class Search:
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
             singles += self._pairs(current, scores, loose)
-        return (
-            self._accept(current, singles, scores)
-            or self._group(current, scores, 2, loose)
-            or self._group(current, scores, 3, loose)
-        )
+        return self.tests.best(current, singles, scores) or self._two_together(current, scores, loose)
 
     def _located(
         self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
@@ -416,7 +300,7 @@ class Search:
 
         known = [c.name for c in best(tried)]
         likely = [c for c in best(scores.curves) if c.name not in known]
-        return self._accept(current, self._curves(current, likely), scores)
+        return self.tests.best(current, self._curves(current, likely), scores)
 
     def _written(self, current: SearchState, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
         """Formulas for a curve, fitted."""
@@ -460,26 +344,22 @@ class Search:
 
     def _together(self, current: SearchState, groups: list[list[Candidate]]) -> list[TrialFit]:
         """Several effects at once fitted in full, from none."""
-
-        def tried(group: list[Candidate]) -> TrialFit | None:
-            return of_library(current.part, group, [0.0] * sum(len(c.amplitude_names) for c in group))
-
         self._trying([" with ".join(c.title for c in group) for group in groups])
-        return fitted_ones(self._each(tried, groups))
+        return fitted_ones(self._each(lambda group: from_none(current.part, group), groups))
 
-    def _group(
-        self, current: SearchState, scores: ScoreRound, size: int, loose: set[str]
+    def _two_together(
+        self, current: SearchState, scores: ScoreRound, loose: set[str]
     ) -> tuple[Step, SearchState] | None:
-        """Several effects at once that pass only together."""
-        best, number = scores.library.groups(size, _TRIED)
+        """Two effects at once that pass only together."""
+        best, number = scores.library.pairs(_TRIED)
         likely = [
             [s.candidate for s in group]
             for group, fall in best
-            if len({s.candidate.effect.name for s in group} - loose) == size
+            if len({s.candidate.effect.name for s in group} - loose) == 2
             and fall > scores.fit.faults
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
-        return self._accept(current, self._together(current, likely), replace(scores, comparisons=number))
+        return self.tests.best(current, self._together(current, likely), replace(scores, comparisons=number))
 
     def _curves(self, current: SearchState, likely: list[Curve]) -> list[TrialFit]:
         """The likeliest curves, as splines and by short formulas."""
@@ -505,7 +385,7 @@ class Search:
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
             before = states[k]
-            found = self._accept(before, self._curves(before, [last.curve]), rounds[k])
+            found = self.tests.best(before, self._curves(before, [last.curve]), rounds[k])
             if found is None:
                 continue
             if _cheaper(found, accepted[k:], states[k], states[-1]):
@@ -531,7 +411,7 @@ class Search:
             kept = [c for s in later for c in s.candidates if c.effect.name not in names]
             values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
             trial = of_library(states[k].part, kept, values)
-            found = self._accept(states[k], fitted_ones([trial]), rounds[k])
+            found = self.tests.best(states[k], fitted_ones([trial]), rounds[k])
             if found is None or not _cheaper(found, later, states[k], states[-1]):
                 continue
             left = {c.effect.name for c in kept}
@@ -539,209 +419,3 @@ class Search:
             accepted[k:] = [replace(found[0], alternatives=others)]
             states[k + 1 :], rounds[k + 1 :] = [found[1]], []
             return
-
-    def _accept(
-        self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
-    ) -> tuple[Step, SearchState] | None:
-        """The best trial that passes all tests."""
-        trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
-        if not trials:
-            return None
-        # chi2 compares only where the models are held equally tightly.
-        level = min(t.fit.level for t in trials)
-        trials = [replace(t, compared=at_level(t.fit, level)) for t in trials]
-        first, before = min(trials, key=lambda t: t.compared.chi2).compared, at_level(current.part, level)
-        unit = first.inflation(before)
-        # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
-        # knows comes before a formula, and a formula before a curve, that fit about as well.
-        trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.prior_penalty, 3))
-        paid = {id(t): t.criterion(unit) + (t.prior_penalty if t.is_curve else 0.0) for t in trials}
-        near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
-        costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
-        near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
-        foretelling = Foretelling(current.whole.record, wholes, self.unit)
-        near = self._foretelling(near, costs, foretelling)
-        # Where the best form fails a test, a clearly worse one is not named instead.
-        for chosen in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
-            trial = self._in_other_widths(current, chosen, scores.library)
-            judged = self._judged(current, trial, scores)
-            if judged is None or judged.witness is None:
-                continue
-            errors = self._errors_or_none(trial.fit)
-            if errors is not None and not self._worse(current.errors, errors):
-                others = self._alternatives(chosen, trials, scores.library, costs, foretelling)
-                step = Step(
-                    candidates=trial.candidates,
-                    curve=trial.curve,
-                    chi2=judged.chi2,
-                    p=judged.p,
-                    ratio=judged.ratio,
-                    witness=judged.witness,
-                    alternatives=others,
-                    price=trial.price + trial.prior_penalty,
-                )
-                return step, SearchState(trial.fit, judged.whole, errors)
-        return None
-
-    def _in_other_widths(self, current: SearchState, trial: TrialFit, scanned: Scan) -> TrialFit:
-        """Several effects at once, with every width of those that turn over one: a fit may be stuck at it.
-
-        Around a model that lacks two of them the width that scores best need not be near that of the fit.
-        """
-        if len(trial.candidates) < 2:
-            return trial
-        groups = [
-            [other if c is mine else c for c in trial.candidates]
-            for mine in trial.candidates
-            for other in (s.candidate for s in scanned.scored)
-            if other.effect.name == mine.effect.name and other is not mine
-        ]
-        if not groups:
-            return trial
-        others = [t for t in self._together(current, groups) if t.fit.level >= trial.fit.level and t.needed]
-        compared = [(at_level(t.fit, trial.fit.level).chi2, k, t) for k, t in enumerate([trial, *others])]
-        return min(compared)[2]
-
-    def _once(self, near: list[TrialFit]) -> list[TrialFit]:
-        """Without formulas that are one of the library's laws in other words."""
-        known = [t for t in near if t.curve is None]
-        return [
-            t
-            for t in near
-            if t.formula is None or not any(same_law(t.compared, other.compared) for other in known)
-        ]
-
-    def _foretelling(
-        self, near: list[TrialFit], costs: dict[int, float], foretelling: Foretelling
-    ) -> list[TrialFit]:
-        """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
-        best = near[0] if near else None
-        for other in near[1:]:
-            tied = costs[id(other)] - costs[id(near[0])] <= _TIED
-            if best and tied and _clearly(foretelling.ratio(best, other)):
-                best = other
-        return [best, *(t for t in near if t is not best)] if best else near
-
-    def _costs(
-        self, current: SearchState, near: list[TrialFit], unit: float, most: float
-    ) -> tuple[dict[int, float], dict[int, TrialFit]]:
-        """What each of several forms costs that explain the first part about as well: by all data; the fits.
-
-        Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
-        of all data is, but for a constant, the cost of predicting each stretch from those before it.
-        """
-        if len(near) < 2:
-            return {id(t): t.criterion(unit) + t.prior_penalty for t in near if t.needed}, {}
-
-        def again(trial: TrialFit) -> TrialFit | None:
-            try:
-                return self._again(current, trial)
-            except FitError:
-                return None
-
-        pairs = zip(near, self._each(again, near), strict=True)
-        wholes = [(t, w) for t, w in pairs if w is not None and w.needed]
-        level = min((w.fit.level for _t, w in wholes), default=0)
-        result = {}
-        for trial, whole in wholes:
-            try:
-                # What no library has is not chosen for fitting what the noise is not sure to show.
-                paid = trial.price + trial.prior_penalty * (most / unit if trial.curve else 1.0)
-                result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
-            except FitError:
-                continue
-        return result, {id(t): w for t, w in wholes}
-
-    def _judged(self, current: SearchState, trial: TrialFit, scores: ScoreRound) -> TestResult | None:
-        """What the tests say of a trial; None where it cannot be fitted to all data."""
-        try:
-            whole = self._again(current, trial)
-            if whole is None:
-                return None
-            pair = same_level(current.whole, whole.fit)
-            fall, p = _chance(pair, trial, scores)
-            ratio: Ratio = (math.nan, math.nan, math.nan)
-            witness: Confirmation | None = None
-            before, after = pair
-            drifts = _DRIFT * (before.chi2 - after.chi2) / max(before.scatter, 1.0) < drift_gain(before)
-            if p < ALPHA and not drifts:
-                part, rest = (current.part, trial.fit), self.record.part(self.held_out)
-                ratio, witness = confirmed_by(part, pair, rest, trial.names, self.unit)
-        except FitError:
-            return None
-        return TestResult(whole.fit, fall, p, ratio, witness, drifts)
-
-    def _errors_or_none(self, fitted: Fit) -> Errors | None:
-        """None where the model cannot be run over the held-out frames."""
-        try:
-            return self.errors(fitted)
-        except FitError:
-            return None
-
-    def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
-        """The same proposal fitted to all data."""
-        whole = current.whole
-        if whole is current.part:
-            return trial
-        if trial.curve is None:
-            return of_library(whole, trial.candidates, trial.amplitudes)
-        if trial.formula is None:
-            return of_curve(whole, trial.curve)
-        return of_formula(whole, trial.curve, trial.formula)
-
-    def _worse(self, before: Errors, after: Errors) -> bool:
-        """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
-        return before.unit != "rad" and any(
-            improvement(before, after, h)[1] > _WORSE for h in before.horizons
-        )
-
-    def _says_less(self, formula: TrialFit, chosen: TrialFit, nats: float) -> bool:
-        """Whether a formula is the chosen law in other words, or has more constants for nothing."""
-        return same_law(formula.compared, chosen.compared) or (
-            nats > 0 and len(formula.names) > len(chosen.names)
-        )
-
-    def _alternatives(
-        self,
-        chosen: TrialFit,
-        trials: list[TrialFit],
-        scanned: Scan,
-        costs: dict[int, float],
-        foretelling: Foretelling,
-    ) -> list[Alternative]:
-        listed = [s.candidate for s in scanned.scored]
-        result: dict[tuple[str, str, str | None], Alternative] = {}
-
-        def cost(trial: TrialFit) -> float:  # a formula may be it as well as what was chosen
-            return costs[id(trial)] - trial.prior_penalty
-
-        best = cost(chosen)
-        for trial in (t for t in trials if id(t) in costs):
-            nats = (cost(trial) - best) / 2
-            if (
-                trial is chosen
-                or nats > EVIDENCE_MARGIN
-                or len(trial.candidates) != len(chosen.candidates)
-                or trial.is_curve
-                or (trial.formula is not None and self._says_less(trial, chosen, nats))
-                or _clearly(foretelling.ratio(trial, chosen))
-            ):
-                continue
-            for mine, other in _beside(chosen.candidates, trial.candidates):
-                if other.title == mine.title:
-                    continue  # but for the width that its sign is smoothed over
-                known = mine in listed and other in listed
-                likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
-                if likeness > _SUPERSET and other.parameters > mine.parameters:
-                    continue  # the chosen form with something more that the data do not ask for
-                named = {p: f"{other.effect.name}.{p}" for p in other.effect.parameters}
-                fitted = trial.fit.parameters
-                effect = other.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
-                one = Alternative(
-                    mine.effect.name, effect, other.title, other.effect.equation, nats, likeness
-                )
-                # The same may stand beside several partners; the best is told.
-                key = (mine.effect.name, other.title, other.effect.momentum)
-                if key not in result or nats < result[key].nats:
-                    result[key] = one
-        return list(result.values())

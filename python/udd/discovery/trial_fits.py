@@ -131,6 +131,11 @@ def of_library(current: Fit, candidates: list[Candidate], start: list[float]) ->
     return trial if trial.physical and fitted.converged else None
 
 
+def from_none(current: Fit, candidates: list[Candidate]) -> TrialFit | None:
+    """Effects of the library with free amplitudes that start at zero."""
+    return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates))
+
+
 def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
     """A curve, located in full."""
     try:

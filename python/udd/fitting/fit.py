@@ -156,6 +156,7 @@ def _with_input_noise(measurements: tuple[Measurement, ...], problem: Problem, p
 
     Not where the inputs have none: then the model's likeliest error is far below what it would make.
     """
+    # Without this a driven machine that lacks nothing gets a formula, and one with dry friction a wave.
     noise = diffusion_by_noise(problem.models, problem.record)
     moved = noise > 0.0
     if not moved.any():

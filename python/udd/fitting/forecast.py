@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.angles import wrapped
 from udd._util.keywords import renamed
 from udd._util.progress import thread_count
 from udd._util.random_generator import Rng, generator
@@ -503,7 +504,7 @@ def _compared(
     expected = np.column_stack([np.interp(t, clock, column) for column in median.T])
     difference = np.where(after.seen[:, None], after.values - expected, np.nan)
     if sensor.error_unit == "rad":
-        difference = (difference + np.pi) % (2 * np.pi) - np.pi
+        difference = wrapped(difference)
     there = np.isfinite(difference).all(axis=1)
     when = _parted(t[there] - clock[0], _size(difference[there], sensor, spread), error)
     return when if np.isfinite(when) else math.nan

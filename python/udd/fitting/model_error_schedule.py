@@ -143,6 +143,7 @@ def with_noise_correlation(fitted: Fit) -> Fit:
     """
     if fitted.leverage > _LOOSE:
         return fitted
+    # Without this k0, k2 of a record with coloured noise move by three of their standard errors.
     sd = fitted.noise.sd(fitted.record, fitted.blurring)
     memory = remembered(fitted.record, fitted.misfit, sd, fitted.noise.weight)
     if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:

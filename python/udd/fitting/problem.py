@@ -271,38 +271,41 @@ class Fit:
 
     def summary(self) -> str:
         """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""
+        return "\n".join([self._state, *self.doubts.sentences, *self._table()])
+
+    @property
+    def _state(self) -> str:
+        state = "converged" if self.converged else "NOT converged"
+        return f"{state}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
+
+    def _table(self) -> list[str]:
+        """Every parameter on a line."""
         from .diagnostics import units
         from .parameter_meanings import meaning
 
         known = units(self)
-        doubts = self.doubts
-        verdict = "converged" if self.converged else "NOT converged"
-        head = f"{verdict}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
-        lines = [
+        return [
             f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {known[name]:<6} "
             f"{meaning(name, self.model.kind)}".rstrip()
             for name, value in self.parameters.items()
         ]
-        return "\n".join([head, *doubts.sentences, *lines])
 
     def __repr__(self) -> str:
         """One line; :meth:`summary` says more."""
-        state = "converged" if self.converged else "NOT converged"
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in list(self.parameters.items())[:4])
         more = ", ..." if len(self.parameters) > 4 else ""
         kinds = ", ".join(dict.fromkeys(type(model).__name__ for model in self.models))
-        quality = f"{state}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
-        return f"<Fit of {kinds}: {quality}; {numbers}{more}>"
+        return f"<Fit of {kinds}: {self._state}; {numbers}{more}>"
 
     def _repr_html_(self) -> str:
         """As :meth:`summary`, for notebooks."""
         from html import escape
 
-        head, *rest = self.summary().split("\n")
-        said = len(self.doubts.sentences)
-        items = "".join(f"<li>{escape(line)}</li>" for line in rest[1:said])
-        table = escape("\n".join(rest[said:]))
-        return f"<p>{escape(head)}: <strong>{escape(rest[0])}</strong></p><ul>{items}</ul><pre>{table}</pre>"
+        first, *more = self.doubts.sentences
+        items = "".join(f"<li>{escape(line)}</li>" for line in more)
+        table = escape("\n".join(self._table()))
+        head = f"<p>{escape(self._state)}: <strong>{escape(first)}</strong></p>"
+        return f"{head}<ul>{items}</ul><pre>{table}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
         """What a machine reads: parameters with errors, noise, goodness, and what there is to doubt."""

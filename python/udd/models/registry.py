@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
+from udd import _core
+
 from .base import Model
-from .disk import Disk
-from .dle import DLE
+from .compiled import CompiledModel
 from .formula_model import FormulaModel
-from .pendulum import Pendulum
 from .profile import ModelProfile
 
-#: Those that are compiled into the core; a new model is one more name here.
-COMPILED: dict[str, type[Model]] = {cls.kind: cls for cls in (DLE, Disk, Pendulum)}
+
+def _compiled() -> dict[str, type[Model]]:
+    """Those that the core has, each from the file that is called like its kind."""
+    kinds = _core.model_kinds()
+    for kind in kinds:
+        import_module(f"{__package__}.{kind}")
+    known = {cls.kind: cls for cls in CompiledModel.__subclasses__()}
+    return {kind: known[kind] for kind in kinds}
+
+
+#: Those that are compiled into the core.
+COMPILED: dict[str, type[Model]] = _compiled()
 MODELS: dict[str, type[Model]] = COMPILED | {FormulaModel.kind: FormulaModel}
 
 

@@ -8,6 +8,8 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.angles import wrapped
+
 Array = NDArray[np.float64]
 
 #: The centre rests at a plateau of theta where it hangs within this angle of straight down [rad].
@@ -76,7 +78,7 @@ def falls(t: Array, Y: Array, Z: Array) -> Falls:
         ascents.append(t[top] - t[_last_minimum(Z, lowest, first)])
         descents.append(t[last + int(np.argmin(Z[last:end]))] - t[top])
         before = last
-    swing = np.abs((theta + np.pi) % (2 * np.pi) - np.pi)
+    swing = np.abs(wrapped(theta))
     step = np.diff(t)
     return Falls(
         side=np.array([int(np.sign(Y[last])) for _, last in pairs], dtype=np.int64),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from .page import report_of, write
+from .page import report_of, summary_of, write
+from .terminal import as_text
 
-__all__ = ["report_of", "write"]
+__all__ = ["as_text", "report_of", "summary_of", "write"]

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -218,16 +218,15 @@ def _drawn(panel: Panel, radius: float, frames: int) -> Iterator[NDArray[np.uint
     path = [whole(at)]
     for centre, beta in zip(at, seen[:, 2], strict=True):
         picture = np.full((_PANEL, _PANEL, 3), 246, dtype=np.uint8)
-        options: dict[str, Any] = {"lineType": cv2.LINE_AA, "shift": 4}
         middle_of = tuple(int(c) for c in whole(centre))
-        cv2.circle(picture, middle_of, round(unit * fine), (255, 255, 255), -1, **options)
-        cv2.circle(picture, middle_of, round(unit * fine), (119, 119, 119), 1, **options)
+        cv2.circle(picture, middle_of, round(unit * fine), (255, 255, 255), -1, lineType=cv2.LINE_AA, shift=4)
+        cv2.circle(picture, middle_of, round(unit * fine), (119, 119, 119), 1, lineType=cv2.LINE_AA, shift=4)
         for quarter, colour in enumerate(MARKS):
             c, s = math.cos(beta + quarter * math.pi / 2), math.sin(beta + quarter * math.pi / 2)
             turned = centre + square @ np.array([[c, s], [-s, c]])
-            cv2.fillPoly(picture, [whole(turned)], _rgb(colour), **options)
-        cv2.polylines(picture, path, False, _rgb(panel.colour), 1, **options)
-        cv2.circle(picture, middle_of, 3 * fine, _rgb(panel.colour), -1, **options)
+            cv2.fillPoly(picture, [whole(turned)], _rgb(colour), lineType=cv2.LINE_AA, shift=4)
+        cv2.polylines(picture, path, False, _rgb(panel.colour), 1, lineType=cv2.LINE_AA, shift=4)
+        cv2.circle(picture, middle_of, 3 * fine, _rgb(panel.colour), -1, lineType=cv2.LINE_AA, shift=4)
         cv2.drawMarker(picture, (_PANEL // 2, _PANEL // 2), (0, 0, 0), cv2.MARKER_CROSS, 12, 1)
         yield picture
 

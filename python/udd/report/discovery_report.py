@@ -99,7 +99,7 @@ def sections(
     made = [_measured(discovery, one, film), _errors(discovery), _residuals(discovery, surprises)]
     if not discovery.effects:
         return (*made, _tried(discovery), _limits(discovery), _numbers(discovery, one))
-    return (*made, _tried(discovery), _others(discovery), _limits(discovery), _numbers(discovery, one))
+    return (*made, _tried(discovery), others(discovery), _limits(discovery), _numbers(discovery, one))
 
 
 def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str] | None) -> Section:
@@ -335,7 +335,8 @@ def _round(discovery: Discovery, stage: int) -> tuple[Part, ...]:
     return parts(Subheading(round_heading(stage)), bars, best, smooth if curves else None)
 
 
-def _others(discovery: Discovery) -> Section:
+def others(discovery: Discovery) -> Section:
+    """What the data cannot tell apart from what was found."""
     listed: list[Text] = []
     for other in discovery.alternatives:
         title = f"{other.title[0].upper()}{other.title[1:]}"
@@ -346,9 +347,14 @@ def _others(discovery: Discovery) -> Section:
             )
         )
     none = "No other effect of the library explains these data as well."
+    return others_of(discovery, tuple(listed) or (none,))
+
+
+def others_of(discovery: Discovery, listed: tuple[Text, ...]) -> Section:
+    """What else it could be, and what to film to tell."""
     hint = discovery.hint
     tell = Paragraph(Markup("To tell: {}.").format(pretty(hint.text))) if hint is not None else None
-    return Section("What else it could be", parts(Bullets(tuple(listed) or (none,)), tell))
+    return Section("What else it could be", parts(Bullets(listed), tell))
 
 
 def _limits(discovery: Discovery) -> Section:

@@ -22,13 +22,13 @@ from .discovery_report import (
     head,
     held_back,
     nearest,
+    others_of,
     reasons,
     round_heading,
     tried_heading,
     whiteness,
 )
 from .document import (
-    Bullets,
     Column,
     Figure,
     Head,
@@ -67,7 +67,7 @@ def sections(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[Se
     """What follows: the motion, the model, the errors, the candidates, the innovations and the numbers."""
     made = [_measured(discovery), _known(discovery), _errors(discovery), _tried(discovery)]
     if discovery.effects:
-        made.append(_others(discovery))
+        made.append(others(discovery))
     made.append(Section("The surprises", whiteness(discovery, surprises)))
     return (*made, _numbers(discovery))
 
@@ -126,7 +126,8 @@ def _tried(discovery: Discovery) -> Section:
     return Section(tried_heading(discovery), shown)
 
 
-def _others(discovery: Discovery) -> Section:
+def others(discovery: Discovery) -> Section:
+    """What the data cannot tell apart from what was found."""
     listed: list[Text] = [
         Markup(
             "<strong>{}</strong> ({}) instead of {}: worse by {:.1f} units of log-likelihood; a form is "
@@ -137,7 +138,7 @@ def _others(discovery: Discovery) -> Section:
         for other in discovery.alternatives
     ]
     none = "Nothing else that was tried explains these data as well."
-    return Section("What else it could be", (Bullets(tuple(listed) or (none,)),))
+    return others_of(discovery, tuple(listed) or (none,))
 
 
 def _numbers(discovery: Discovery) -> Section:

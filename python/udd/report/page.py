@@ -15,7 +15,7 @@ from udd.errors import UddError
 from udd.fitting.innovations import innovations
 
 from . import discovery_report, formula_report, wording
-from .document import Report
+from .document import Head, Report, Section
 
 if TYPE_CHECKING:
     from udd.discovery.results import Discovery
@@ -58,9 +58,23 @@ def report_of(
             sections = formula_report.sections(discovery, surprises)
         else:
             sections = discovery_report.sections(discovery, film, surprises)
-    first = formula_report.formula_head(discovery) if of_own else discovery_report.disk_head(discovery)
     usual = wording.command(discovery, None if origin is None else Path(origin).name)
-    return Report(first, sections, identity(origin), command or usual)
+    return Report(_head(discovery), sections, identity(origin), command or usual)
+
+
+def summary_of(discovery: Discovery) -> Report:
+    """The verdict, why each effect was added, what came near and what else it could be; no pictures."""
+    tried = (*discovery_report.nearest(discovery), *discovery_report.reasons(discovery))
+    of_own = discovery.fit.model.profile.written
+    others = formula_report.others(discovery) if of_own else discovery_report.others(discovery)
+    sections = [Section(discovery_report.tried_heading(discovery), tried)] if tried else []
+    return Report(_head(discovery), (*sections, *([others] if discovery.alternatives else [])))
+
+
+def _head(discovery: Discovery) -> Head:
+    if discovery.fit.model.profile.written:
+        return formula_report.formula_head(discovery)
+    return discovery_report.disk_head(discovery)
 
 
 def write(

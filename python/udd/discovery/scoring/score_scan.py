@@ -28,8 +28,8 @@ _ABSORBED = 1e-4
 _ALIKE = 1e6  # condition of the information from which on candidates act alike
 _STRONG = 4.0  # times the usual amplitudes, of effects that may have either sign
 _WAVES = 100  # scored at a time: what a long record takes in memory
-_GROUPS = 20_000  # looked at together: some ten megabytes
-_MOST_GROUPS = 700_000  # looked at in all: a few seconds
+_AT_ONCE = 20_000  # looked at together: some ten megabytes
+_MOST_PAIRS = 700_000  # looked at in all: a few seconds
 _LINES = 24  # of a scan over frequencies, looked at between them too
 
 
@@ -71,14 +71,14 @@ class Scan:
     columns: list[list[int]]
     scatter: float
 
-    def groups(self, size: int, most: int | None = None) -> tuple[list[tuple[list[Scored], float]], int]:
-        """So many candidates with the fall of chi2 that all of them together give, largest first.
+    def pairs(self, most: int | None = None) -> tuple[list[tuple[list[Scored], float]], int]:
+        """Two candidates with the fall of chi2 that both together give, largest first.
 
-        At most so many groups, and how many there are. Where there are millions only those of the candidates
+        At most so many pairs, and how many there are. Where there are millions only those of the candidates
         that alone give most are looked at; the others count, too, as the data chose which.
         """
         told_apart = [k for k, s in enumerate(self.scored) if not s.absorbed]
-        usable = self._strongest(told_apart, size)
+        usable = self._strongest(told_apart)
         # Candidates that act alike have no place side by side.
         unit = _unit(self.information)
 
@@ -90,43 +90,37 @@ class Scan:
             found = g.mT @ np.linalg.solve(self.information[at[:, :, None], at[:, None, :]], g)
             return np.asarray(found[:, 0, 0]) / self.scatter
 
-        pairs, groups = _combinations(usable, 2), _combinations(usable, size)
-        unlike = np.zeros((len(self.scored),) * 2, dtype=bool)
-        unlike[tuple(pairs.T)] = self._each(pairs, alike) < _ALIKE
-        for two in _combinations(range(size), 2):
-            groups = groups[unlike[tuple(groups[:, two].T)]]
-        if size > 2:
-            groups = groups[self._each(groups, alike) < _ALIKE]
-        falls = self._each(groups, fall)
+        pairs = np.array(list(itertools.combinations(usable, 2)), dtype=np.intp).reshape(-1, 2)
+        pairs = pairs[self._each(pairs, alike) < _ALIKE]
+        falls = self._each(pairs, fall)
         order = np.argsort(-falls, kind="stable")
-        found = [([self.scored[k] for k in groups[i]], float(falls[i])) for i in order[:most]]
-        left_out = math.comb(len(told_apart), size) - math.comb(len(usable), size)
-        return found, len(order) + left_out
+        found = [([self.scored[k] for k in pairs[i]], float(falls[i])) for i in order[:most]]
+        return found, len(order) + math.comb(len(told_apart), 2) - math.comb(len(usable), 2)
 
-    def _strongest(self, usable: list[int], size: int) -> list[int]:
-        """Candidates that make no more groups than are looked at."""
+    def _strongest(self, usable: list[int]) -> list[int]:
+        """Candidates that make no more pairs than are looked at."""
         many = len(usable)
-        while math.comb(many, size) > _MOST_GROUPS:
+        while math.comb(many, 2) > _MOST_PAIRS:
             many -= 1
         best = sorted(usable, key=lambda k: -self.scored[k].chi2)[:many]
         return sorted(best)
 
     def _each(
-        self, groups: NDArray[np.intp], value: Callable[[NDArray[np.intp]], NDArray[np.float64]]
+        self, pairs: NDArray[np.intp], value: Callable[[NDArray[np.intp]], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        """A value of each group from its columns: of groups with as many columns many at a time."""
+        """A value of each pair from its columns: of those with as many columns many at a time."""
         widths = np.array([len(own) for own in self.columns], dtype=np.intp)
         table = np.zeros((len(widths), widths.max(initial=1)), dtype=np.intp)
         for row, own in zip(table, self.columns, strict=True):
             row[: len(own)] = own
-        result = np.empty(len(groups))
-        # The widths of a group as one number, which is told apart sooner than a row.
-        kinds = widths[groups] @ (widths.max(initial=0) + 1) ** np.arange(groups.shape[1])
+        result = np.empty(len(pairs))
+        # The widths of a pair as one number, which is told apart sooner than a row.
+        kinds = widths[pairs] @ (widths.max(initial=0) + 1) ** np.arange(pairs.shape[1])
         for one in np.unique(kinds):
             rows = np.flatnonzero(kinds == one)
-            kind = widths[groups[rows[0]]]
-            for some in np.array_split(rows, len(rows) // _GROUPS + 1):
-                at = [table[groups[some, k], :width] for k, width in enumerate(kind)]
+            kind = widths[pairs[rows[0]]]
+            for some in np.array_split(rows, len(rows) // _AT_ONCE + 1):
+                at = [table[pairs[some, k], :width] for k, width in enumerate(kind)]
                 result[some] = value(np.concatenate(at, axis=1))
         return result
 
@@ -137,11 +131,6 @@ class Scan:
         left = np.linalg.solve(block[np.ix_(a, a)], block[np.ix_(a, b)])
         right = np.linalg.solve(block[np.ix_(b, b)], block[np.ix_(b, a)])
         return float(np.sqrt(max(np.linalg.eigvals(left @ right).real.max(), 0.0)))
-
-
-def _combinations(items: Iterable[int], size: int) -> NDArray[np.intp]:
-    """All choices of so many of them, one a row."""
-    return np.array(list(itertools.combinations(items, size)), dtype=np.intp).reshape(-1, size)
 
 
 def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:

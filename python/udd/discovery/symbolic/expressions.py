@@ -1,19 +1,20 @@
 """Short formulas in one variable: read, evaluated, simplified, written in the text grammar of effects.
 
 A formula is a nested tuple: ``("x",)``, a literal ``("n", value)``, a constant to be fitted
-``("c", number)``, a function ``("tanh", argument)`` or an operation ``("+", a, b)``. Text that comes from
-elsewhere is read by a whitelist; nothing is ever run.
+``("c", number)``, a function ``("tanh", argument)`` or an operation ``("+", a, b)``. The core reads
+text.
 """
 
 from __future__ import annotations
 
-import ast
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from udd._core import formula_operations
 
 Array = NDArray[np.float64]
 Node = tuple[Any, ...]
@@ -34,53 +35,50 @@ _UNARY: dict[str, Callable[[Any], Any]] = {
     "abs": np.abs,
     "sqrt": np.sqrt,
 }
-_SIGNS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^"}
 _RANK = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4}
 
 X: Node = ("x",)
 
 
 def read(text: str, names: dict[str, Node]) -> tuple[Node, list[float]]:
-    """A formula from its text; its numbers become constants to be fitted, with these values.
+    """A formula from its text, by the core's grammar; its numbers become constants to fit, with these values.
 
-    Whole exponents stay as they are.
+    Whole exponents stay as they are; what the core computes from numbers alone is one number. A square root
+    is a power, whose exponent can be fitted.
 
     Raises
     ------
     ValueError
-        Something in it is not of the grammar.
+        Something in it is not of the grammar, or no operation of such a formula.
     """
     values: list[float] = []
+    stack: list[Node] = []
+    known = list(names.values())
 
-    def number(value: float) -> Node:
+    def constant(value: float) -> Node:
         values.append(value)
         return ("c", len(values) - 1)
 
-    def walk(node: ast.AST, exponent: bool = False) -> Node:
-        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
-            value = float(node.value)
-            return ("n", value) if exponent and value.is_integer() else number(value)
-        if isinstance(node, ast.Name) and node.id in names:
-            return names[node.id]
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            inside = node.operand
-            if isinstance(inside, ast.Constant) and isinstance(inside.value, (int, float)):
-                return number(-float(inside.value))
-            return ("*", ("n", -1.0), walk(inside))
-        if isinstance(node, ast.BinOp) and type(node.op) in _SIGNS:
-            sign = _SIGNS[type(node.op)]
-            return (sign, walk(node.left), walk(node.right, exponent=sign == "^"))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
-            name = {"log": "ln"}.get(node.func.id, node.func.id)
-            if name in _UNARY:
-                return (name, walk(node.args[0]))
-        raise ValueError(f"the formula has {ast.dump(node)[:60]}, which is not of the grammar")
-
-    try:
-        tree = ast.parse(text.replace("^", "**"), mode="eval")
-    except SyntaxError as error:
-        raise ValueError(f"{text!r} is no formula") from error
-    return walk(tree.body), values
+    for name, takes, number in formula_operations(text, list(names)):
+        taken = stack[len(stack) - takes :]
+        del stack[len(stack) - takes :]
+        match name, taken:
+            case "state", []:
+                made = known[int(number)]
+            case "number", []:
+                made = constant(number)
+            case "-", [one]:
+                made = ("*", ("n", -1.0), one)
+            case "^", [one]:
+                made = ("^", one, ("n", number))
+            case "sqrt", [one]:
+                made = ("^", one, constant(0.5))
+            case _ if name in (_UNARY if takes == 1 else _BINARY):
+                made = (name, *taken)
+            case _:
+                raise ValueError(f"the formula has {name}, which cannot be fitted to a curve")
+        stack.append(made)
+    return stack[0], values
 
 
 def evaluate(node: Node, x: Array, values: Sequence[float | Array]) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.angles import wrapped
 from udd.errors import FitError
 from udd.fitting import UNEXPLAINED, Fit, Record, filtered, predicted
 from udd.fitting.sensor import reads
@@ -400,24 +401,18 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
     sensor = fit.model.profile.sensor
     if sensor.compared:
         if sensor.error_unit == "rad":
-            difference = _turned(difference)
+            difference = wrapped(difference)
         result = np.abs(reduce(np.hypot, np.moveaxis(difference[..., : sensor.compared], -1, 0)))
         return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
     squares = []
     for k in np.flatnonzero(record.observed.any(axis=0)):
         spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
         angle = isinstance(fit.model, FormulaModel) and fit.channels[k] in fit.model.turning
-        own = _turned(difference[..., k]) if angle else difference[..., k]
+        own = wrapped(difference[..., k]) if angle else difference[..., k]
         squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
     known = np.count_nonzero(np.isfinite(squares), axis=0)
     result = np.sqrt(np.nansum(squares, axis=0) / np.where(known, known, np.nan))
     return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
-
-
-def _turned(angle: Array) -> Array:
-    """The same angle within half a turn of zero."""
-    result: Array = (angle + np.pi) % (2 * np.pi) - np.pi
-    return result
 
 
 def _median(rows: Array) -> Array:

@@ -13,7 +13,7 @@ from udd.discovery.trial_fits import TrialFit
 from udd.errors import FitError
 from udd.fitting import Fit, Record, frame_costs, smoothed_states, within
 
-from .acceptance_tests import same_level
+from .confirmation import same_level
 from .held_out_errors import Ratio, cost_improvement
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Acceptance tests of an effect on data that were not fitted."""
+"""Confirmation of an effect on data that were not fitted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a camera's faults would explain, where the camera was held as perfect."""
+"""What the parameters of a camera that was held as perfect would explain, were they free."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from udd.fitting import Fit, extend, ran_away, released
 from udd.fitting.parameters import Free, free_parameters
 from udd.fitting.sensor import is_encoder
 
-from .acceptance_tests import same_level
+from .confirmation import same_level
 
 _MOST = 0.5  # of chi2 that a camera takes away, from which on a form found without it is not to be trusted
 _TRIED = 2  # effects of the library beside a free camera, where a formula was found without it

@@ -1,0 +1,19 @@
+//! What the core reads in a formula's text.
+
+use pyo3::prelude::*;
+
+use super::errors::ModelError;
+use crate::formula::{Expression, Names};
+
+/// A formula's operations on a stack: what each is called, how many numbers it takes, and the number that it holds.
+#[pyfunction]
+fn formula_operations(text: &str, variables: Vec<String>) -> PyResult<Vec<(&'static str, usize, f64)>> {
+    let names = Names { states: &variables, parameters: &[], inputs: &[], rates: false };
+    let parsed = Expression::parse(text, names)
+        .map_err(|mistake| ModelError::new_err(format!("the formula {mistake}")))?;
+    Ok(parsed.ops().iter().map(|op| (op.name(), op.takes(), op.number())).collect())
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(formula_operations, module)?)
+}
