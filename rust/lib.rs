@@ -1,10 +1,10 @@
 //! The core of `udd`, the laboratory of the upward-driven disk.
 //!
 //! Data flows one way; nothing below knows what stands above it:
-//! [`scalar`] (what a number is) → [`formula`] (what a user writes) → [`model`] (what is integrated) → [`integrate`] (how a step is
-//! taken) → [`observe`] (what is seen on the way) → [`run`] (who drives it) → [`estimate`] (what
-//! measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
-//! Beside this stand [`picture`], the inner loop of the tracker, and [`memory`], which know none of them.
+//! [`scalar`] (what a number is) → [`formula`] (what a user writes) → [`model`] (what is integrated) → [`tape`] (its power
+//! series) → [`integrate`] (how a step is taken) → [`observe`] (what is seen on the way) → [`analysis`] (runs, sections,
+//! exponents) → [`estimate`] (what measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
+//! Beside this stand [`image`], the inner loop of the tracker, and [`memory`], which know none of them.
 
 // Formulas over components are read with their indices.
 #![allow(clippy::needless_range_loop)]
@@ -17,7 +17,6 @@ pub mod integrate;
 pub mod memory;
 pub mod model;
 pub mod observe;
-
 pub mod scalar;
 pub mod tape;
 mod unroll;

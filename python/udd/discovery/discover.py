@@ -14,12 +14,11 @@ from udd._util.expressions import Expression
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
-from udd.discovery.validation.by_record import by_record, contested
+from udd.discovery.validation.by_record import by_record
 from udd.discovery.validation.held_camera import camera_shows
 from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
 from udd.discovery.validation.sensor_drift import FORETELLS, as_random
 from udd.effects import Effect
-from udd.effects.user_defined import is_spline
 from udd.errors import FitError
 from udd.fitting import (
     UNEXPLAINED,
@@ -31,7 +30,6 @@ from udd.fitting import (
     record_of,
     refit,
 )
-from udd.fitting.diagnostics import readings
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
@@ -43,6 +41,7 @@ from .results import AddedEffect, Discovery, RejectedEffect
 from .search import Search, both
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
+from .verdict import verdict_of
 
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
@@ -203,23 +202,8 @@ def discover(
             rejected = search.rejected(begin, end.rounds[-1], order)
         except TimeUpError as up:
             stopped = stopped or str(up)
-    if not found and end.unconfirmed:
-        verdict = "fits the first part, not confirmed"
-    elif (
-        unexplained
-        or doubtful
-        or left
-        or random
-        or excused is not None
-        or any(contested(f.by_record) for f in found)
-        or any(is_spline(f.effect) or f.like_a_drift(final.model) for f in found)
-        or (any(f.curve is not None for f in found) and any(one.coarse for one in readings(final)))
-    ):
-        verdict = "effect present, form not identified"
-    elif found:
-        verdict = "effect identified"
-    else:
-        verdict = "search not finished" if stopped else "nothing missing"
+    open_form = doubtful or left or random or excused is not None or unexplained
+    verdict = verdict_of(found, final, bool(end.unconfirmed), bool(open_form), bool(stopped))
     return Discovery(
         verdict=verdict,
         baseline=(baseline if found else final).without_cache(),

@@ -133,15 +133,17 @@ class Search:
         states = [begin]
         stopped = None
         try:
-            self._grow(accepted, states, rounds)
+            self._forward_selection(accepted, states, rounds)
         except TimeUpError as up:
             stopped = str(up)
-        number = self._confirmed(known or states[0], states)
+        number = self._confirmed_by_free_runs(known or states[0], states)
         unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
         end = states[number] if number else known or states[0]
         return Outcome(end.part, end.whole, end.errors, accepted[:number], rounds, unconfirmed, stopped)
 
-    def _grow(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
+    def _forward_selection(
+        self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
+    ) -> None:
         """Add effects to the lists as they pass."""
         known: set[tuple[str, ...]] = set()
         while sum(len(step.candidates) for step in accepted) < _MOST:
@@ -161,7 +163,7 @@ class Search:
                 break
             accepted.append(found[0])
             states.append(found[1])
-            self._prune(accepted, states, rounds)
+            self._backward_elimination(accepted, states, rounds)
             states[-1] = self._released(states[-1])
             # What takes another's place may give way to it again: then the search goes in circles.
             titles = tuple(c.title for step in accepted for c in step.candidates)
@@ -173,7 +175,7 @@ class Search:
             if accepted[-1].curve is not None and contradicted:
                 break
 
-    def _confirmed(self, known: SearchState, states: list[SearchState]) -> int:
+    def _confirmed_by_free_runs(self, known: SearchState, states: list[SearchState]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
@@ -371,7 +373,9 @@ class Search:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))
         return trials
 
-    def _prune(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
+    def _backward_elimination(
+        self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
+    ) -> None:
         """Leave out effects that a later one makes needless.
 
         A wrong form of the library takes up a part of what an effect outside of it does, or of what another
