@@ -1,6 +1,6 @@
 //! Where formulas have kinks: the surfaces that runs land on.
 
-use super::{Binary, Expression, Op, Unary};
+use super::{Binary, Expression, Leaf, Op, Unary};
 use crate::model::MAX_SURFACES;
 use crate::scalar::Scalar;
 
@@ -73,6 +73,9 @@ pub struct Kinks {
     pub surfaces: Vec<Expression>,
     /// Whether a formula jumps there.
     pub jumps: Vec<bool>,
+    /// Those that a law may [slide](crate::model::sliding_mode) on: where it jumps at a linear function of the states
+    /// in the rate of one of them.
+    pub sliding: Vec<usize>,
     /// One surface fewer, which is kept for the [clock](crate::model::System::clock).
     pub clocked: bool,
 }
@@ -103,6 +106,19 @@ impl Kinks {
             starts.truncate(at);
             starts.push(start);
         }
+    }
+
+    /// Finds the surfaces that the law with these rates may slide on.
+    pub fn find_sliding(&mut self, rates: &[Expression]) {
+        let moves = |j: usize, n: usize| {
+            let jumps = rates[n].ops.iter().any(|op| matches!(op, Op::On(_, own) if usize::from(*own) == j));
+            jumps && self.surfaces[j].ops.contains(&Op::Push(Leaf::State(n)))
+        };
+        self.sliding = (0..self.surfaces.len())
+            .filter(|&j| {
+                self.jumps[j] && self.surfaces[j].is_affine() && (0..rates.len()).any(|n| moves(j, n))
+            })
+            .collect();
     }
 
     /// The number of the surface with this function, if there is room for it.

@@ -13,6 +13,8 @@ use crate::unroll::vector;
 /// The most intermediate values of an equation; most need few.
 const DEEP: usize = 64;
 const SHALLOW: usize = 8;
+/// A power of two, far from the states that linear functions are asked for.
+const FAR: f64 = 1_048_576.0;
 /// The most measured inputs.
 pub const MAX_INPUTS: usize = 8;
 
@@ -222,11 +224,11 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 /// Builds [`Own`].
 ///
 /// ```
-/// use udd::model::{Family, FormulaFamily, System};
+/// use udd::model::{Family, FormulaFamily, MAX_SURFACES, System};
 /// let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
 /// let family = FormulaFamily::<2>::parse(&names(&["x", "v"]), &["v", "-k*x"], &names(&["k"]), &[]).unwrap();
 /// let system = family.build(&[4.0]);
-/// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; 4]), [1.0, -12.0]);
+/// assert_eq!(system.rates(0.0, &[3.0, 1.0], &[true; MAX_SURFACES]), [1.0, -12.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct FormulaFamily<const D: usize> {
@@ -273,6 +275,7 @@ impl<const D: usize> FormulaFamily<D> {
         }
         let mut kinks = Kinks { clocked: !inputs.is_empty(), ..Kinks::default() };
         parsed.iter_mut().for_each(|one| kinks.of(one));
+        kinks.find_sliding(&parsed);
         let deep = parsed.iter().chain(&kinks.surfaces).any(|one| one.depth() > SHALLOW);
         let equations = with_idle(parsed);
         let states = states.iter().map(|name| (name.clone(), false)).collect();
@@ -338,13 +341,12 @@ impl<const D: usize> FormulaFamily<D> {
         Own { equations, kinks, sliding, deep: self.deep, parameters: values.to_vec(), inputs }
     }
 
-    /// Where the law may slide: where it jumps as a linear function of the states passes a constant.
+    /// The surfaces that the law may slide on, as many as there is room for.
     fn sliding_surfaces<S: Scalar>(&self, values: &[S]) -> Vec<SlidingSurface<S>> {
         let kinks = &self.kinks.surfaces;
         let room = MAX_SURFACES - kinks.len() - usize::from(self.kinks.clocked);
-        let jumps = (0..kinks.len()).filter(|&j| self.kinks.jumps[j] && kinks[j].is_affine());
         let mut surfaces = Vec::new();
-        for (i, surface) in jumps.take(room.min(sliding_mode::MAX_SLIDING)).enumerate() {
+        for &surface in self.kinks.sliding.iter().take(room.min(sliding_mode::MAX_SLIDING)) {
             let at = |x: &[S; D]| {
                 let place = Place { t: S::zero(), x, rates: &[], parameters: values, inputs: &[] };
                 kinks[surface].value(&place, &mut [S::zero(); DEEP])
@@ -353,16 +355,13 @@ impl<const D: usize> FormulaFamily<D> {
             let offset = at(&x);
             let mut gradient = x;
             for n in 0..D {
-                x[n] = S::one();
-                gradient[n] = at(&x) - offset;
+                // Far off, where the constant does not take digits from the difference.
+                x[n] = S::constant(FAR);
+                gradient[n] = (at(&x) - offset).scale(1.0 / FAR);
                 x[n] = S::zero();
             }
-            surfaces.push(SlidingSurface {
-                surface,
-                mode: kinks.len() + i,
-                offset,
-                gradient: gradient.to_vec(),
-            });
+            let mode = kinks.len() + surfaces.len();
+            surfaces.push(SlidingSurface { surface, mode, offset, gradient: gradient.to_vec() });
         }
         surfaces
     }

@@ -89,27 +89,24 @@ pub fn rates<S: Scalar>(surfaces: &[SlidingSurface<S>], sides: &Sides<S>, law: L
     }
 }
 
-/// The weights with which the law stays on every surface whose mode is on (Utkin's equivalent control).
+/// The weights with which the law stays on every surface that it slides on (Utkin's equivalent control).
+///
+/// The side of such a surface is false: its other side is what is mixed in.
 fn balance<S: Scalar>(surfaces: &[SlidingSurface<S>], sides: &Sides<S>, law: Law<'_, S>) -> Balance<S> {
     let (count, states) = (surfaces.len(), surfaces[0].gradient.len());
-    let mut above = *sides;
-    for own in surfaces {
-        above[own.surface] = S::mask(true);
-    }
     let mut rates = [S::zero(); MOST];
-    law(&above, &mut rates[..states]);
+    law(sides, &mut rates[..states]);
     let mut halves = [[S::zero(); MOST]; MAX_SLIDING];
     for (half, own) in halves.iter_mut().zip(surfaces) {
-        let mut below = above;
-        below[own.surface] = S::mask(false);
-        law(&below, &mut half[..states]);
+        let mut above = *sides;
+        above[own.surface] = S::mask(true);
+        law(&above, &mut half[..states]);
         for (part, &rate) in half.iter_mut().zip(&rates) {
-            *part = (rate - *part).scale(0.5);
+            *part = (*part - rate).scale(0.5);
         }
     }
-    // What goes from each upper side towards the lower one: nothing or all where the law does not slide.
     let mut matrix = [[S::zero(); MAX_SLIDING]; MAX_SLIDING];
-    let mut down = [S::zero(); MAX_SLIDING];
+    let mut up = [S::zero(); MAX_SLIDING];
     let mut away = [S::zero(); MAX_SLIDING];
     for (i, own) in surfaces.iter().enumerate() {
         let slides = sides[own.mode];
@@ -118,11 +115,10 @@ fn balance<S: Scalar>(surfaces: &[SlidingSurface<S>], sides: &Sides<S>, law: Law
             matrix[i][j] = S::select(slides, own.along(&halves[j]), rest);
         }
         away[i] = own.along(&halves[i]);
-        let stays = S::select(sides[own.surface], S::zero(), S::constant(-2.0));
-        down[i] = S::select(slides, -own.along(&rates), stays);
+        up[i] = S::select(slides, -own.along(&rates), S::zero());
     }
-    solve(count, &mut matrix, &mut down);
-    for (&part, half) in down.iter().zip(&halves[..count]) {
+    solve(count, &mut matrix, &mut up);
+    for (&part, half) in up.iter().zip(&halves[..count]) {
         for (rate, &own) in rates.iter_mut().zip(half) {
             *rate += part * own;
         }
@@ -132,7 +128,7 @@ fn balance<S: Scalar>(surfaces: &[SlidingSurface<S>], sides: &Sides<S>, law: Law
         let left = own.along(&rates);
         own.take(&mut rates, left, sides[own.mode]);
     }
-    Balance { rates, between: down.map(|part| part + S::one()), away }
+    Balance { rates, between: up.map(|part| part - S::one()), away }
 }
 
 /// Solves `matrix x = right` in place. Frictions oppose their own surface most: without pivots.
@@ -145,14 +141,14 @@ fn solve<S: Scalar>(
         for i in k + 1..count {
             let factor = matrix[i][k] / matrix[k][k];
             for j in k..count {
-                matrix[i][j] = matrix[i][j] - factor * matrix[k][j];
+                matrix[i][j] -= factor * matrix[k][j];
             }
-            right[i] = right[i] - factor * right[k];
+            right[i] -= factor * right[k];
         }
     }
     for k in (0..count).rev() {
         for j in k + 1..count {
-            right[k] = right[k] - matrix[k][j] * right[j];
+            right[k] -= matrix[k][j] * right[j];
         }
         right[k] = right[k] / matrix[k][k];
     }
@@ -176,53 +172,46 @@ pub fn margin<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides
 /// Completes the sides of a start: on surfaces the law slides, or leaves them to where it points.
 pub fn settle<S: Scalar>(surfaces: &[SlidingSurface<S>], x: &[S], sides: &mut Sides<S>, law: Law<'_, S>) {
     // All that it is on may hold one another.
-    for own in surfaces {
-        let here = own.holds(x);
+    for (i, own) in surfaces.iter().enumerate() {
+        sides[own.mode] = S::mask(false);
+        let [below, above] = speeds(surfaces, i, sides, law);
+        let here = own.holds(x).and(above.less(below));
         sides[own.mode] = here;
         sides[own.surface] = sides[own.surface].and(here.not());
     }
-    for i in 0..surfaces.len() {
-        let here = surfaces[i].slides(sides);
+    for (i, own) in surfaces.iter().enumerate() {
+        let here = own.slides(sides);
         if here.any() {
-            land(surfaces, i, sides, here, law);
+            let stays = here.and(S::zero().less(margin(surfaces, i, sides, law)));
+            let up = points_up(surfaces, i, sides, law);
+            sides[own.mode] = stays;
+            sides[own.surface] = choose(here, up.and(stays.not()), sides[own.surface]);
         }
     }
 }
 
-/// What becomes of the sides where a run gets to surface `i`, in the lanes `here`; returns those that slide.
-fn land<S: Scalar>(
-    surfaces: &[SlidingSurface<S>],
-    i: usize,
-    sides: &mut Sides<S>,
-    here: S::Mask,
-    law: Law<'_, S>,
-) -> S::Mask {
-    let SlidingSurface { surface, mode, .. } = surfaces[i];
-    let mut sliding = *sides;
-    sliding[surface] = S::mask(false);
-    sliding[mode] = S::mask(true);
-    let stays = here.and(S::zero().less(margin(surfaces, i, &sliding, law)));
-    let mut passing = *sides;
-    passing[mode] = S::mask(false);
-    let up = S::zero().less(midway(surfaces, i, &passing, law));
-    sides[mode] = choose(here, stays, sides[mode]);
-    sides[surface] = choose(here, up.and(stays.not()), sides[surface]);
-    stays
-}
-
-/// How fast the mean of both sides leaves surface `i`.
-fn midway<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides<S>, law: Law<'_, S>) -> S {
+/// How fast the law leaves surface `i` upwards on its lower and on its upper side.
+fn speeds<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides<S>, law: Law<'_, S>) -> [S; 2] {
     let own = &surfaces[i];
-    let mut sum = S::zero();
-    for side in [true, false] {
+    [false, true].map(|side| {
         let mut on = *sides;
         on[own.surface] = S::mask(side);
         on[own.mode] = S::mask(false);
         let mut here = [S::zero(); MOST];
         rates(surfaces, &on, law, &mut here[..own.gradient.len()]);
-        sum += own.along(&here);
-    }
-    sum
+        own.along(&here)
+    })
+}
+
+/// Whether the mean of both sides leaves surface `i` upwards.
+fn points_up<S: Scalar>(
+    surfaces: &[SlidingSurface<S>],
+    i: usize,
+    sides: &Sides<S>,
+    law: Law<'_, S>,
+) -> S::Mask {
+    let [below, above] = speeds(surfaces, i, sides, law);
+    S::zero().less(below + above)
 }
 
 /// Passes surface `i`, or that of its mode, in the lanes `here`: the law begins to slide, goes through, or is let go.
@@ -235,17 +224,22 @@ pub fn switch<S: Scalar>(
     law: Law<'_, S>,
 ) {
     let own = &surfaces[i];
-    let was = own.slides(sides);
-    let arrives = here.and(was.not());
-    let leaves = here.and(was);
+    let leaves = here.and(own.slides(sides));
+    let arrives = here.and(leaves.not());
+    let mut stays = S::mask(false);
     if leaves.any() {
-        let up = S::zero().less(midway(surfaces, i, sides, law));
+        let up = points_up(surfaces, i, sides, law);
         sides[own.mode] = sides[own.mode].and(leaves.not());
         sides[own.surface] = choose(leaves, up, sides[own.surface]);
     }
-    let mut stays = S::mask(false);
     if arrives.any() {
-        stays = land(surfaces, i, sides, arrives, law);
+        let mut sliding = *sides;
+        sliding[own.surface] = S::mask(false);
+        sliding[own.mode] = S::mask(true);
+        stays = arrives.and(S::zero().less(margin(surfaces, i, &sliding, law)));
+        sides[own.mode] = choose(arrives, stays, sides[own.mode]);
+        let through = sides[own.surface].not().and(stays.not());
+        sides[own.surface] = choose(arrives, through, sides[own.surface]);
     }
     let off = own.offset + own.along(x);
     own.take(x, off, stays.or(leaves));

@@ -27,12 +27,12 @@ use crate::scalar::Scalar;
 /// The operations that give the rates of a system of `D` equations.
 ///
 /// ```
-/// use udd::model::DleFamily;
+/// use udd::model::{DleFamily, MAX_SURFACES};
 /// use udd::tape::Tape;
 /// // Without damping, B = 0: two products.
 /// let tape = Tape::record(&DleFamily, &[None, Some(0.0)]).unwrap();
 /// let x = [1.0, 2.0, 3.0];
-/// assert_eq!(tape.rates(&[7.1, 0.0], 0.0, &x, &[true; 4]), [1.0, 3.0, 5.1]);
+/// assert_eq!(tape.rates(&[7.1, 0.0], 0.0, &x, &[true; MAX_SURFACES]), [1.0, 3.0, 5.1]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tape<const D: usize> {

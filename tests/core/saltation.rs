@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use approx::assert_relative_eq;
 use udd::integrate::{Ending, Failure, Integrator, Tolerance, pass, propagate};
 use udd::model::effects::{Effect, FrictionModel, Kind};
-use udd::model::{Disk, DiskFamily, Family, PendulumFamily, Sides, System, choose, sides_of};
+use udd::model::{Disk, DiskFamily, Family, MAX_SURFACES, PendulumFamily, Sides, System, choose, sides_of};
 use udd::scalar::{Dual, Mask, Scalar};
 
 const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
@@ -156,8 +156,9 @@ impl<S: Scalar> System<S, 2> for Kinked {
 fn the_saltation_matrix_is_the_book_s() {
     type N = Dual<f64, 2>;
     let (t, at) = (0.4, [-0.2, 0.6]);
-    let real: Sides<f64> = [false, true, true, true];
-    let (before, after) = (Kinked.rates(t, &at, &real), Kinked.rates(t, &at, &[true; 4]));
+    let all = [true; MAX_SURFACES];
+    let real: Sides<f64> = from_fn(|j| j > 0);
+    let (before, after) = (Kinked.rates(t, &at, &real), Kinked.rates(t, &at, &all));
     let normal = [1.0, 0.5];
     let dot = |f: [f64; 2]| normal[0] * f[0] + normal[1] * f[1] - 0.25;
 

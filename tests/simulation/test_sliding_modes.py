@@ -94,6 +94,42 @@ def test_derivatives_pass_through_sticking_and_slipping() -> None:
     np.testing.assert_allclose(found["by_parameter"][0], np.transpose(apart) / (2 * by), atol=3e-6)
 
 
+def test_friction_that_another_jump_changes() -> None:
+    """Half the friction on the side x < 1, where it does not hold what the other side's would."""
+    law = udd.Model(["x", "v"], ["v", "u0 - where(x > 1, 1, 0.5)*sign(v)"], {"u0": -0.7})
+    np.testing.assert_allclose(law.rates(0.0, [0.0, 0.0]), [0.0, -0.2])
+    run = udd.simulate(law, 2.0, [0.0, 0.0], rtol=1e-10, atol=1e-12)
+    assert run.state[-1, 0] == pytest.approx(-0.2 * 2.0**2 / 2, abs=1e-9)
+    held = law.replace(u0=0.7)
+    np.testing.assert_array_equal(held.rates(0.0, [1.5, 0.0]), [0.0, 0.0])
+    np.testing.assert_allclose(held.rates(0.0, [0.5, 0.0]), [0.0, 0.2])
+
+
+@pytest.mark.parametrize("text", ["where(x > 0, 1, 2)", "1 - where(x > 0, x, 0)"])
+def test_a_start_on_a_surface_that_is_left_at_second_order(text: str) -> None:
+    run = udd.simulate(udd.Model(["x", "v"], ["v", text]), 1.0, [0.0, 0.0], rtol=1e-10, atol=1e-12)
+    assert run.outcome == "finished"
+    # v' = 1 for x > 0, or 1 - x.
+    assert run.state[-1, 0] == pytest.approx(0.5 if "2" in text else 1 - np.cos(1.0), abs=1e-8)
+
+
+def test_friction_beside_a_spring_that_acts_on_one_side() -> None:
+    """At (0, 0) on two surfaces, of which only one holds."""
+    law = udd.Model(["x", "v"], ["v", "u - F*sign(v) - where(x > 0, k*x, 0)"], {"F": 1.0, "k": 5.0, "u": 0.5})
+    np.testing.assert_array_equal(law.rates(0.0, [0.0, 0.0]), [0.0, 0.0])
+    np.testing.assert_allclose(law.replace(u=1.5).rates(0.0, [0.0, 0.0]), [0.0, 0.5])
+    frictionless = law.replace(F=0.0)
+    np.testing.assert_allclose(frictionless.rates(0.0, [0.0, 0.0]), [0.0, 0.5])
+
+
+def test_room_is_for_surfaces_that_can_hold() -> None:
+    """Three walls of the coordinate before the friction in the text."""
+    text = "-k*x - where(x > 2, 1, 0) - where(x > 3, 1, 0) + where(x < -2, 1, 0) - F*sign(v)"
+    run = udd.simulate(udd.Model(["x", "v"], ["v", text], {"k": 1.0, "F": 0.3}), 20.0, [1.5, 0.0])
+    assert run.outcome == "finished"
+    assert run.events.kind[-1] == "stick"
+
+
 class Chain:
     """A double pendulum with dry joints, event by event: modes by trying all, forces by linear equations."""
 

@@ -328,8 +328,7 @@ class FormulaModel(Model):
                 texts[state] = f"{texts[state]} + ({term})" + (f"*({factor})" if factor else "")
         # A point is no part of a name there.
         names = [name.replace(".", _POINT) for name in self.parameters]
-        late = dict(self.delays) | {delayed_by(e.slots[0]): f"{e.name}.{e.amplitudes[0]}" for e in self._late}
-        delays = {name: parameter.replace(".", _POINT) for name, parameter in late.items()}
+        delays = {name: parameter.replace(".", _POINT) for name, parameter in self.late.items()}
         return FormulaText(
             states=list(self.state_names),
             equations=list(texts.values()),
@@ -343,9 +342,10 @@ class FormulaModel(Model):
         )
 
     @property
-    def _late(self) -> list[Effect]:
-        """Those of its effects that are delays of inputs."""
-        return [effect for effect in self.effects if delayed_by(effect.slots[0])]
+    def late(self) -> dict[str, str]:
+        """The inputs and sensors that are late, each with its parameter: of :attr:`delays` and of effects."""
+        pairs = ((delayed_by(effect.slots[0]), effect) for effect in self.effects)
+        return dict(self.delays) | {name: f"{e.name}.{e.amplitudes[0]}" for name, e in pairs if name}
 
     def _entered(self, slot: str) -> dict[str, str]:
         """The states whose rates a slot adds to, and the factor in front of each; none for a rate itself."""
@@ -560,6 +560,8 @@ def _check_delay(effect: Effect, delayed: str, inputs: Sequence[str], late: Sequ
 def _written(effect: Effect) -> str:
     """An effect's formula with its parameters as the core calls them."""
     assert effect.spec.own is not None
+    if not effect.parameters:
+        return effect.spec.own[1]
     names = "|".join(map(re.escape, effect.parameters))
     return re.sub(rf"(?<![\w.])(?:{names})(?!\w)", rf"{effect.name}{_POINT}\g<0>", effect.spec.own[1])
 

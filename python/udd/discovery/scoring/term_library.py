@@ -31,6 +31,7 @@ _MOST = 200  # terms of an equation; beyond it sines and cosines are not multipl
 _WIDTHS = (0.3, 0.03, 0.002)
 #: The same of what has a threshold, in units of its own root mean square.
 _BOUNDS = (0.7, 0.2)
+_SWINGS = 0.3  # of its root mean square that its standard deviation is, for that
 
 
 def terms(model: FormulaModel) -> list[Candidate]:
@@ -62,7 +63,7 @@ def terms(model: FormulaModel) -> list[Candidate]:
 
 def delays(model: FormulaModel) -> list[Candidate]:
     """The delay of every measured input that has none: felt later, or seen later where it is negative."""
-    late = {name for name, _parameter in model.delays}
+    late = model.late
     (tau,) = _unused(model, "tau")
     result = []
     for name in model.inputs:
@@ -207,6 +208,8 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
         slot = f"force({along[state]})" if state in along else f"{state}'"
         for x, values in sizes.items():
             typical = float(np.sqrt(np.nanmean(values**2)))
+            if float(np.nanstd(values)) < _SWINGS * typical:
+                continue  # what stays on one side of zero does not show a zone about it
             for kind, term in (
                 ("dead zone", "(max({x} - {b}, 0) + min({x} + {b}, 0))"),
                 ("saturation", "tanh({x}/{b})"),
