@@ -29,6 +29,7 @@ def test_lorenz_has_the_one_where_his_chaos_becomes_an_attractor() -> None:
     assert 0.0 < one.error < 1e-10
 
 
+@pytest.mark.nightly
 def test_backward_in_time_a_cycle_leads_to_the_equilibrium() -> None:
     forward = ["10*(y-x)", "r*x-y-x*z", "x*y-8/3*z"]
     lorenz, reversed_ = (
