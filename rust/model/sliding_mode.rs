@@ -174,8 +174,11 @@ pub fn settle<S: Scalar>(surfaces: &[SlidingSurface<S>], x: &[S], sides: &mut Si
     // All that it is on may hold one another.
     for (i, own) in surfaces.iter().enumerate() {
         sides[own.mode] = S::mask(false);
-        let [below, above] = speeds(surfaces, i, sides, law);
-        let here = own.holds(x).and(above.less(below));
+        let mut here = own.holds(x);
+        if here.any() {
+            let [below, above] = speeds(surfaces, i, sides, law);
+            here = here.and(above.less(below));
+        }
         sides[own.mode] = here;
         sides[own.surface] = sides[own.surface].and(here.not());
     }
