@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan
@@ -33,9 +31,6 @@ from .score_rounds import ScoreRound
 from .thresholds import ALPHA, Confirmation
 from .time_budget import Clock
 from .trial_fits import TrialFit, fitted_ones, from_none, of_curve, of_formula, of_library, same_law
-
-From = TypeVar("From")
-To = TypeVar("To")
 
 _SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
@@ -139,10 +134,6 @@ class Acceptance:
     def __init__(self, record: Record, held_out: NDArray[np.bool_], clock: Clock, unit: float = 1.0) -> None:
         self.record, self.held_out, self.clock, self.unit = record, held_out, clock, unit
 
-    def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
-        """Independent pieces of work side by side, as long as there is time."""
-        return parallel_map(self.clock.watched(work), pieces)
-
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
         return held_out_errors(fitted, self.record, self.held_out, unit=self.unit)
@@ -210,12 +201,12 @@ class Acceptance:
             [other if c is mine else c for c in trial.candidates]
             for mine in trial.candidates
             for other in (s.candidate for s in scanned.scored)
-            if other.effect.name == mine.effect.name and other is not mine
+            if other.title == mine.title and other is not mine
         ]
-        found = fitted_ones(self._each(lambda group: from_none(current.part, group), groups))
-        others = [t for t in found if t.fit.level >= trial.fit.level and t.needed]
-        compared = [(at_level(t.fit, trial.fit.level).chi2, k, t) for k, t in enumerate([trial, *others])]
-        return min(compared)[2]
+        found = fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
+        level = trial.fit.level
+        others = [t for t in found if t.fit.level >= level and t.needed]
+        return min([trial, *others], key=lambda t: at_level(t.fit, level).chi2) if others else trial
 
     def _once(self, near: list[TrialFit]) -> list[TrialFit]:
         """Without formulas that are one of the library's laws in other words."""
@@ -256,7 +247,7 @@ class Acceptance:
             except FitError:
                 return None
 
-        pairs = zip(near, self._each(again, near), strict=True)
+        pairs = zip(near, self.clock.each(again, near), strict=True)
         wholes = [(t, w) for t, w in pairs if w is not None and w.needed]
         level = min((w.fit.level for _t, w in wholes), default=0)
         result = {}

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +44,6 @@ from .trial_fits import (
     of_library,
     one_of_each,
 )
-
-From = TypeVar("From")
-To = TypeVar("To")
 
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
 _TRIED = 6  # of the best candidates, fitted in full
@@ -121,10 +117,6 @@ class Search:
         self.clock, self.tell = clock, clock.tell
         self.given, self.free = given, free
         self.tests = Acceptance(record, held_out, clock, unit)
-
-    def _each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
-        """Independent pieces of work side by side, as long as there is time."""
-        return parallel_map(self.clock.watched(work), pieces)
 
     def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
         """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
@@ -307,7 +299,9 @@ class Search:
     def _written(self, current: SearchState, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
         """Formulas for a curve, fitted."""
         self._trying([f.text for f in formulas])
-        return fitted_ones(self._each(lambda written: of_formula(current.part, curve, written), formulas))
+        return fitted_ones(
+            self.clock.each(lambda written: of_formula(current.part, curve, written), formulas)
+        )
 
     def _trying(self, titles: list[str]) -> None:
         if titles:
@@ -324,7 +318,7 @@ class Search:
 
     def _tried(self, current: SearchState, some: list[Scored]) -> list[TrialFit]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
-        found = self._each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
+        found = self.clock.each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
         return one_of_each(fitted_ones(found))
 
     def _pairs(self, current: SearchState, scores: ScoreRound, loose: set[str]) -> list[TrialFit]:
@@ -347,7 +341,7 @@ class Search:
     def _together(self, current: SearchState, groups: list[list[Candidate]]) -> list[TrialFit]:
         """Several effects at once fitted in full, from none."""
         self._trying([" with ".join(c.title for c in group) for group in groups])
-        return fitted_ones(self._each(lambda group: from_none(current.part, group), groups))
+        return fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
 
     def _two_together(
         self, current: SearchState, scores: ScoreRound, loose: set[str]
@@ -367,7 +361,7 @@ class Search:
         """The likeliest curves, as splines and by short formulas."""
         trials: list[TrialFit] = []
         self._trying([curve.title for curve in likely])
-        for located in fitted_ones(self._each(lambda curve: of_curve(current.part, curve), likely)):
+        for located in fitted_ones(self.clock.each(lambda curve: of_curve(current.part, curve), likely)):
             trials.append(located)
             if located.curve is not None:
                 trials += self._written(current, located.curve, self._formulas(current, located.curve))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
+from udd._util.parallel import parallel_map
 from udd.errors import FitError
 
 From = TypeVar("From")
@@ -62,3 +63,7 @@ class Clock:
             return work(piece)
 
         return checked
+
+    def each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
+        """Independent pieces of work side by side, as long as there is time."""
+        return parallel_map(self.watched(work), pieces)

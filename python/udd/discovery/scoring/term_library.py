@@ -215,7 +215,7 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
                 ("saturation", "tanh({x}/{b})"),
             ):
                 title = f"{kind} of {x} in {slot}"
-                name = f"{_name(kind.replace(' ', '_'))}_of_{x}_in_{_place(slot)}"
+                name = f"{_name(kind)}_of_{x}_in_{_place(slot)}"
                 made = (model, slot, term.replace("{x}", x), name, title, typical, (-np.inf, np.inf))
                 result += _turning(*made, _BOUNDS, "shape") if typical > 0 else []
     return result
