@@ -24,7 +24,7 @@ from udd.discovery.validation.held_out_errors import (
 from udd.discovery.validation.predictive_comparison import Foretelling
 from udd.discovery.validation.sensor_drift import drift_gain
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level
+from udd.fitting import Fit, Record, at_level, started_at
 
 from .results import Alternative
 from .score_rounds import ScoreRound
@@ -287,10 +287,11 @@ class Acceptance:
             return None
 
     def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
-        """The same proposal fitted to all data."""
-        whole = current.whole
-        if whole is current.part:
+        """The same proposal fitted to all data, from where its fit to the first part ended."""
+        if current.whole is current.part:
             return trial
+        # All data take the known model alone farther astray: from there phases may be a turn off.
+        whole = started_at(current.whole, trial.fit, ~self.held_out)
         if trial.curve is None:
             return of_library(whole, trial.candidates, trial.amplitudes)
         if trial.formula is None:

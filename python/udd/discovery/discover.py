@@ -30,6 +30,7 @@ from udd.fitting import (
     record_of,
     refit,
 )
+from udd.fitting.solve import SolveError
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
@@ -91,6 +92,9 @@ def discover(
 
     Records of more than 8000 frames, of 2000 where inputs were measured, are averaged in blocks as far as
     their motion and noise allow.
+
+    *Parameters* of the model that the data do not determine are held near their stated values, give or take
+    as much, and the remarks say which.
 
     *Several records* share the model, and what is missing must be missing in all of them: the amplitudes of
     what was found are fitted to each record apart, and where one that could show the effect does not want it,
@@ -164,11 +168,23 @@ def discover(
     clock.finish("fitting the known model")
     background_import.importing("scipy.stats", "pyoperon.sklearn")
 
+    near: dict[str, tuple[float, float]] = {}
+
     def fits() -> tuple[Fit, ...]:
         parts = (record.part(train), *(() if apart else (record,)))
-        return tuple(
-            parallel_map(lambda some: fit_record(measurement, some, model, **options, search=True), parts)
-        )
+        while True:
+            options["priors"] = {**near, **(priors or {})}
+            try:
+                return tuple(
+                    parallel_map(
+                        lambda some: fit_record(measurement, some, model, **options, search=True), parts
+                    )
+                )
+            except SolveError as error:
+                more = _near_the_stated(model, error.undetermined, options["priors"])
+                if not more:
+                    raise
+                near.update(more)
 
     # Where whole records are held out, all data that a fit may see are those that effects are sought in.
     base, *others_too = checked_units(measurement, model, options, fits)
@@ -225,7 +241,22 @@ def discover(
         excused=None if excused is None else [f.title for f in found if f.effect.name in excused],
         random=random.doubts.missed if random else [],
         held_out=tuple(sorted(order[len(order) - apart :])),
+        undetermined=tuple(near),
     )
+
+
+def _near_the_stated(
+    model: Model | Sequence[Model], names: Iterable[str], priors: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Priors of parameters that have none: what was stated, give or take as much."""
+    result = {}
+    for label in sorted(names):
+        name, _, film = label.partition("[")
+        own = model if isinstance(model, Model) else model[int(film.rstrip("]") or 0)]
+        value = own.parameters.get(name, 0.0)
+        if value and not {label, name} & set(priors):
+            result[label] = (value, abs(value))
+    return result
 
 
 def _held_out(

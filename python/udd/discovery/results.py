@@ -235,6 +235,8 @@ class Discovery:
     held_out : tuple of int
         The numbers of the measurements that were held out whole; none where the last part of each was. Then
         `split` is the time in the first measurement from which pictures show free runs.
+    undetermined : tuple of str
+        Parameters that the data do not determine, held near what was stated.
     """
 
     verdict: str
@@ -257,6 +259,7 @@ class Discovery:
     excused: list[str] | None = None
     random: list[ModelError] = field(default_factory=list)
     held_out: tuple[int, ...] = ()
+    undetermined: tuple[str, ...] = ()
 
     looks = renamed_attribute("looks", "comparisons")
     refused = renamed_attribute("refused", "rejected")
@@ -350,6 +353,11 @@ class Discovery:
                 for one in readings(self.fit)
                 if one.coarse
             ]
+        if self.undetermined:
+            said.append(
+                f"The data do not determine {', '.join(self.undetermined)}: each was held near its stated "
+                "value, give or take as much. Their numbers say little more than was stated."
+            )
         fixed = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if fixed:
             said.append(

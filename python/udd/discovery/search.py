@@ -46,7 +46,8 @@ from .trial_fits import (
 )
 
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
-_TRIED = 6  # of the best candidates, fitted in full
+_TRIED = 12  # of the best candidates, fitted in full
+_TOGETHER = 6  # pairs that may pass only together
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
@@ -347,7 +348,7 @@ class Search:
         self, current: SearchState, scores: ScoreRound, loose: set[str]
     ) -> tuple[Step, SearchState] | None:
         """Two effects at once that pass only together."""
-        best, number = scores.library.pairs(_TRIED)
+        best, number = scores.library.pairs(_TOGETHER)
         likely = [
             [s.candidate for s in group]
             for group, fall in best

@@ -12,6 +12,7 @@ from .fit import (
     ran_away,
     refit,
     released,
+    started_at,
     widened,
 )
 from .model_error_schedule import at_level, eased, smoothed_states, with_larger_model_error
@@ -38,6 +39,7 @@ __all__ = [
     "refit",
     "released",
     "smoothed_states",
+    "started_at",
     "widened",
     "with_larger_model_error",
     "within",

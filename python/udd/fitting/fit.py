@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from udd.effects import Effect
 from udd.errors import FitError
@@ -305,6 +306,18 @@ def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) ->
         FilmParameters([*values[:known], *more], camera, clock) for values, camera, clock in end.sets
     )
     return replace(fitted.problem, models=models), Point(end.states, sets)
+
+
+def started_at(fitted: Fit, part: Fit, seen: NDArray[np.bool_]) -> Fit:
+    """A fit to be gone on from where one of a part of its data ended, `seen`, and of more effects perhaps.
+
+    The states of the rest start as they were read.
+    """
+    known = len(fitted.model.parameters)
+    sets = tuple(FilmParameters(values[:known], camera, clock) for values, camera, clock in part.point.sets)
+    states = fitted.record.states.copy()
+    states[seen] = part.states
+    return replace(fitted, point=Point(states, sets))
 
 
 def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
