@@ -208,8 +208,11 @@ def discover(
     ratio = search.tests.improvement(before, end.errors) if found else (1.0, 1.0, 1.0)
     # Random forces foretell nothing: what makes free runs so much better is a law.
     random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
-    lost = not found and misses_the_motion(before, record, ~train)
-    unexplained = not found and (max(baseline.scatter, final.scatter) > UNEXPLAINED or lost)
+    unexplained = not found and (
+        max(baseline.scatter, final.scatter) > UNEXPLAINED
+        or misses_the_motion(before, record, ~train)
+        or lacks_more(final, end.errors)
+    )
     rejected: list[RejectedEffect] = end.unconfirmed
     stopped = end.stopped
     if unexplained and not rejected and end.rounds:
