@@ -178,13 +178,11 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
         if state in model.kinematic:
             continue
         for text, said, values in speeds:
-            typical = float(np.sqrt((values**2).mean()))
             # What is another body's may drive this one.
             low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
             name, title = f"dry_{_name(said)}_in_{state}", f"dry friction of {said} in {state}'"
             inner = text if text.isidentifier() else f"({text})"
-            made = (model, f"{state}'", f"tanh({inner}/{{b}})", name, title, typical, low_high)
-            result += _turning(*made) if typical > 0 else []
+            result += _turning(model, f"{state}'", f"tanh({inner}/{{b}})", name, title, values, low_high)
     return result
 
 
@@ -207,8 +205,7 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
             continue
         slot = f"force({along[state]})" if state in along else f"{state}'"
         for x, values in sizes.items():
-            typical = float(np.sqrt(np.nanmean(values**2)))
-            if float(np.nanstd(values)) < _SWINGS * typical:
+            if float(np.nanstd(values)) < _SWINGS * _typical(values):
                 continue  # what stays on one side of zero does not show a zone about it
             for kind, term in (
                 ("dead zone", "(max({x} - {b}, 0) + min({x} + {b}, 0))"),
@@ -216,8 +213,8 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
             ):
                 title = f"{kind} of {x} in {slot}"
                 name = f"{_name(kind)}_of_{x}_in_{_place(slot)}"
-                made = (model, slot, term.replace("{x}", x), name, title, typical, (-np.inf, np.inf))
-                result += _turning(*made, _BOUNDS, "shape") if typical > 0 else []
+                made = (model, slot, term.replace("{x}", x), name, title, values, (-np.inf, np.inf))
+                result += _turning(*made, _BOUNDS, "shape")
     return result
 
 
@@ -226,10 +223,10 @@ def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candid
     for along in _ways(model):
         v, where = _along(model, along)
         columns = [states[:, model.state_names.index(model.speeds[x])] for x in along.split(" - ")]
-        typical = float(np.sqrt((reduce(np.subtract, columns) ** 2).mean()))
         name, title = _name(f"dry {where}"), f"dry friction {where}"
-        made = (model, f"force({along})", f"tanh({v}/{{b}})", name, title, typical, (-np.inf, 0.0))
-        result += [replace(c, form="dry") for c in _turning(*made)] if typical > 0 else []
+        speed = reduce(np.subtract, columns)
+        made = (model, f"force({along})", f"tanh({v}/{{b}})", name, title, speed, (-np.inf, 0.0))
+        result += [replace(c, form="dry") for c in _turning(*made)]
     return result
 
 
@@ -238,18 +235,26 @@ def _said(own: dict[str, str], name: str) -> str:
     return own.get(name, f"{name}'")
 
 
+def _typical(values: NDArray[np.float64]) -> float:
+    """The root mean square."""
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
 def _turning(
     model: FormulaModel,
     slot: str,
     term: str,
     name: str,
     title: str,
-    typical: float,
+    argument: NDArray[np.float64],
     limits: tuple[float, float],
     widths: tuple[float, ...] = _WIDTHS,
     role: str = "width",
 ) -> list[Candidate]:
-    """A term that turns over within a width ``{b}``, with each of these in units of what is typical."""
+    """A term that turns over within a width ``{b}``: each of these, in units of its argument's size."""
+    typical = _typical(argument)
+    if not typical > 0.0:
+        return []
     c, b = _unused(model, "c", "eps" if role == "width" else "b")
     ranges = {c: limits, b: (0.0, np.inf)}
     spec = written(slot, f"{c}*{term.replace('{b}', b)}", name, title, [c], ranges, (c, b))
