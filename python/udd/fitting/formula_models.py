@@ -102,7 +102,7 @@ def guessed(
 def _off_the_edge(
     model: FormulaModel, t: Array, states: Array, seen: Mapping[str, Array]
 ) -> dict[str, float]:
-    """Starts of hidden states where their law does not go on beyond zero, as that of a tank's level does not.
+    """Starts of hidden states whose law does not go on beyond zero, or is flat there, as of a tank's level.
 
     They are as large as what is seen.
     """
@@ -112,7 +112,8 @@ def _off_the_edge(
     result = {}
     for k in hidden:
         aside = states[0] - 1e-3 * size * (np.arange(states.shape[1]) == k)
-        if not np.isfinite(model.rates(t[0], aside)).all():
+        beyond = model.rates(t[0], aside)
+        if not np.isfinite(beyond).all() or (beyond == model.rates(t[0], states[0])).all():
             result[model.state_names[k]] = size
     return result
 

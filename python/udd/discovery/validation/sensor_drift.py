@@ -29,23 +29,36 @@ def drift_gain(fit: Fit) -> float:
     for film in np.unique(fit.record.film):
         own = fit.record.film == film
         t = fit.record.t[own]
-        span = float(np.ptp(t))
-        number = min(_INTERVALS, int(span / (_SLOW * change))) if change > 0 else 0
-        if number < _FEWEST:
-            continue
-        inner = np.linspace(t[0], t[-1], number + 1)
-        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
-        design = BSpline.design_matrix(t, knots, 3).toarray()
-        for misfit, size in zip(fit.misfit[own].T, sd[own].T, strict=True):
+        for misfit, read, size in zip(fit.misfit[own].T, fit.record.seen[own].T, sd[own].T, strict=True):
             seen = np.isfinite(misfit)
-            if seen.sum() <= design.shape[1]:
+            # A drift is slow beside what this sensor sees of the motion: a tank's level is slow itself.
+            slow = max(change, _takes_to_change(t[seen], (read - misfit)[seen]))
+            number = min(_INTERVALS, int(float(np.ptp(t)) / (_SLOW * slow))) if slow > 0 else 0
+            if number < _FEWEST or seen.sum() <= number + 3:
                 continue
-            weighted = design[seen] / size[seen, None]
+            weighted = _splines(t, number)[seen] / size[seen, None]
             scaled = misfit[seen] / size[seen]
             left = scaled - weighted @ np.linalg.lstsq(weighted, scaled, rcond=None)[0]
             fall = float(scaled @ scaled - left @ left) / max(fit.scatter, 1.0)
-            total += fall if fall > price_of(fit) * design.shape[1] else 0.0
+            total += fall if fall > price_of(fit) * weighted.shape[1] else 0.0
     return total
+
+
+def _takes_to_change(t: Array, values: Array) -> float:
+    """Standard deviation over root mean square rate of what a channel sees, about its trend."""
+    if len(t) < _FEWEST:
+        return 0.0
+    level = values - np.polyval(np.polyfit(t - t[0], values, 1), t - t[0])
+    rate = float(np.sqrt(np.mean((np.diff(level) / np.diff(t)) ** 2)))
+    return float(level.std()) / rate if rate > 0 else 0.0
+
+
+def _splines(t: Array, intervals: int) -> Array:
+    """Cubic B-splines over a record, (n, intervals + 3)."""
+    inner = np.linspace(t[0], t[-1], intervals + 1)
+    knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
+    result: Array = BSpline.design_matrix(t, knots, 3).toarray()
+    return result
 
 
 FORETELLS = 0.5
