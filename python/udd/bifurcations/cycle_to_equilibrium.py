@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -181,9 +182,8 @@ class _Search:
         if around is None or start is None:
             return None
         step = self.time * self.flow.clock / _FINE
-        x, last, before, left = start, np.inf, np.inf, False
-        for k in range(1, round(_FINE * _LEAVES)):
-            x = self.flow.fly(values, x[np.newaxis], np.array([step]), loose=self.loose).x[0]
+        last, before, left = np.inf, np.inf, False
+        for k, x in enumerate(self._run(values, start, step), 1):
             away = np.linalg.norm((x - around.states) / self.flow.size, axis=1).min()
             if not away < _FAR:
                 return None
@@ -193,6 +193,14 @@ class _Search:
                 return float(at), self._height(values, start, around, float(at))[0]
             before, last = last, float(away)
         return None
+
+    def _run(self, values: Floats, x: Floats, step: float) -> Iterator[Floats]:
+        """The states after each step of time, a typical time of them in one call."""
+        spans: Floats = step * np.arange(1, _FINE + 1)
+        for _ in range(round(_LEAVES)):
+            states = self.flow.fly(values, np.tile(x, (_FINE, 1)), spans, loose=self.loose).x
+            yield from states
+            x = states[-1]
 
     def _start(self, values: Floats) -> Floats | None:
         rest = refined(self.flow, values, self.guess)
