@@ -196,7 +196,7 @@ class _Search:
 
     def _run(self, values: Floats, x: Floats, step: float) -> Iterator[Floats]:
         """The states after each step of time, a typical time of them in one call."""
-        spans: Floats = step * np.arange(1, _FINE + 1)
+        spans = np.arange(1.0, _FINE + 1.0) * step
         for _ in range(round(_LEAVES)):
             states = self.flow.fly(values, np.tile(x, (_FINE, 1)), spans, loose=self.loose).x
             yield from states
