@@ -37,6 +37,7 @@ _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio excee
 _DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion held, may be all there is
 #: In chi2: forms that differ by less are compared by all data and by what they foretell.
 _TIED = 4 * EVIDENCE_MARGIN
+_ASTRAY = 1.5  # times the scatter of the first part, of all data: that fit may have ended elsewhere
 _FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
 _EQUALS = 10  # forms between which all data decide
 
@@ -126,6 +127,15 @@ class TestResult:
     ratio: Ratio
     witness: Confirmation | None
     drifts: bool = False
+
+
+def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
+    """A proposal fitted to all data, from where a fit of these without it ended."""
+    if trial.curve is None:
+        return of_library(whole, trial.candidates, trial.amplitudes)
+    if trial.formula is None:
+        return of_curve(whole, trial.curve)
+    return of_formula(whole, trial.curve, trial.formula)
 
 
 class Acceptance:
@@ -287,16 +297,16 @@ class Acceptance:
             return None
 
     def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
-        """The same proposal fitted to all data, from where its fit to the first part ended."""
+        """The same proposal fitted to all data."""
         if current.whole is current.part:
             return trial
-        # All data take the known model alone farther astray: from there phases may be a turn off.
-        whole = started_at(current.whole, trial.fit, ~self.held_out)
-        if trial.curve is None:
-            return of_library(whole, trial.candidates, trial.amplitudes)
-        if trial.formula is None:
-            return of_curve(whole, trial.curve)
-        return of_formula(whole, trial.curve, trial.formula)
+        found = _fitted_to(current.whole, trial)
+        if found and found.fit.level >= trial.fit.level and found.fit.scatter < _ASTRAY * trial.fit.scatter:
+            return found
+        # All data take the known model farther astray than the first part, and phases may be turns off.
+        other = _fitted_to(started_at(current.whole, trial.fit, ~self.held_out), trial)
+        both = fitted_ones([found, other])
+        return min(both, key=lambda t: (-t.fit.level, t.fit.chi2)) if both else None
 
     def worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
