@@ -14,6 +14,7 @@ from udd.discovery.nonparametric.curve_scan import Curve, refined, rescored
 from udd.discovery.symbolic.expressions import softened, write
 from udd.discovery.symbolic.formulas import Formula
 from udd.effects import Effect
+from udd.errors import FitError
 from udd.fitting import Fit, widened
 from udd.fitting.model_error_schedule import FEW, reduce_model_error
 from udd.fitting.parameters import Free
@@ -100,11 +101,14 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     FitError
         The curve cannot be added to a model, or the fit does not converge with it.
     """
-    curve, start, settled = refined(curve, fit), fit, False
+    curve, start, settled, ended = refined(curve, fit), fit, False, True
     for _ in range(_ROUNDS):
         effect, at = curve_effect(curve, name), curve.coefficients
         problem, point = widened(fit, [effect], start)
         current = reduce_model_error(fit.measurements, problem, point, problem.schedule[1:])
+        if not (ended or current.converged):
+            raise FitError("the fit does not converge with the curve")  # twice: nor would it later
+        ended = current.converged
         curve, start = rescored(curve, current, at), current
         moved = curve.coefficients - at
         settled = bool(moved @ curve.score.information @ moved / 2 < _STILL)
