@@ -129,6 +129,17 @@ class TestResult:
     drifts: bool = False
 
 
+def _compared(trials: Sequence[TrialFit], level: int) -> list[TrialFit]:
+    """Trials held as tightly as one another, without those that cannot be solved there."""
+    result = []
+    for trial in trials:
+        try:
+            result.append(replace(trial, compared=at_level(trial.fit, level)))
+        except FitError:
+            continue
+    return result
+
+
 def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
     """A proposal fitted to all data, from where a fit of these without it ended."""
     if trial.curve is None:
@@ -166,7 +177,9 @@ class Acceptance:
             return None
         # chi2 compares only where the models are held equally tightly.
         level = min(t.fit.level for t in trials)
-        trials = [replace(t, compared=at_level(t.fit, level)) for t in trials]
+        trials = _compared(trials, level)
+        if not trials:
+            return None
         first, before = min(trials, key=lambda t: t.compared.chi2).compared, at_level(current.part, level)
         unit = first.inflation(before)
         # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
@@ -215,8 +228,8 @@ class Acceptance:
         ]
         found = fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
         level = trial.fit.level
-        others = [t for t in found if t.fit.level >= level and t.needed]
-        return min([trial, *others], key=lambda t: at_level(t.fit, level).chi2) if others else trial
+        some = [trial, *(t for t in found if t.fit.level >= level and t.needed)]
+        return min(_compared(some, level), key=lambda t: t.compared.chi2, default=trial)
 
     def _once(self, near: list[TrialFit]) -> list[TrialFit]:
         """Without formulas that are one of the library's laws in other words."""

@@ -286,10 +286,17 @@ def _windows(
 
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
-    """States at the windows' first and last frames."""
+    """States at the windows' first and last frames; as they were read where the model cannot be run there."""
     diffusion = fit.problem.schedule[fit.model.profile.discovery.filter_level]
-    first, last, _covariance = filtered(fit, record, windows, diffusion)
-    return first, last
+    try:
+        first, last, _covariance = filtered(fit, record, windows, diffusion)
+        return first, last
+    except FitError:
+        if len(windows) == 1:
+            start, end = windows[0]
+            return record.states[[start]], record.states[[end]]
+    each = [_filtered(fit, record, one[np.newaxis]) for one in windows]
+    return np.concatenate([first for first, _last in each]), np.concatenate([last for _first, last in each])
 
 
 def _settled(record: Record, own: NDArray[np.int64], window: float) -> int:
