@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import udd
+from udd.discovery.scoring.candidates import library
+from udd.discovery.scoring.look_alikes import look_alikes
 
 
 def noisy(model: udd.Model, start: list[float], share: float) -> udd.Measurement:
@@ -25,6 +27,21 @@ def test_a_form_is_found_whose_score_ranks_below_those_of_others_like_it() -> No
     assert names.index("x_y_in_z") > 6
     assert [f.effect.name for f in found.effects] == ["x_y_in_z"]
     assert abs(found.fit.parameters["x_y_in_z.c1"] + 1.054) < 4 * found.fit.errors["x_y_in_z.c1"]
+
+
+def test_what_does_nearly_the_same_along_a_motion_is_listed_whatever_its_score() -> None:
+    """Lorenz' equations near rest, where z hardly changes: x*z^2 does what x*z does."""
+    known = udd.Model(list("xyz"), {"x": "10*(y - x)", "y": "14*x - y", "z": "x*y - b*z"}, {"b": 8.0 / 3.0})
+    wrong = known.with_effects([udd.effects.formula("y'", "c*x*z^2", c=-0.07)])
+    t = np.linspace(0.0, 10.0, 512)
+    run = udd.simulate(wrong, t, [6.0, 6.3, 13.5]).state  # around rest, where z is 13
+    fitted = udd.fit(udd.Measurement(t, dict(zip("xyz", run.T, strict=True))), wrong)
+    found = look_alikes(known, fitted, library(known))
+    names = [candidate.effect.name for candidate, _amplitude in found]
+    at = names.index("x_z_in_y")
+    assert 0 <= at < 4
+    assert abs(found[at][1] + 0.07 * fitted.states[:, 2].mean()) < 0.02
+    assert "y_in_z" not in names
 
 
 def test_all_data_are_fitted_from_where_the_fit_of_the_first_part_ended() -> None:

@@ -15,6 +15,7 @@ from udd._util import chi_squared
 from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.look_alikes import look_alikes
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.symbolic.formulas import Formula, formulas_for
 from udd.discovery.validation.by_record import by_record, contested
@@ -47,6 +48,7 @@ from .trial_fits import (
 
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
 _TRIED = 12  # of the best candidates, fitted in full
+_ALIKE = 6  # more of them, that do nearly the same as the best
 _TOGETHER = 6  # pairs that may pass only together
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
@@ -272,6 +274,7 @@ class Search:
         with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
             sought = beside.submit(self._formulas, current, curve) if curve and passing else None
             singles = self._singles(current, passing)
+        singles += self._look_alikes(current, scores, singles)
         # With these the model cannot even be held as tightly as without: nor with another one beside.
         loose = {t.candidates[0].effect.name for t in singles if t.fit.level < current.part.level}
         if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
@@ -316,6 +319,18 @@ class Search:
         best = _machines_first(passing)
         self._trying([s.candidate.title for s in best])
         return self._tried(current, best)
+
+    def _look_alikes(self, current: SearchState, scores: ScoreRound, tried: list[TrialFit]) -> list[TrialFit]:
+        """What does nearly the same along the motion as the best of those tried, whatever its score."""
+        if not tried or not current.part.model.profile.written:
+            return []
+        names = {t.candidates[0].effect.name for t in tried}
+        others = [s.candidate for s in scores.library.scored if s.candidate.effect.name not in names]
+        best = min(tried, key=lambda t: (-t.fit.level, t.fit.chi2))
+        likest = look_alikes(current.part.model, best.fit, others)[:_ALIKE]
+        self._trying([candidate.title for candidate, _amplitude in likest])
+        found = self.clock.each(lambda one: of_library(current.part, [one[0]], [one[1]]), likest)
+        return one_of_each(fitted_ones(found))
 
     def _tried(self, current: SearchState, some: list[Scored]) -> list[TrialFit]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
