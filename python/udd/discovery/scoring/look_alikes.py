@@ -57,13 +57,16 @@ def look_alikes(known: Model, fitted: Fit, candidates: Iterable[Candidate]) -> l
         own = rates.ravel()
         return own - absorbed @ np.linalg.lstsq(absorbed, own)[0]
 
-    wanted = left(added(fitted.model.effects[-1]))
-    found = []
+    wanted, found = left(added(fitted.model.effects[-1])), []
+    if not wanted.any():
+        return []
     for candidate in candidates:
         if len(candidate.effect.amplitudes) != 1:
             continue
         (name,) = candidate.effect.amplitudes
         whole = added(candidate.effect.replace(**{name: 1.0}))
+        if not np.isfinite(whole).all():
+            continue
         own = left(whole)
         size = float((own**2).sum())
         if not size > _SEEN * float((whole**2).sum()):
