@@ -29,4 +29,4 @@ pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};
 pub use saltation::pass;
 pub use steps::Steps;
 pub use taylor::{Taylor, order};
-pub use tolerance::{ErrorNorm, Failure, Tolerance, WithTangents};
+pub use tolerance::{ErrorNorm, Failure, MaybeTangents, Tolerance, WithTangents};
