@@ -20,7 +20,7 @@ mod taylor;
 mod tolerance;
 
 pub use dop853::Dop853Scheme;
-pub use event_location::{Probes, TARGETS, WALL, beyond};
+pub use event_location::{Probes, TARGETS, WALL, beyond, beyond_in_turn};
 pub use integrator::{Counts, Ending, Integrator, Progress};
 pub use method::{MOST_PROBES, Method, StepStart, Trial};
 pub use propagate::propagate;
