@@ -1,7 +1,7 @@
 //! The law's own derivatives at a state.
 
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Dual, Scalar, constants};
+use crate::scalar::{Dual, Scalar, WIDTH, Wide, constants};
 use crate::unroll::vector;
 
 /// The rates at a state and their first derivatives.
@@ -23,15 +23,22 @@ pub fn linear<F: Family<D>, const D: usize>(
     t: f64,
     x: &[f64; D],
 ) -> Linearisation<D> {
-    let fixed: Vec<Dual<f64, D>> = constants(values);
-    let rates = at(&family.build(&fixed), t, &vector!(Dual<f64, D>, D; n => Dual::variable(x[n], n)));
-    let still = vector!(Dual<f64, 1>, D; n => Dual::constant(x[n]));
-    let mut by_parameter = Vec::with_capacity(values.len());
-    for p in 0..values.len() {
-        let mut varied: Vec<Dual<f64, 1>> = constants(values);
-        varied[p] = Dual::variable(values[p], 0);
-        let rates = at(&family.build(&varied), t, &still);
-        by_parameter.push(vector!(f64, D; n => rates[n].d[0]));
+    let (mut rate, mut by_state, mut by_parameter) = ([0.0; D], [[0.0; D]; D], vec![[0.0; D]; values.len()]);
+    // By the components of the state, then by the parameters.
+    let directions = D + values.len();
+    for first in (0..directions).step_by(WIDTH) {
+        let mut varied = Vec::with_capacity(values.len());
+        for (p, &value) in values.iter().enumerate() {
+            varied.push(Wide::along(value, D + p, first));
+        }
+        let rates = at(&family.build(&varied), t, &vector!(Wide, D; n => Wide::along(x[n], n, first)));
+        for n in 0..D {
+            rate[n] = rates[n].re;
+            for k in first..directions.min(first + WIDTH) {
+                let slope = if k < D { &mut by_state[n][k] } else { &mut by_parameter[k - D][n] };
+                *slope = rates[n].d[k - first];
+            }
+        }
     }
     let system = family.build(values);
     let sides = sides_of(&system, t, x);
@@ -39,11 +46,7 @@ pub fn linear<F: Family<D>, const D: usize>(
     for j in 0..system.surfaces() {
         surfaces.push(system.surface(j, t, x, &sides));
     }
-    let mut by_state = [[0.0; D]; D];
-    for n in 0..D {
-        by_state[n] = rates[n].d;
-    }
-    Linearisation { rate: vector!(f64, D; n => rates[n].re), by_state, by_parameter, surfaces }
+    Linearisation { rate, by_state, by_parameter, surfaces }
 }
 
 /// The second and third derivatives, `[n][i][j]` and `[n][i][j][k]` flat.

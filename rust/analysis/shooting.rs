@@ -2,7 +2,10 @@
 
 use crate::analysis::CancelFlag;
 use crate::analysis::batch::parallel::try_map;
-use crate::integrate::{Dop853, Dopri5, Failure, Integrator, Method, Taylor, Tolerance, WithTangents, order};
+use crate::integrate::{
+    Dop853, Dopri5, ErrorNorm, Failure, Integrator, MaybeTangents, Method, Taylor, Tolerance, WithTangents,
+    order,
+};
 use crate::model::{AnySystem, Family};
 use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
@@ -90,30 +93,37 @@ fn one<F: Family<D>, const D: usize, const N: usize>(
     }
     let system = family.build(&values);
     let system: &dyn AnySystem<Dual<f64, N>, D> = &system;
+    // Of many states the norm and the method that are compiled for their exponents, of few the norm of fits.
+    let tangents = WithTangents(*tolerance);
+    let fitted = MaybeTangents { tolerance: *tolerance, tangents: true };
     if let Some(tape) = tape {
         let method = Taylor::new(tape, values, order(tolerance), Isa::best());
-        match follow(method, system, piece, first, tolerance, stop) {
+        let flown = match const { D > FEW } {
+            true => follow(method, system, piece, first, &tangents, stop),
+            false => follow(method, system, piece, first, &fitted, stop),
+        };
+        match flown {
             Err(failure) if tape.hands_over(&failure) => {}
             flown => return flown,
         }
     }
-    // Of many states the method that is compiled for their exponents.
     if const { D > FEW } {
-        follow(Dopri5::default(), system, piece, first, tolerance, stop)
+        follow(Dopri5::default(), system, piece, first, &tangents, stop)
     } else {
-        follow(Dop853::default(), system, piece, first, tolerance, stop)
+        follow(Dop853::default(), system, piece, first, &fitted, stop)
     }
 }
 
-fn follow<K, const D: usize, const N: usize>(
+fn follow<E, K, const D: usize, const N: usize>(
     method: K,
     system: &dyn AnySystem<Dual<f64, N>, D>,
     piece: &Segment<D>,
     first: usize,
-    tolerance: &Tolerance,
+    norm: &E,
     stop: &CancelFlag,
 ) -> Result<SegmentEnd<D>, Failure>
 where
+    E: ErrorNorm<Dual<f64, N>, D> + Copy,
     K: Method<Dual<f64, N>, D>,
 {
     // Where derivatives by the start are asked for, those by parameters come after them.
@@ -121,8 +131,7 @@ where
         |n: usize| if n < first { Dual::variable(piece.x[n], n) } else { Dual::constant(piece.x[n]) };
     let start = vector!(Dual<f64, N>, D; n => variable(n));
     let end = piece.t + piece.span;
-    let norm = WithTangents(*tolerance);
-    let mut driver = Integrator::by(method, system, piece.t, start, Some(piece.span), &norm);
+    let mut driver = Integrator::by(method, system, piece.t, start, Some(piece.span), norm);
     while driver.t() != end {
         stop.check()?;
         driver.advance(end)?;

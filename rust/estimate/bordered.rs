@@ -109,7 +109,7 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
         let mut rows = RowMatrix::zeros(M.max(D), width);
         for i in 0..n {
             std::mem::swap(&mut now, &mut before);
-            now.fill(linear, columns, record, i);
+            now.fill::<V>(linear, columns, record, i);
             // By how much this frame and the one before take part in each row.
             let (mut h, mut h_back) = ([[0.0; M]; D], [[0.0; M]; D]);
             let mut remembered = false;
@@ -121,14 +121,14 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                 }
                 let memory = record.remembered(i, m, before.there[m]);
                 let scale = (1.0 - memory * memory).sqrt().recip();
-                add(row, scale, now.columns.row(m));
+                add::<V>(row, scale, now.columns.row(m));
                 for k in 0..D {
                     h[k][m] = now.h[m][k] * scale;
                 }
                 if memory != 0.0 {
                     remembered = true;
                     let back = -memory * scale;
-                    add(row, back, before.columns.row(m));
+                    add::<V>(row, back, before.columns.row(m));
                     for k in 0..D {
                         h_back[k][m] = before.h[m][k] * back;
                     }
@@ -138,13 +138,13 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
             let rows = &rows.numbers()[..M * width];
             add_products(&mut system.diagonal[i], &h, &h);
             for k in 0..D {
-                combine(system.border.row_mut(D * i + k), &h[k], rows);
+                combine::<V>(system.border.row_mut(D * i + k), &h[k], rows);
             }
             if remembered {
                 add_products(&mut system.diagonal[i - 1], &h_back, &h_back);
                 add_products(&mut system.below[i - 1], &h, &h_back);
                 for k in 0..D {
-                    combine(system.border.row_mut(D * (i - 1) + k), &h_back[k], rows);
+                    combine::<V>(system.border.row_mut(D * (i - 1) + k), &h_back[k], rows);
                 }
             }
         }
@@ -168,12 +168,12 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
                     a[j][k] = -w * link.slope(k, j);
                     system.below[i][(k, j)] += w * a[j][k];
                 }
-                add(system.border.row_mut(D * (i + 1) + k), w, row);
+                add::<V>(system.border.row_mut(D * (i + 1) + k), w, row);
                 squares.push::<V>(row, &mut system.corner);
             }
             add_products(&mut system.diagonal[i], &a, &a);
             for j in 0..D {
-                combine(system.border.row_mut(D * i + j), &a[j], &rows.numbers()[..D * width]);
+                combine::<V>(system.border.row_mut(D * i + j), &a[j], &rows.numbers()[..D * width]);
             }
         }
         squares.flush::<V>(&mut system.corner);
@@ -219,7 +219,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
     }
 
     #[inline(always)]
-    fn fill(
+    fn fill<V: InstructionSet>(
         &mut self,
         linear: &Linearisation<D, M>,
         columns: &ParameterJacobian,
@@ -241,7 +241,7 @@ impl<const D: usize, const M: usize> Whitened<D, M> {
                 for k in 0..D {
                     h[k] += sight.h[(c, k)] * weight;
                 }
-                add(&mut row[..p], weight, columns.seen.row(M * i + c));
+                add::<V>(&mut row[..p], weight, columns.seen.row(M * i + c));
                 row[p] += weight * sight.misfit[c];
             }
             self.h[m] = h;
@@ -314,7 +314,7 @@ impl<const D: usize> Work for Elimination<'_, D> {
             if i > 0 {
                 for k in 0..D {
                     let factors = vector!(f64, D; j => -links[i - 1][(k, j)]);
-                    combine(&mut own[k * width..(k + 1) * width], &factors, before);
+                    combine::<V>(&mut own[k * width..(k + 1) * width], &factors, before);
                 }
             }
             rest.copy_from_slice(own);
@@ -322,7 +322,7 @@ impl<const D: usize> Work for Elimination<'_, D> {
                 let row = &mut own[k * width..(k + 1) * width];
                 let factors = vector!(f64, D; j => inverse[(k, j)]);
                 row.fill(0.0);
-                combine(row, &factors[..=k], &rest);
+                combine::<V>(row, &factors[..=k], &rest);
                 squares.push::<V>(row, &mut corner);
             }
             if i + 1 < n {
@@ -487,8 +487,8 @@ impl<const D: usize, const M: usize> Work for SeenVariance<'_, D, M> {
             for m in 0..M {
                 moved.fill(0.0);
                 let by_state = vector!(f64, D; k => h[(m, k)]);
-                combine(&mut moved, &by_state, &shifts.numbers()[D * i * shifts.width()..]);
-                combine(&mut moved, self.linear.columns.seen.row(M * i + m), root.numbers());
+                combine::<V>(&mut moved, &by_state, &shifts.numbers()[D * i * shifts.width()..]);
+                combine::<V>(&mut moved, self.linear.columns.seen.row(M * i + m), root.numbers());
                 let mut known = -0.0;
                 for k in 0..D {
                     let mut along = -0.0;
@@ -534,13 +534,13 @@ impl<const D: usize> Work for StateCovariance<'_, D> {
                 }
                 let row = alone.row_mut(j);
                 row.fill(0.0);
-                combine(row, &factors, self.root.numbers());
+                combine::<V>(row, &factors, self.root.numbers());
             }
             for k in 0..D {
                 let row = &mut own[k * width..(k + 1) * width];
-                combine(row, &vector!(f64, D; j => inverse[(j, k)]), alone.numbers());
+                combine::<V>(row, &vector!(f64, D; j => inverse[(j, k)]), alone.numbers());
                 if linked {
-                    combine(row, &vector!(f64, D; j => -taken[(j, k)]), next);
+                    combine::<V>(row, &vector!(f64, D; j => -taken[(j, k)]), next);
                 }
             }
             states[i] = conditional;

@@ -24,63 +24,107 @@ where
         let record = &self.record;
         let linear = Self { free: Vec::new(), known: None, ..self.clone() }.linearise(point)?;
         let precision = self.precision();
-        let mut at = DVector::zeros(D + M);
-        let mut spread = DMatrix::zeros(D + M, D + M);
-        let mut known = 0;
+        let mut filter =
+            Filter { states: D, at: DVector::zeros(D + M), spread: DMatrix::zeros(D + M, D + M), known: 0 };
         let mut before = [false; M];
         let mut found = vec![[f64::NAN; M]; record.t.len()];
         for (i, own) in found.iter_mut().enumerate() {
             let root = root(&record.information[i]);
-            let there: Vec<usize> = (0..M).filter(|&m| root[(m, m)] != 0.0).collect();
             let mut ahead = DMatrix::zeros(D + M, D + M);
             for m in 0..M {
                 ahead[(D + m, D + m)] = record.remembered(i, m, before[m]);
+                before[m] = root[(m, m)] != 0.0;
             }
             if i > 0 && record.linked[i - 1] {
                 let link = &linear.flow[i - 1];
-                ahead.view_mut((0, 0), (D, D)).copy_from(&link.a());
-                at = &ahead * at;
-                spread = &ahead * spread * ahead.transpose();
-                for k in 0..D {
-                    at[k] -= link.defect[k];
-                    spread[(k, k)] += precision[i - 1][k].recip();
+                for m in 0..D {
+                    for k in 0..D {
+                        ahead[(m, k)] = link.slope(m, k);
+                    }
                 }
+                filter.go_on(&ahead, link.defect.as_slice(), precision[i - 1].as_slice());
             } else {
-                at.fill(0.0);
-                spread.fill(0.0);
-                (0..D).for_each(|k| spread[(k, k)] = vague[k].powi(2));
-                known = 0;
+                filter.begin(vague);
             }
-            (D..D + M).for_each(|e| spread[(e, e)] += 1.0 - ahead[(e, e)].powi(2));
-            before = std::array::from_fn(|m| there.contains(&m));
-            if there.is_empty() {
-                continue;
-            }
-
-            // What is seen of state and noise: h x + root^-1 e.
-            let rows = there.len();
-            let within = DMatrix::from_fn(rows, rows, |r, c| root[(there[r], there[c])]);
-            let noise = within.try_inverse().expect("the diagonal of a triangle has no zero");
+            filter.renew_noise(&ahead);
             let sight = &linear.sights[i];
-            let mut seen = DMatrix::zeros(rows, D + M);
-            for r in 0..rows {
-                (0..D).for_each(|k| seen[(r, k)] = sight.h[(there[r], k)]);
-                (0..rows).for_each(|c| seen[(r, D + there[c])] = noise[(r, c)]);
-            }
-            let rest = DVector::from_fn(rows, |r, _| sight.misfit[there[r]]) - &seen * &at;
-            let across = &seen * &spread;
-            let expected = &across * seen.transpose();
-            if known >= SETTLED {
-                for (r, &m) in there.iter().enumerate() {
-                    own[m] = rest[r] / expected[(r, r)].sqrt();
-                }
-            }
-            let inverse = expected.cholesky().ok_or(EstimateError::Singular { t: record.t[i] })?;
-            at += across.tr_mul(&inverse.solve(&rest));
-            spread -= across.tr_mul(&inverse.solve(&across));
-            spread = (&spread + spread.transpose()) / 2.0;
-            known += 1;
+            filter
+                .see(root.as_slice(), sight.h.as_slice(), sight.misfit.as_slice(), own)
+                .ok_or(EstimateError::Singular { t: record.t[i] })?;
         }
         Ok(found)
+    }
+}
+
+/// The filter, for any numbers of states and channels.
+struct Filter {
+    states: usize,
+    /// The states' deviations, then the noise, and their covariance.
+    at: DVector<f64>,
+    spread: DMatrix<f64>,
+    /// How many frames it has seen.
+    known: usize,
+}
+
+impl Filter {
+    /// Starts anew.
+    fn begin(&mut self, vague: &[f64]) {
+        self.at.fill(0.0);
+        self.spread.fill(0.0);
+        for (k, vague) in vague.iter().enumerate() {
+            self.spread[(k, k)] = vague.powi(2);
+        }
+        self.known = 0;
+    }
+
+    /// Goes on to the next frame.
+    fn go_on(&mut self, ahead: &DMatrix<f64>, defect: &[f64], precision: &[f64]) {
+        self.at = ahead * &self.at;
+        self.spread = ahead * &self.spread * ahead.transpose();
+        for k in 0..self.states {
+            self.at[k] -= defect[k];
+            self.spread[(k, k)] += precision[k].recip();
+        }
+    }
+
+    /// The part of the noise that is new has the rest of its variance.
+    fn renew_noise(&mut self, ahead: &DMatrix<f64>) {
+        for e in self.states..self.at.len() {
+            self.spread[(e, e)] += 1.0 - ahead[(e, e)].powi(2);
+        }
+    }
+
+    /// Looks at a frame, and puts what it brings in its place where enough is known; none where that cannot be told.
+    /// Matrices are given by their columns.
+    fn see(&mut self, root: &[f64], h: &[f64], misfit: &[f64], brought: &mut [f64]) -> Option<()> {
+        let (states, channels) = (self.states, misfit.len());
+        let root = |r: usize, c: usize| root[c * channels + r];
+        let there: Vec<usize> = (0..channels).filter(|&m| root(m, m) != 0.0).collect();
+        if there.is_empty() {
+            return Some(());
+        }
+        // What is seen of state and noise: h x + root^-1 e.
+        let rows = there.len();
+        let within = DMatrix::from_fn(rows, rows, |r, c| root(there[r], there[c]));
+        let noise = within.try_inverse().expect("the diagonal of a triangle has no zero");
+        let mut seen = DMatrix::zeros(rows, states + channels);
+        for r in 0..rows {
+            (0..states).for_each(|k| seen[(r, k)] = h[k * channels + there[r]]);
+            (0..rows).for_each(|c| seen[(r, states + there[c])] = noise[(r, c)]);
+        }
+        let rest = DVector::from_fn(rows, |r, _| misfit[there[r]]) - &seen * &self.at;
+        let across = &seen * &self.spread;
+        let expected = &across * seen.transpose();
+        if self.known >= SETTLED {
+            for (r, &m) in there.iter().enumerate() {
+                brought[m] = rest[r] / expected[(r, r)].sqrt();
+            }
+        }
+        let inverse = expected.cholesky()?;
+        self.at += across.tr_mul(&inverse.solve(&rest));
+        self.spread -= across.tr_mul(&inverse.solve(&across));
+        self.spread = (&self.spread + self.spread.transpose()) / 2.0;
+        self.known += 1;
+        Some(())
     }
 }

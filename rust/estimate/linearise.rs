@@ -11,11 +11,11 @@ use super::parameter_jacobian::{
     FurtherDirections, ParameterJacobian, WIDTH, Wide, acting, camera, clock, columns_of, model, tagged,
 };
 use super::row_matrix::RowMatrix;
-use super::sensor::{Moment, rates, seen};
+use super::sensor::{Moment, rates, see_late};
 use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Sensor, Unknowns};
 use crate::analysis::batch::parallel::in_parts;
-use crate::model::Family;
-use crate::scalar::{InstructionSet, Isa, Scalar, Work, constants};
+use crate::model::{Family, System};
+use crate::scalar::{InstructionSet, Isa, Scalar, Work, constants, run_with};
 use crate::unroll::vector;
 
 /// Frames are looked at by so many at least: each takes about a microsecond.
@@ -187,7 +187,7 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
         let rate = rates(&law.system, t, &x);
         // The parameters of the model are seen through the rate, by a camera that looks at it, or by formulas.
         let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
-        let expected = seen(sensor, &law.system, &view.plain, &at);
+        let expected = see::<V, _, _, D, M>(sensor, Some(&law.system), &view.plain, &at);
         fill(rows, p, &expected, live, &view.model);
         sight.misfit = self.of.misfit(i, &vector!(f64, M; m => expected[m].re));
         for m in 0..M {
@@ -199,7 +199,8 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
         let rate = vector!(Wide, D; k => Wide::constant(rate[k].re));
         let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
         for (camera, columns) in &view.tagged {
-            fill(rows, p, &sensor.observe(camera, &at), 0, columns);
+            let expected = see::<V, _, F::Built<Wide>, D, M>(sensor, None, camera, &at);
+            fill(rows, p, &expected, 0, columns);
         }
         if !view.clock.is_empty() {
             // The model's time is (1 + c) times the record's, c the clock's value.
@@ -207,13 +208,14 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
             clocked.d[0] = record.t[i];
             let rate = rates(&law.system, clocked, &x);
             let at = Moment { t: clocked, rate: &rate, ..at };
-            fill(rows, p, &seen(sensor, &law.system, &view.plain, &at), 0, &view.clock);
+            let expected = see::<V, _, _, D, M>(sensor, Some(&law.system), &view.plain, &at);
+            fill(rows, p, &expected, 0, &view.clock);
         }
         for FurtherDirections { first, columns, laws } in self.beyond {
             let (law, x): (_, [Wide; D]) = (&laws[film], variable(state, *first..live));
             let rate = rates(&law.system, t, &x);
             let at = Moment { t, x: &x, rate: &rate, parameters: &law.values };
-            let expected = seen(sensor, &law.system, &view.plain, &at);
+            let expected = see::<V, _, _, D, M>(sensor, Some(&law.system), &view.plain, &at);
             for m in 0..M {
                 for k in *first..live.min(first + WIDTH) {
                     sight.h[(m, k)] = expected[m].d[k - first];
@@ -221,6 +223,39 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
             }
             fill(rows, p, &expected, live.saturating_sub(*first), &columns[film]);
         }
+    }
+}
+
+/// What a sensor sees with these instructions, what is late where its law is given: a function of its own, which is long
+/// beside what is done with it.
+#[inline(always)]
+fn see<V: InstructionSet, C: Sensor<D, M>, B: System<Wide, D>, const D: usize, const M: usize>(
+    sensor: &C,
+    law: Option<&B>,
+    camera: &[Wide],
+    at: &Moment<'_, Wide, D>,
+) -> [Wide; M] {
+    run_with::<V, _>(See::<C, B, D, M> { sensor, law, camera, at })
+}
+
+struct See<'a, C, B, const D: usize, const M: usize> {
+    sensor: &'a C,
+    law: Option<&'a B>,
+    camera: &'a [Wide],
+    at: &'a Moment<'a, Wide, D>,
+}
+
+impl<C: Sensor<D, M>, B: System<Wide, D>, const D: usize, const M: usize> Work for See<'_, C, B, D, M> {
+    type Output = [Wide; M];
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> [Wide; M] {
+        let Self { sensor, law, camera, at } = self;
+        let mut all = sensor.observe(camera, at);
+        if let Some(law) = law {
+            see_late(sensor, law, camera, at, &mut all);
+        }
+        all
     }
 }
 

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use super::{EstimateError, Estimator, Role, Sensor, Unknowns};
 use crate::analysis::batch::parallel::try_in_parts;
-use crate::integrate::{Failure, Integrator, Method, Taylor, Tolerance, order};
+use crate::integrate::{ErrorNorm, Failure, Integrator, MaybeTangents, Method, Taylor, Tolerance, order};
 use crate::model::{AnySystem, Family, System};
-use crate::scalar::{Dual, Isa, Scalar};
+use crate::scalar::{Dual, Isa, Scalar, Wide};
 use crate::tape::Tape;
 use crate::unroll::vector;
 
@@ -22,46 +22,45 @@ pub(super) struct Law<B, S> {
     pub system: B,
 }
 
-type BySeries<'a, S, const D: usize> = Integrator<&'a dyn AnySystem<S, D>, S, D, Tolerance, Taylor<'a, S, D>>;
+type BySeries<'a, const D: usize> =
+    Integrator<&'a dyn AnySystem<Wide, D>, Wide, D, MaybeTangents, Taylor<'a, Wide, D>>;
 
-/// What follows one film's links. It is compiled once for each kind of number: a series is of the law's tape, and
-/// beside twelve derivatives a call costs little.
-pub(super) enum TransitionIntegrator<'a, S: Scalar<Real = f64, Mask = bool>, const D: usize> {
+/// What follows one film's links. It is compiled once for each number of states: a series is of the law's tape, and
+/// beside so many derivatives a call costs little.
+pub(super) enum TransitionIntegrator<'a, const D: usize> {
     /// By the law's power series: most links take one step. Where it does not serve they are taken by the other.
-    Series(Box<BySeries<'a, S, D>>, Tolerance),
+    Series(Box<BySeries<'a, D>>, Tolerance),
     /// By a Runge-Kutta method, where the law has no series.
-    Stages(Box<Integrator<&'a dyn AnySystem<S, D>, S, D>>),
+    Stages(Box<Integrator<&'a dyn AnySystem<Wide, D>, Wide, D>>),
 }
 
 /// A link on the way from its start.
-pub(super) struct TransitionRun<'a, S, const D: usize> {
+pub(super) struct TransitionRun<'a, const D: usize> {
     pub start: f64,
     pub end: f64,
-    pub x: [S; D],
+    pub x: [Wide; D],
     /// Places on the way, as parts of it, and the states met there.
     pub places: &'a [f64],
-    pub met: &'a mut [[S; D]],
+    pub met: &'a mut [[Wide; D]],
 }
 
 /// A link's film, its start and its end in the model's time.
 pub(super) type Span = (usize, f64, f64);
 /// Where a link ends, and whether the law switched on the way.
-pub(super) type End<S, const D: usize> = ([S; D], bool);
+pub(super) type End<const D: usize> = ([Wide; D], bool);
 
-impl<'a, S, const D: usize> TransitionIntegrator<'a, S, D>
-where
-    S: Scalar<Real = f64, Mask = bool>,
-{
-    fn new<M: System<S, D>>(
+impl<'a, const D: usize> TransitionIntegrator<'a, D> {
+    fn new<M: System<Wide, D>>(
         tape: Option<(&'a Tape<D>, usize)>,
-        law: &'a Law<M, S>,
+        law: &'a Law<M, Wide>,
         tolerance: &Tolerance,
     ) -> Self {
-        let (x, system): (_, &dyn AnySystem<S, D>) = ([S::zero(); D], &law.system);
+        let (x, system): (_, &dyn AnySystem<Wide, D>) = ([Wide::zero(); D], &law.system);
         match tape {
             Some((tape, order)) => {
                 let method = Taylor::new(tape, law.values.clone(), order, Isa::best());
-                let driver = Integrator::by(method, system, 0.0, x, Some(1.0), tolerance);
+                let norm = MaybeTangents { tolerance: *tolerance, tangents: false };
+                let driver = Integrator::by(method, system, 0.0, x, Some(1.0), &norm);
                 Self::Series(Box::new(driver), *tolerance)
             }
             None => Self::Stages(Box::new(Integrator::new(system, 0.0, x, Some(1.0), tolerance))),
@@ -69,13 +68,13 @@ where
     }
 
     /// Follows a link; the first trial step is all of it.
-    pub fn follow(&mut self, way: TransitionRun<'_, S, D>) -> Result<End<S, D>, Failure> {
+    pub fn follow(&mut self, way: TransitionRun<'_, D>) -> Result<End<D>, Failure> {
         match self {
             Self::Series(driver, tolerance) => {
                 let TransitionRun { start, end, x, places, met } = way;
                 match follow(driver, TransitionRun { start, end, x, places, met: &mut *met }) {
                     Err(failure) if failure.is_of_series() => {
-                        let mut stages: Integrator<_, S, D> =
+                        let mut stages: Integrator<_, Wide, D> =
                             Integrator::new(*driver.system(), start, x, Some(end - start), tolerance);
                         follow(&mut stages, TransitionRun { start, end, x, places, met })
                     }
@@ -87,14 +86,14 @@ where
     }
 }
 
-fn follow<M, S, K, const D: usize>(
-    driver: &mut Integrator<M, S, D, Tolerance, K>,
-    way: TransitionRun<'_, S, D>,
-) -> Result<End<S, D>, Failure>
+fn follow<M, E, K, const D: usize>(
+    driver: &mut Integrator<M, Wide, D, E, K>,
+    way: TransitionRun<'_, D>,
+) -> Result<End<D>, Failure>
 where
-    S: Scalar<Real = f64, Mask = bool>,
-    M: System<S, D>,
-    K: Method<S, D>,
+    M: System<Wide, D>,
+    E: ErrorNorm<Wide, D> + Copy,
+    K: Method<Wide, D>,
 {
     let TransitionRun { start, end, x, places, met } = way;
     driver.start(true, start, x, Some(end - start));
@@ -162,19 +161,14 @@ where
     /// What `one` makes of every link, given its number, its span and where to keep it; `none` for frames that are
     /// not linked. It is kept where `found` was.
     #[allow(clippy::type_complexity, reason = "a name for it would take as many parameters")]
-    pub(super) fn each_link<S, T: Clone + Send + Sync>(
+    pub(super) fn each_link<T: Clone + Send + Sync>(
         &self,
         point: &Unknowns<D>,
-        laws: &[Law<F::Built<S>, S>],
-        one: &(
-             dyn Fn(&mut TransitionIntegrator<'_, S, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync
-         ),
+        laws: &[Law<F::Built<Wide>, Wide>],
+        one: &(dyn Fn(&mut TransitionIntegrator<'_, D>, usize, Span, &mut T) -> Result<(), Failure> + Sync),
         none: &T,
         mut found: Vec<T>,
-    ) -> Result<Vec<T>, EstimateError>
-    where
-        S: Scalar<Real = f64, Mask = bool>,
-    {
+    ) -> Result<Vec<T>, EstimateError> {
         let tape = self.tape(point);
         let series = tape.as_ref().map(|tape| (tape, order(&self.tolerance)));
         let tolerance = self.tolerance.filled::<D>(self.family.idle());
@@ -182,7 +176,7 @@ where
         found.resize(self.record.linked.len(), none.clone());
         try_in_parts(&mut found, TOGETHER, &|first, part| {
             // The film whose links were followed last, and what followed them.
-            let mut last: Option<(usize, TransitionIntegrator<'_, S, D>)> = None;
+            let mut last: Option<(usize, TransitionIntegrator<'_, D>)> = None;
             for (j, found) in part.iter_mut().enumerate() {
                 let i = first + j;
                 let Some(link) = self.link(point, i) else {

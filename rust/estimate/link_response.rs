@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::bordered::zeros;
 use super::link_propagation::{Law, Span, TransitionIntegrator, TransitionRun, variable};
@@ -88,7 +88,7 @@ where
             further: vec![[0.0; D]; D.saturating_sub(WIDTH)],
             end_rate: zero,
         };
-        let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
+        let one = |follower: &mut TransitionIntegrator<'_, D>,
                    i: usize,
                    (film, start, end): Span,
                    link: &mut Transition<D>| {
@@ -111,7 +111,7 @@ where
         let (laws, live) = (self.own_laws(point), self.live());
         let place = QuadraturePoint { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };
         let none = QuadraturePoints { switched: false, places: [place; PLACES_PER_LINK] };
-        let one = |follower: &mut TransitionIntegrator<'_, Wide, D>,
+        let one = |follower: &mut TransitionIntegrator<'_, D>,
                    i: usize,
                    (_, start, end): Span,
                    found: &mut QuadraturePoints<D>| {
@@ -132,13 +132,21 @@ where
             for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
-                let back = here[q].try_inverse().unwrap_or_else(zeros);
-                let response = a * back * (WEIGHTS[q] * (end - start));
+                invert(here[q].as_mut_slice(), D);
+                let response = a * here[q] * (WEIGHTS[q] * (end - start));
                 found.places[q] = QuadraturePoint { since, t: start + since, state: states[q], response };
             }
             Ok(())
         };
         self.each_link(point, &laws, &one, &none, Vec::new())
+    }
+}
+
+/// Puts the inverse of a square matrix in its place, zeros where it has none. Compiled for any size: it is long.
+fn invert(numbers: &mut [f64], size: usize) {
+    match DMatrix::from_column_slice(size, size, numbers).try_inverse() {
+        Some(inverse) => numbers.copy_from_slice(inverse.as_slice()),
+        None => numbers.fill(0.0),
     }
 }
 

@@ -10,14 +10,12 @@ use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Role, Senso
 use crate::analysis::batch::parallel::in_parts;
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Dual, Scalar, constants};
+use crate::scalar::{Scalar, constants};
+pub(super) use crate::scalar::{WIDTH, Wide};
 use crate::unroll::vector;
 
 /// Blocks of rows are worked on by so many at least.
 const TOGETHER: usize = 16;
-/// In how many directions one evaluation differentiates.
-pub const WIDTH: usize = 8;
-pub(super) type Wide = Dual<f64, WIDTH>;
 
 /// One column per parameter: `M` rows for each frame, of what is seen, and `D` for each link, of the state at
 /// its end.
@@ -322,14 +320,18 @@ where
 
     /// The derivatives of what is seen by the state's rate; a sensor's delay plays no part.
     fn seen_by_rate(&self, set: &FilmParameters, t: f64, x: &[f64; D], rate: &[f64; D]) -> [[f64; D]; M] {
-        let x = vector!(Dual<f64, D>, D; k => Dual::constant(x[k]));
+        let x = vector!(Wide, D; k => Wide::constant(x[k]));
         let (camera, parameters) = (constants(&set.camera), constants(&set.model));
-        let rate = variable(rate, 0..D);
-        let at = Moment { t: Dual::constant(t), x: &x, rate: &rate, parameters: &parameters };
-        let seen = self.sensor.observe::<Dual<f64, D>>(&camera, &at);
         let mut slopes = [[0.0; D]; M];
-        for m in 0..M {
-            slopes[m] = seen[m].d;
+        for first in (0..D).step_by(WIDTH) {
+            let rate: [Wide; D] = variable(rate, first..D);
+            let at = Moment { t: Wide::constant(t), x: &x, rate: &rate, parameters: &parameters };
+            let seen = self.sensor.observe(&camera, &at);
+            for m in 0..M {
+                for k in first..D.min(first + WIDTH) {
+                    slopes[m][k] = seen[m].d[k - first];
+                }
+            }
         }
         slopes
     }

@@ -172,7 +172,7 @@ impl Work for Flush<'_> {
                         }
                     }
                     for j in 0..TOGETHER {
-                        add(&mut sum.row_mut(first + j)[start..start + CHUNK], *sign, &sums[j]);
+                        add::<V>(&mut sum.row_mut(first + j)[start..start + CHUNK], *sign, &sums[j]);
                     }
                     continue;
                 }
@@ -181,7 +181,7 @@ impl Work for Flush<'_> {
                     let to = &mut sum.numbers[j * width..][start..end];
                     for i in 0..*collected {
                         let row = &rows[i * width..(i + 1) * width];
-                        add(to, *sign * row[j], &row[start..end]);
+                        add::<V>(to, *sign * row[j], &row[start..end]);
                     }
                 }
             }
@@ -210,9 +210,23 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     whole + rest
 }
 
-/// Adds multiples of rows that lie one after the other, each as wide as `to`.
+/// Adds multiples of rows that lie one after the other, each as wide as `to`, with the caller's instructions.
 #[inline(always)]
-pub(super) fn combine(to: &mut [f64], factors: &[f64], rows: &[f64]) {
+pub(super) fn combine<V: InstructionSet>(to: &mut [f64], factors: &[f64], rows: &[f64]) {
+    if const { V::ISA.is_rare() } {
+        combine_apart(to, factors, rows)
+    } else {
+        combine_here(to, factors, rows)
+    }
+}
+
+#[inline(never)]
+fn combine_apart(to: &mut [f64], factors: &[f64], rows: &[f64]) {
+    combine_here(to, factors, rows);
+}
+
+#[inline(always)]
+fn combine_here(to: &mut [f64], factors: &[f64], rows: &[f64]) {
     let width = to.len();
     let count = factors.len().min(rows.len() / width);
     let (chunks, rest) = to.as_chunks_mut::<CHUNK>();
@@ -238,9 +252,19 @@ pub(super) fn combine(to: &mut [f64], factors: &[f64], rows: &[f64]) {
     }
 }
 
-/// Adds a multiple of a row to another.
+/// Adds a multiple of a row to another, with the caller's instructions.
 #[inline(always)]
-pub(super) fn add(to: &mut [f64], factor: f64, row: &[f64]) {
+pub(super) fn add<V: InstructionSet>(to: &mut [f64], factor: f64, row: &[f64]) {
+    if const { V::ISA.is_rare() } { add_apart(to, factor, row) } else { add_here(to, factor, row) }
+}
+
+#[inline(never)]
+fn add_apart(to: &mut [f64], factor: f64, row: &[f64]) {
+    add_here(to, factor, row);
+}
+
+#[inline(always)]
+fn add_here(to: &mut [f64], factor: f64, row: &[f64]) {
     let ((to, to_rest), (row, row_rest)) = (to.as_chunks_mut::<CHUNK>(), row.as_chunks::<CHUNK>());
     for c in 0..to.len() {
         for k in 0..CHUNK {

@@ -53,11 +53,26 @@ where
     C: Sensor<D, M>,
 {
     let mut all = sensor.observe(camera, at);
+    see_late(sensor, system, camera, at, &mut all);
+    all
+}
+
+/// Puts what late channels see in its place.
+#[inline(always)]
+pub(super) fn see_late<S, C, const D: usize, const M: usize>(
+    sensor: &C,
+    system: &impl System<S, D>,
+    camera: &[S],
+    at: &Moment<'_, S, D>,
+    all: &mut [S; M],
+) where
+    S: Scalar<Real = f64, Mask = bool>,
+    C: Sensor<D, M>,
+{
     for (m, own) in all.iter_mut().enumerate() {
         let Some(delay) = sensor.delay(m) else { continue };
         *own = late(sensor, system, camera, at, at.parameters[delay])[m];
     }
-    all
 }
 
 /// What is seen of the state a while before.

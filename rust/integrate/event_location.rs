@@ -58,15 +58,31 @@ pub fn beyond<M: System<S, D>, S: Scalar, const D: usize>(
         return;
     }
     let watch = SurfaceMonitor { system, at, wall, noise: NOISE };
-    // The usual numbers of places known to the compiler, which looks at them side by side.
-    if const { size_of::<S>() == size_of::<f64>() } {
-        match probes.parts.len() {
-            4 => return watch.at_places(4, probes, beyond),
-            8 => return watch.at_places(8, probes, beyond),
-            _ => {}
+    // The numbers of places, quarters or eighths, known to the compiler, which looks at them side by side.
+    match probes.parts.len() {
+        4 if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(4, probes, beyond),
+        _ if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(MOST_PROBES, probes, beyond),
+        places => watch.at_places(places, probes, beyond),
+    }
+}
+
+/// The same, one target and one place after the other: for laws whose surfaces are long to ask for.
+pub fn beyond_in_turn<M: System<S, D>, S: Scalar, const D: usize>(
+    system: &M,
+    at: &StepStart<S, D>,
+    wall: bool,
+    probes: &Probes<'_, S::Real, D>,
+    beyond: &mut [S::Mask; TARGETS],
+) {
+    if const { M::SMOOTH } {
+        return;
+    }
+    let watch = SurfaceMonitor { system, at, wall, noise: NOISE };
+    for (target, beyond) in beyond.iter_mut().enumerate() {
+        if watch.has(target) {
+            *beyond = watch.at_target(target, probes.parts.len(), probes);
         }
     }
-    watch.at_places(probes.parts.len(), probes, beyond);
 }
 
 /// What a step does to the targets, lane by lane.
@@ -142,19 +158,25 @@ where
     /// The lanes that are beyond each target at any of so many places.
     #[inline(always)]
     fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, beyond: &mut [S::Mask; TARGETS]) {
-        let parts = &probes.parts[..places];
         // Unrolled, so that each target's function is known.
         unroll!(target in 0..TARGETS => {
             if self.has(target) {
-                let mut any = S::mask(false);
-                for i in 0..places {
-                    let x = vector!(S, D; n => S::lift(probes.states[i][n]));
-                    let value = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
-                    any = any.or(value.less(S::Real::zero()));
-                }
-                beyond[target] = any;
+                beyond[target] = self.at_target(target, places, probes);
             }
         });
+    }
+
+    /// The lanes that are beyond a target at any of so many places.
+    #[inline(always)]
+    fn at_target(&self, target: usize, places: usize, probes: &Probes<'_, S::Real, D>) -> S::Mask {
+        let parts = &probes.parts[..places];
+        let mut any = S::mask(false);
+        for i in 0..places {
+            let x = vector!(S, D; n => S::lift(probes.states[i][n]));
+            let value = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
+            any = any.or(value.less(S::Real::zero()));
+        }
+        any
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.

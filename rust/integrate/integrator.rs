@@ -297,6 +297,13 @@ where
         progress
     }
 
+    /// The same as a function of its own, which all share who follow single runs: in their loops the compiler makes slower
+    /// code of it.
+    #[inline(never)]
+    pub fn trial_apart(&mut self, end: S::Real) -> Progress<S::Mask> {
+        self.trial(end)
+    }
+
     #[inline(always)]
     fn trial_within(&mut self, end: S::Real) -> Progress<S::Mask> {
         let run = &mut self.run;
@@ -726,11 +733,10 @@ where
         }
     }
 
-    /// Tries a step; where it does not end freely, says how. A function of its own: in the loop the compiler makes
-    /// slower code of it.
-    #[inline(never)]
+    /// Tries a step; where it does not end freely, says how.
+    #[inline(always)]
     fn attempt(&mut self, end: f64, ending: &mut Ending) -> Attempted {
-        let progress = self.trial(end);
+        let progress = self.trial_apart(end);
         if progress.failed {
             Attempted::Failed
         } else if progress.moved {

@@ -20,7 +20,7 @@ mod taylor;
 mod tolerance;
 
 pub use dop853::Dop853Scheme;
-pub use event_location::{Probes, TARGETS, WALL, beyond};
+pub use event_location::{Probes, TARGETS, WALL, beyond, beyond_in_turn};
 pub use integrator::{Counts, Ending, Integrator, Progress};
 pub use method::{MOST_PROBES, Method, StepStart, Trial};
 pub use propagate::propagate;
@@ -29,4 +29,4 @@ pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};
 pub use saltation::pass;
 pub use steps::Steps;
 pub use taylor::{Taylor, order};
-pub use tolerance::{ErrorNorm, Failure, Tolerance, WithTangents};
+pub use tolerance::{ErrorNorm, Failure, MaybeTangents, Tolerance, WithTangents};

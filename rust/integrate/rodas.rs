@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::method::{Method, QUARTERS, StepStart, Trial};
 use super::tolerance::ErrorNorm;
 use crate::model::System;
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::{WIDTH, Wide};
 use crate::unroll::vector;
 
 const STAGES: usize = 8;
@@ -145,20 +145,25 @@ pub struct Rodas<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Rodas<'a, D> {
-    /// For the law of these systems, over numbers with derivatives by the state, and by time.
-    pub fn new(
-        by_state: impl System<Dual<f64, D>, D> + 'a,
-        by_time: impl System<Dual<f64, 1>, D> + 'a,
-    ) -> Self {
+    /// For this law, over numbers with derivatives.
+    pub fn new(system: impl System<Wide, D> + 'a) -> Self {
+        let none = ([[0.0; D]; D], [0.0; D]);
         let slopes_at = Box::new(move |at: &StepStart<f64, D>| {
-            let varied = vector!(Dual<f64, D>, D; n => Dual::variable(at.x[n], n));
-            let still = vector!(Dual<f64, 1>, D; n => Dual::constant(at.x[n]));
-            let by_state = by_state.rates(Dual::constant(at.t), &varied, &at.sides);
-            let by_time = by_time.rates(Dual::variable(at.t, 0), &still, &at.sides);
-            (by_state.map(|rate| rate.d), by_time.map(|rate| rate.d[0]))
+            let (mut by_state, mut by_time) = none;
+            // By the components of the state, then by time.
+            for first in (0..=D).step_by(WIDTH) {
+                let x = vector!(Wide, D; n => Wide::along(at.x[n], n, first));
+                let rates = system.rates(Wide::along(at.t, D, first), &x, &at.sides);
+                for n in 0..D {
+                    for k in first..(D + 1).min(first + WIDTH) {
+                        let slope = if k < D { &mut by_state[n][k] } else { &mut by_time[n] };
+                        *slope = rates[n].d[k - first];
+                    }
+                }
+            }
+            (by_state, by_time)
         });
-        let slopes = ([[0.0; D]; D], [0.0; D]);
-        Self { slopes_at, known: None, slopes, h: 0.0, powers: [[0.0; D]; 5] }
+        Self { slopes_at, known: None, slopes: none, h: 0.0, powers: [[0.0; D]; 5] }
     }
 
     /// Finds the derivatives where a step starts, unless they are known from one that failed.

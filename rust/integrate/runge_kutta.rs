@@ -42,6 +42,13 @@ pub fn step<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P:
 ) -> ([S; D], [[S; D]; N]) {
     let mut stages = [*first; N];
     let mut new = *x;
+    if const { apart::<S>() } {
+        for i in 1..T::TABLEAU.stages {
+            new = stage::<T, S, D, N, P>(i, x, &stages, h);
+            stages[i] = system.rates(S::lift(t + h.scale(const { &T::TABLEAU }.c[i])), &new, sides);
+        }
+        return (new, stages);
+    }
     unroll!(i in 1..N => {
         if i < T::TABLEAU.stages {
             new = stage::<T, S, D, N, P>(i, x, &stages, h);
@@ -59,7 +66,34 @@ fn stage<T: Scheme<N, P>, S: Scalar, const D: usize, const N: usize, const P: us
     stages: &[[S; D]; N],
     h: S::Real,
 ) -> [S; D] {
+    if const { apart::<S>() } {
+        let mut new = combined_apart(&const { &T::TABLEAU }.a[i][..i], stages, h);
+        for n in 0..D {
+            new[n] = x[n] + new[n];
+        }
+        return new;
+    }
     components!(n => x[n] + combine(&T::TABLEAU.a[i], stages, i, n).times(h))
+}
+
+/// `h` times the sums of all stages with these weights, in every component.
+#[inline(always)]
+fn combined<S: Scalar, const D: usize, const N: usize>(
+    weights: &'static [f64; N],
+    stages: &[[S; D]; N],
+    count: usize,
+    h: S::Real,
+) -> [S; D] {
+    if const { apart::<S>() } {
+        return combined_apart(&weights[..count.min(N)], stages, h);
+    }
+    components!(n => combine(weights, stages, count, n).times(h))
+}
+
+/// Whether what is done with a number is long, as with derivatives that are not in vector registers: such steps are made
+/// of functions and loops, not written out.
+const fn apart<S: Scalar>() -> bool {
+    size_of::<S>() > size_of::<S::Real>() && S::Real::LANES == 1
 }
 
 /// `Σ_(j < count) weights_j k_j` for component `n`, the zero weights left out.
@@ -70,9 +104,6 @@ fn combine<S: Scalar, const D: usize, const N: usize>(
     count: usize,
     n: usize,
 ) -> S {
-    if const { size_of::<S>() > size_of::<S::Real>() && S::Real::LANES == 1 } {
-        return combine_apart(&weights[..count.min(N)], stages, n);
-    }
     let mut sum = stages[0][n].scale(weights[0]);
     unroll!(j in 1..N => {
         if j < count && weights[j] != 0.0 {
@@ -82,16 +113,20 @@ fn combine<S: Scalar, const D: usize, const N: usize>(
     sum
 }
 
-/// The same for numbers with derivatives, of which each is an array: not written out.
+/// As [`combined`], a function of its own.
 #[inline(never)]
-fn combine_apart<S: Scalar, const D: usize>(weights: &[f64], stages: &[[S; D]], n: usize) -> S {
-    let mut sum = stages[0][n].scale(weights[0]);
-    for j in 1..weights.len() {
-        if weights[j] != 0.0 {
-            sum += stages[j][n].scale(weights[j]);
+fn combined_apart<S: Scalar, const D: usize>(weights: &[f64], stages: &[[S; D]], h: S::Real) -> [S; D] {
+    let mut all = [S::zero(); D];
+    for n in 0..D {
+        let mut sum = stages[0][n].scale(weights[0]);
+        for j in 1..weights.len() {
+            if weights[j] != 0.0 {
+                sum += stages[j][n].scale(weights[j]);
+            }
         }
+        all[n] = sum.times(h);
     }
-    sum
+    all
 }
 
 /// A Runge-Kutta pair as a [`Method`].
@@ -175,11 +210,11 @@ where
     ) -> Trial<S, D> {
         let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
         let count = T::TABLEAU.stages;
-        let error = components!(n => combine(&T::TABLEAU.e, &stages, count, n).times(h));
+        let error = combined(&const { &T::TABLEAU }.e, &stages, count, h);
         let mut error = norm.of_step(&error, &at.x, &x);
-        if let Some(low) = &T::TABLEAU.e_low {
+        if let Some(low) = &const { &T::TABLEAU }.e_low {
             // Hairer's combination, which behaves as h^8.
-            let low = components!(n => combine(low, &stages, count, n).times(h));
+            let low = combined(low, &stages, count, h);
             let (square, low) = (error * error, norm.of_step(&low, &at.x, &x));
             let both = square + (low * low).scale(0.01);
             error = S::Real::select(S::Real::zero().less(both), square / both.sqrt(), error);

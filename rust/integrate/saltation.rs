@@ -21,7 +21,7 @@ const GRAZE: f64 = 1e-5;
 /// of Non-Smooth Mechanical Systems, 2004, ch. 7); `g` may depend on time and on parameters too.
 ///
 /// The state's values are those of [`System::switch`], to the last bit.
-#[inline(always)]
+#[inline(never)]
 pub fn pass<S: Scalar, const D: usize>(
     system: &impl System<S, D>,
     j: usize,

@@ -58,9 +58,11 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         for halvings in 0..=MOST_HALVINGS {
             let Trial { size, error, .. } = *trial;
             let (isa, known) = (self.jets.isa(), error.finite());
+            let end = vector!(S::Real, D; n => trial.x[n].real());
             let mut strays = |part: f64| {
                 let dt = size.scale(part);
-                let defect = Defect { method: &mut *self, at, from: &from, size, dt, norm };
+                let x = if part == 1.0 { end } else { self.real_at(dt, &[true; D]) };
+                let defect = Defect { method: &mut *self, at, from: &from, x: &x, size, dt, norm };
                 // Packets are only fast with their own instructions.
                 let defect = if const { S::Real::LANES > 1 } {
                     S::Real::work(isa, defect)
@@ -89,11 +91,12 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
 }
 
 /// By how much the rates of the polynomial at a distance `dt` miss those of the law, over a step of this `size`, in
-/// units of what its error may be.
+/// units of what its error may be; `x` is the state there.
 struct Defect<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
     at: &'a StepStart<S, D>,
     from: &'a [S::Real; D],
+    x: &'a [S::Real; D],
     size: S::Real,
     dt: S::Real,
     norm: &'a E,
@@ -104,12 +107,11 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Defect<'_, '_, S, D
 
     #[inline(always)]
     fn run<V: InstructionSet>(self) -> S::Real {
-        let Self { method, at, from, size, dt, norm } = self;
-        let x = method.jets.real_at(dt, &[true; D]);
-        let rates = method.jets.rates(method.tape, at.t + dt, &x, &at.sides);
+        let Self { method, at, from, x, size, dt, norm } = self;
+        let rates = method.jets.rates(method.tape, at.t + dt, x, &at.sides);
         let slope = method.jets.slope_here(dt);
         let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
-        norm.state().norm(defect, *from, x)
+        norm.state().norm(defect, *from, *x)
     }
 }
 
@@ -165,7 +167,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     }
 
     fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
-        self.jets.real_at(dt, of)
+        self.along(dt, &[1.0], of)[0]
     }
 
     fn along(&self, h: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; MOST_PROBES] {

@@ -139,6 +139,45 @@ impl<R: Real, const D: usize, const N: usize> ErrorNorm<Dual<R, N>, D> for WithT
     }
 }
 
+/// The norm with tangents, or that of the state alone: runs by either share what is compiled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaybeTangents {
+    pub tolerance: Tolerance,
+    pub tangents: bool,
+}
+
+impl<R: Real, const D: usize, const N: usize> ErrorNorm<Dual<R, N>, D> for MaybeTangents {
+    #[inline(always)]
+    fn of_step(&self, error: &[Dual<R, N>; D], before: &[Dual<R, N>; D], after: &[Dual<R, N>; D]) -> R {
+        match self.tangents {
+            true => WithTangents(self.tolerance).of_step(error, before, after),
+            false => self.tolerance.of_step(error, before, after),
+        }
+    }
+
+    type Weights = ([R; D], [R; N]);
+
+    #[inline(always)]
+    fn weights(&self, start: &[Dual<R, N>; D]) -> ([R; D], [R; N]) {
+        match self.tangents {
+            true => WithTangents(self.tolerance).weights(start),
+            false => (self.tolerance.weights(start), [R::zero(); N]),
+        }
+    }
+
+    #[inline(always)]
+    fn of_term(&self, term: &[Dual<R, N>; D], weights: &([R; D], [R; N])) -> R {
+        match self.tangents {
+            true => WithTangents(self.tolerance).of_term(term, weights),
+            false => self.tolerance.of_term(term, &weights.0),
+        }
+    }
+
+    fn state(&self) -> &Tolerance {
+        &self.tolerance
+    }
+}
+
 /// The square of the length of tangent `i`.
 #[inline(always)]
 fn square<R: Real, const D: usize, const N: usize>(x: &[Dual<R, N>; D], i: usize) -> R {

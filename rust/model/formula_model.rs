@@ -7,6 +7,7 @@ use super::{
     Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System, choose, parameter,
 };
 use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
+use crate::integrate::{Probes, StepStart, TARGETS, beyond_in_turn};
 use crate::scalar::{Mask, Real, Scalar};
 use crate::unroll::vector;
 
@@ -215,6 +216,16 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         inputs.side(t.lane(0), forwards)
     }
 
+    fn beyond(
+        &self,
+        at: &StepStart<S, D>,
+        wall: bool,
+        probes: &Probes<'_, S::Real, D>,
+        found: &mut [S::Mask; TARGETS],
+    ) {
+        beyond_in_turn(self, at, wall, probes, found);
+    }
+
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
         let InputValues::Measured(inputs) = &self.inputs else { unreachable!("only asked of these") };
         inputs.piece(k, t, sides[self.knots()])
@@ -337,39 +348,43 @@ impl<const D: usize> FormulaFamily<D> {
 
     fn built<S: Scalar>(&self, values: &[S], inputs: InputValues<S>) -> Own<S, D> {
         let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
-        let sliding = self.sliding_surfaces(values);
+        let sliding = sliding_surfaces(&kinks, D, values);
         Own { equations, kinks, sliding, deep: self.deep, parameters: values.to_vec(), inputs }
-    }
-
-    /// The surfaces that the law may slide on, as many as there is room for.
-    fn sliding_surfaces<S: Scalar>(&self, values: &[S]) -> Vec<SlidingSurface<S>> {
-        let kinks = &self.kinks.surfaces;
-        let room = MAX_SURFACES - kinks.len() - usize::from(self.kinks.clocked);
-        let mut surfaces = Vec::new();
-        for &surface in self.kinks.sliding.iter().take(room.min(sliding_mode::MAX_SLIDING)) {
-            let at = |x: &[S; D]| {
-                let place = Place { t: S::zero(), x, rates: &[], parameters: values, inputs: &[] };
-                kinks[surface].value(&place, &mut [S::zero(); DEEP])
-            };
-            let mut x = [S::zero(); D];
-            let offset = at(&x);
-            let mut gradient = x;
-            for n in 0..D {
-                // Far off, where the constant does not take digits from the difference.
-                x[n] = S::constant(FAR);
-                gradient[n] = (at(&x) - offset).scale(1.0 / FAR);
-                x[n] = S::zero();
-            }
-            let mode = kinks.len() + surfaces.len();
-            surfaces.push(SlidingSurface { surface, mode, offset, gradient: gradient.to_vec() });
-        }
-        surfaces
     }
 
     /// The right-hand sides.
     pub fn equations(&self) -> &[Expression; D] {
         &self.equations
     }
+}
+
+/// The surfaces that the law of so many states may slide on, as many as there is room for. For any number of states, so
+/// that it is compiled once for each kind of number.
+fn sliding_surfaces<S: Scalar>(kinks: &Kinks, states: usize, values: &[S]) -> Vec<SlidingSurface<S>> {
+    let mut surfaces = Vec::new();
+    // Packets have no kinks.
+    if const { S::Real::LANES > 1 } {
+        return surfaces;
+    }
+    let room = MAX_SURFACES - kinks.surfaces.len() - usize::from(kinks.clocked);
+    for &surface in kinks.sliding.iter().take(room.min(sliding_mode::MAX_SLIDING)) {
+        let at = |x: &[S]| {
+            let place = Place { t: S::zero(), x, rates: &[], parameters: values, inputs: &[] };
+            kinks.surfaces[surface].value(&place, &mut [S::zero(); DEEP])
+        };
+        let mut x = vec![S::zero(); states];
+        let offset = at(&x);
+        let mut gradient = x.clone();
+        for n in 0..states {
+            // Far off, where the constant does not take digits from the difference.
+            x[n] = S::constant(FAR);
+            gradient[n] = (at(&x) - offset).scale(1.0 / FAR);
+            x[n] = S::zero();
+        }
+        let mode = kinks.surfaces.len() + surfaces.len();
+        surfaces.push(SlidingSurface { surface, mode, offset, gradient });
+    }
+    surfaces
 }
 
 /// Equations of `D` states, of which those that are not given rest.

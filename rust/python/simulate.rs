@@ -84,7 +84,7 @@ fn run<F: Family<D>, const D: usize>(
     let tolerance = &tolerance.filled::<D>(idle);
     let (stiff, stop) = ((stop, None), (stop, stiffness));
     let rodas = || {
-        let method = Rodas::new(family.build(&constants(values)), family.build(&constants(values)));
+        let method = Rodas::new(family.build(&constants(values)));
         let system: &dyn model::AnySystem<f64, D> = &system();
         trajectory(system, method, output, x0, tolerance, keep, stiff)
     };

@@ -31,6 +31,16 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
         Self { re, d }
     }
 
+    /// The variable of direction `i`, of which only those from `first` on, as many as there is room for, are worked out
+    /// here: else a constant.
+    #[inline(always)]
+    pub fn along(re: S, i: usize, first: usize) -> Self {
+        match i.checked_sub(first) {
+            Some(i) if i < N => Self::variable(re, i),
+            _ => Self::fixed(re),
+        }
+    }
+
     /// A value whose derivatives are zero.
     #[inline(always)]
     pub fn fixed(re: S) -> Self {

@@ -26,6 +26,12 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// have in common are vector instructions, and no bit changes. For fewer of them see [`DerivativeLanes`].
 pub type Spread<V> = Dual<Packet<4, V>, 1>;
 
+/// How many derivatives a [`Wide`] number has.
+pub const WIDTH: usize = 8;
+/// A number with derivatives in as many directions as are worked out together wherever it is not the exponents of a few
+/// states that are wanted: fits, pieces of orbits, stiff steps and linearised laws share what is compiled for it.
+pub type Wide = Dual<f64, WIDTH>;
+
 /// A number that a model can be evaluated over.
 pub trait Scalar:
     Copy

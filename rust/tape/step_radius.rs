@@ -15,12 +15,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(self.isa(), Value(self, dt))
     }
 
-    /// The same without derivatives, of these components; the others are zero.
-    pub fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
-        S::Real::work(self.isa(), RealValue(self, dt, of))
-    }
-
-    /// The same at these parts of a distance.
+    /// The same without derivatives at these parts of a distance, of these components; the others are zero.
     pub fn along<const P: usize>(&self, dt: S::Real, parts: &[f64], of: &[bool; D]) -> [[S::Real; D]; P] {
         S::Real::work(self.isa(), Along::<S, D, N, P>(self, dt, parts, of))
     }
@@ -56,6 +51,16 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     #[inline(always)]
     fn real_values(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
         let order = self.order();
+        if const { S::Real::LANES == 1 } {
+            // Only where machines are rare.
+            let mut x = [S::Real::zero(); D];
+            for n in 0..D {
+                if of[n] {
+                    x[n] = value(&self.coefficients()[n], order, dt, S::real);
+                }
+            }
+            return x;
+        }
         vector!(S::Real, D; n => if of[n] { value(&self.coefficients()[n], order, dt, S::real) } else { S::Real::zero() })
     }
 
@@ -101,7 +106,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let reach = |k: usize| {
             let term = vector!(S, D; n => series[n][k].scale(SMALL));
             let square = norm.of_term(&term, weights);
-            power_rough(square, -0.5 / k as f64).scale(SMALL.powf(1.0 / k as f64)) + square.scale(0.0)
+            let mut rough = square;
+            for lane in 0..S::Real::LANES {
+                rough.set_lane(lane, power_rough(square.lane(lane), -0.5 / k as f64));
+            }
+            rough.scale(SMALL.powf(1.0 / k as f64)) + square.scale(0.0)
         };
         let (last, before) = (reach(order), reach(order - 1));
         last.min(before) + (last + before).scale(0.0)
@@ -145,18 +154,6 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
     #[inline(always)]
     fn run<V: InstructionSet>(self) -> [S; D] {
         self.0.at_here(self.0.order(), self.1)
-    }
-}
-
-struct RealValue<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real, &'a [bool; D]);
-
-impl<S: Scalar, const D: usize, const N: usize> Work for RealValue<'_, S, D, N> {
-    type Output = [S::Real; D];
-
-    #[inline(always)]
-    fn run<V: InstructionSet>(self) -> [S::Real; D] {
-        let Self(jets, dt, of) = self;
-        jets.real_values(dt, of)
     }
 }
 

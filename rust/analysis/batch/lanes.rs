@@ -56,6 +56,21 @@ where
     /// Starts a job in a lane.
     #[inline(always)]
     pub fn load(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
+        // Of packets it is a part of what has their instructions.
+        if const { S::Real::LANES > 1 } {
+            self.load_here(lane, job, start);
+        } else {
+            self.load_apart(lane, job, start);
+        }
+    }
+
+    #[inline(never)]
+    fn load_apart(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
+        self.load_here(lane, job, start);
+    }
+
+    #[inline(always)]
+    fn load_here(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
         let mut changed = false;
         for i in 0..start.values.len() {
             let mut lanes = self.values[i].real();
@@ -103,7 +118,11 @@ where
     /// Tries a step in every lane.
     pub fn trial(&mut self) -> Progress<S::Mask> {
         let end = self.end;
-        work::<S::Real, _>(self.isa, Trial { driver: &mut self.driver, end })
+        if const { S::Real::LANES > 1 } {
+            S::Real::work(self.isa, Trial { driver: &mut self.driver, end })
+        } else {
+            self.driver.trial_apart(end)
+        }
     }
 
     /// Lanes that are at their end.

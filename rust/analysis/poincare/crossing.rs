@@ -186,7 +186,11 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
                 leave_out(stretches, &mut self.skip);
             }
             if crosses(stretches) {
-                surface.find(&law, &step, stretches, which, &mut self.crossed);
+                if const { R::LANES > 1 } {
+                    surface.find(&law, &step, stretches, which, &mut self.crossed);
+                } else {
+                    surface.find_apart(&law, &step, stretches, which, &mut self.crossed);
+                }
             }
             surface.value = R::select(moved, last, surface.value);
         }
@@ -270,6 +274,19 @@ impl<R: Real> Surface<'_, R> {
         };
         self.side.below = choose(moved, after.below, self.side.below);
         self.side.above = choose(moved, after.above, self.side.above);
+    }
+
+    /// As [`find`](Surface::find), whatever the method of a single run.
+    #[inline(never)]
+    fn find_apart<M: System<R, D>, const D: usize>(
+        &mut self,
+        law: &Law<'_, M, R>,
+        step: &Step<'_, R, D>,
+        stretches: &mut [Stretch<R>],
+        which: u8,
+        crossed: &mut Vec<(usize, Crossing<D>)>,
+    ) {
+        self.find(law, step, stretches, which, crossed);
     }
 
     /// Finds the crossings in the stretches that have one.
