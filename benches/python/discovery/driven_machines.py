@@ -197,7 +197,8 @@ def driven_one_degree(smooth: Force, dry: float, x: float, v: float, t: np.ndarr
             dense_output=True,
         )
         own = (t >= now) & (t <= run.t[-1])
-        result[own] = run.sol(t[own])[0]
+        if own.any():  # some swings are shorter than the time between two samples
+            result[own] = run.sol(t[own])[0]
         now, x, v = float(run.t[-1]), float(run.y[0, -1]), 0.0
     return result
 
