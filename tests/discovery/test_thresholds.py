@@ -60,6 +60,30 @@ def test_a_spring_with_play_is_found() -> None:
     assert abs(play - 0.08) < 4 * found.fit.errors["dead_zone_of_x_in_v.b"]
 
 
+@pytest.mark.parametrize(
+    ("kind", "gone"),
+    [
+        ("dead zone", "min(max(torque, -0.3), 0.3)"),
+        ("limit", "(max(torque - 0.5, 0) + min(torque + 0.5, 0))"),
+    ],
+)
+def test_what_a_motor_does_not_give_is_found(kind: str, gone: str) -> None:
+    """Nothing within 0.3 N m, or nothing more than 0.5: what is missing takes the whole gain, 20, away."""
+    t = np.arange(0, 15, 0.01)
+    torque = 0.4 * drive(t, 5)
+    run = udd.simulate(ARM.with_term("v", gone, less=-20.0), t, [0.3, 0.0], inputs={"torque": torque})
+    seen = run.q + 1e-3 * np.random.default_rng(6).normal(size=len(t))
+    known = ARM.replace(J=0.055, weight=0.95)
+    found = udd.discover(udd.Measurement(t, {"q": seen}, inputs={"torque": torque}), known)
+    (added,) = found.effects
+    assert added.title == f"{kind} of torque in v'"
+    errors = [found.fit.errors[f"{added.effect.name}.{name}"] for name in added.effect.parameters]
+    for value, error, true in zip(
+        added.effect.values, errors, (-20.0, 0.3 if kind == "dead zone" else 0.5), strict=True
+    ):
+        assert abs(value - true) < 4 * error < 0.1 * abs(true)
+
+
 def test_a_delay_that_is_an_effect_is_the_parameter_s() -> None:
     t = np.linspace(0, 3, 301)
     named = ARM.replace(parameters=dict(ARM.parameters) | {"late": 0.03}, delays={"torque": "late"})

@@ -27,7 +27,7 @@ from udd.discovery.validation.held_out_errors import (
 from udd.discovery.validation.sensor_drift import as_random
 from udd.effects.user_defined import along_of
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, ran_away, released
+from udd.fitting import Fit, Record, at_level, ran_away, released, started_at
 from udd.fitting.parameters import Free
 
 from .acceptance import Acceptance, SearchState, Step
@@ -424,7 +424,9 @@ class Search:
             self.tell(f"trying without {' and '.join(one.title for _k, one in group)}")
             kept = [c for s in later for c in s.candidates if c.effect.name not in names]
             values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
-            trial = of_library(states[k].part, kept, values)
+            last = states[-1].part
+            from_there = started_at(states[k].part, last, np.ones(len(last.record.t), dtype=bool))
+            trial = of_library(from_there, kept, values)
             found = self.tests.best(states[k], fitted_ones([trial]), rounds[k])
             if found is None or not _cheaper(found, later, states[k], states[-1]):
                 continue

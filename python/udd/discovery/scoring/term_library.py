@@ -186,12 +186,26 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
     return result
 
 
-def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
-    """Forces with a threshold in a displacement or an input: dead zones and saturations, of a few widths.
+#: Forces with a threshold {b}, and the limits of their amplitudes: of a displacement, and of an input. An
+#: input's dead zone takes from its gain within the threshold, its limit beyond it: were one written as the
+#: other, it would have to hold the whole gain, and the known model's none.
+_IN_PLACE = (
+    ("dead zone", "(max({x} - {b}, 0) + min({x} + {b}, 0))", (-np.inf, np.inf)),
+    ("saturation", "tanh({x}/{b})", (-np.inf, np.inf)),
+)
+_IN_INPUT = (
+    ("dead zone", "min(max({x}, -{b}), {b})", (-np.inf, 0.0)),
+    ("limit", "(max({x} - {b}, 0) + min({x} + {b}, 0))", (-np.inf, 0.0)),
+    ("saturation", "tanh({x}/{b})", (-np.inf, np.inf)),
+)
 
-    Beside the force in proportion that a model has, a dead zone is that of a spring or a gear with play, or
-    of a motor that does not answer to little; with the other sign it is a stop, or a motor that gives no
-    more. ``tanh`` is a saturation without corners.
+
+def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
+    """Forces with a threshold in a displacement or an input: dead zones, limits and saturations.
+
+    Beside the force in proportion that a model has, a dead zone of a displacement is that of a spring or a
+    gear with play; with the other sign it is a stop. A motor that does not answer to little has one of
+    its input, one that gives no more a limit. ``tanh`` is a saturation without corners.
     """
     rates = _speeds(model)
     along = {v: x for x, v in model.speeds.items()} if model.mass else {}
@@ -207,13 +221,10 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
         for x, values in sizes.items():
             if float(np.nanstd(values)) < _SWINGS * _typical(values):
                 continue  # what stays on one side of zero does not show a zone about it
-            for kind, term in (
-                ("dead zone", "(max({x} - {b}, 0) + min({x} + {b}, 0))"),
-                ("saturation", "tanh({x}/{b})"),
-            ):
+            for kind, term, limits in _IN_INPUT if x in model.inputs else _IN_PLACE:
                 title = f"{kind} of {x} in {slot}"
                 name = f"{_name(kind)}_of_{x}_in_{_place(slot)}"
-                made = (model, slot, term.replace("{x}", x), name, title, values, (-np.inf, np.inf))
+                made = (model, slot, term.replace("{x}", x), name, title, values, limits)
                 result += _turning(*made, _BOUNDS, "shape")
     return result
 
