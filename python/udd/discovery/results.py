@@ -398,6 +398,7 @@ class Discovery:
             "horizon_s": self.horizon,
             "held_out_from_s": self.split,
             "held_out_records": list(self.held_out),
+            "undetermined": list(self.undetermined),
             "baseline": self.baseline.numbers(),
             "fit": self.fit.numbers(),
         }
