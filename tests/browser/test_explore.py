@@ -43,9 +43,8 @@ def test_it_moves_at_once(opened: Opened) -> None:
     page = opened.go()
     until(page, "udd.player.at > 60")
     first = page.locator("#numbers").text_content()
-    page.wait_for_timeout(500)
-    assert page.locator("#numbers").text_content() != first
-    assert page.evaluate("udd.player.ahead") >= 3  # pieces
+    until(page, f"document.querySelector('#numbers').textContent !== {json.dumps(first)}")
+    until(page, "udd.player.ahead >= 3")  # pieces
 
 
 def test_a_link_reproduces_the_run_to_the_bit(opened: Opened) -> None:
