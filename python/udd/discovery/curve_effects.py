@@ -101,14 +101,13 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     FitError
         The curve cannot be added to a model, or the fit does not converge with it.
     """
-    curve, start, settled, ended = refined(curve, fit), fit, False, True
+    curve, start, settled = refined(curve, fit), fit, False
     for _ in range(_ROUNDS):
         effect, at = curve_effect(curve, name), curve.coefficients
         problem, point = widened(fit, [effect], start)
         current = reduce_model_error(fit.measurements, problem, point, problem.schedule[1:])
-        if not (ended or current.converged):
+        if start is not fit and not (start.converged or current.converged):
             raise FitError("the fit does not converge with the curve")  # twice: nor would it later
-        ended = current.converged
         curve, start = rescored(curve, current, at), current
         moved = curve.coefficients - at
         settled = bool(moved @ curve.score.information @ moved / 2 < _STILL)

@@ -329,12 +329,15 @@ class Search:
         best = min(tried, key=lambda t: (-t.fit.level, t.fit.chi2))
         likest = look_alikes(current.part.model, best.fit, others)[:_ALIKE]
         self._trying([candidate.title for candidate, _amplitude in likest])
-        found = self.clock.each(lambda one: of_library(current.part, [one[0]], [one[1]]), likest)
-        return one_of_each(fitted_ones(found))
+        return self._in_full(current, [(candidate, [amplitude]) for candidate, amplitude in likest])
 
     def _tried(self, current: SearchState, some: list[Scored]) -> list[TrialFit]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
-        found = self.clock.each(lambda s: of_library(current.part, [s.candidate], list(s.amplitudes)), some)
+        return self._in_full(current, [(s.candidate, list(s.amplitudes)) for s in some])
+
+    def _in_full(self, current: SearchState, some: list[tuple[Candidate, list[float]]]) -> list[TrialFit]:
+        """Candidates fitted in full, each from its amplitudes."""
+        found = self.clock.each(lambda one: of_library(current.part, [one[0]], one[1]), some)
         return one_of_each(fitted_ones(found))
 
     def _pairs(self, current: SearchState, scores: ScoreRound, loose: set[str]) -> list[TrialFit]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .problem import Fit
 
@@ -13,9 +14,15 @@ def correlation_time(fit: Fit) -> float:
     """The least over the states of standard deviation over root mean square rate; 0 where nothing moves."""
     linked, dt = fit.record.linked, np.diff(fit.record.t)
     rates = np.diff(fit.states, axis=0)[linked] / dt[linked, None]
-    spread, rate = fit.states.std(axis=0), np.sqrt((rates**2).mean(axis=0))
-    moving = (rate > 0) & (spread > 0)
-    return float((spread[moving] / rate[moving]).min()) if moving.any() else 0.0
+    times = takes_to_change(fit.states, rates)
+    return float(times[times > 0].min(initial=np.inf)) if times.any() else 0.0
+
+
+def takes_to_change(values: NDArray[np.float64], rates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation over root mean square rate of each column; 0 of one that does not move."""
+    spread, rate = values.std(axis=0), np.sqrt((rates**2).mean(axis=0))
+    result: NDArray[np.float64] = np.divide(spread, rate, out=np.zeros_like(spread), where=rate > 0)
+    return result
 
 
 def motion_time_scale(fit: Fit) -> float:

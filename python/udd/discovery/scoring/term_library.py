@@ -189,14 +189,13 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
 #: Forces with a threshold {b}, and the limits of their amplitudes: of a displacement, and of an input. An
 #: input's dead zone takes from its gain within the threshold, its limit beyond it: were one written as the
 #: other, it would have to hold the whole gain, and the known model's none.
-_IN_PLACE = (
-    ("dead zone", "(max({x} - {b}, 0) + min({x} + {b}, 0))", (-np.inf, np.inf)),
-    ("saturation", "tanh({x}/{b})", (-np.inf, np.inf)),
-)
+_BEYOND = "(max({x} - {b}, 0) + min({x} + {b}, 0))"
+_SMOOTH = ("saturation", "tanh({x}/{b})", (-np.inf, np.inf))
+_IN_PLACE = (("dead zone", _BEYOND, (-np.inf, np.inf)), _SMOOTH)
 _IN_INPUT = (
     ("dead zone", "min(max({x}, -{b}), {b})", (-np.inf, 0.0)),
-    ("limit", "(max({x} - {b}, 0) + min({x} + {b}, 0))", (-np.inf, 0.0)),
-    ("saturation", "tanh({x}/{b})", (-np.inf, np.inf)),
+    ("limit", _BEYOND, (-np.inf, 0.0)),
+    _SMOOTH,
 )
 
 

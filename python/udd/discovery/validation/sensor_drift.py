@@ -9,7 +9,7 @@ from scipy.interpolate import BSpline
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.trial_fits import price_of
 from udd.fitting import Fit, eased
-from udd.fitting.time_scale import correlation_time
+from udd.fitting.time_scale import correlation_time, takes_to_change
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def drift_gain(fit: Fit) -> float:
         for misfit, read, size in zip(fit.misfit[own].T, fit.record.seen[own].T, sd[own].T, strict=True):
             seen = np.isfinite(misfit)
             # A drift is slow beside what this sensor sees of the motion: a tank's level is slow itself.
-            slow = max(change, _takes_to_change(t[seen], (read - misfit)[seen]))
+            slow = max(change, _about_its_trend(t[seen], (read - misfit)[seen]))
             number = min(_INTERVALS, int(float(np.ptp(t)) / (_SLOW * slow))) if slow > 0 else 0
             if number < _FEWEST or seen.sum() <= number + 3:
                 continue
@@ -44,13 +44,13 @@ def drift_gain(fit: Fit) -> float:
     return total
 
 
-def _takes_to_change(t: Array, values: Array) -> float:
-    """Standard deviation over root mean square rate of what a channel sees, about its trend."""
+def _about_its_trend(t: Array, values: Array) -> float:
+    """What a channel sees takes so long to change, about its trend."""
     if len(t) < _FEWEST:
         return 0.0
     level = values - np.polyval(np.polyfit(t - t[0], values, 1), t - t[0])
-    rate = float(np.sqrt(np.mean((np.diff(level) / np.diff(t)) ** 2)))
-    return float(level.std()) / rate if rate > 0 else 0.0
+    (time,) = takes_to_change(level[:, None], (np.diff(level) / np.diff(t))[:, None])
+    return float(time)
 
 
 def _splines(t: Array, intervals: int) -> Array:
