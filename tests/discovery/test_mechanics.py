@@ -29,7 +29,7 @@ def test_dry_friction_is_in_the_library_of_every_speed():
     state = udd.simulate(SPRING, np.arange(0, 5, 0.05), [1.0, 0.0]).state
     dry = [c for c in library(SPRING, (), state) if c.effect.name == "dry_v_in_v"]
     widths = [c.effect.parameters["eps"] for c in dry]
-    assert len(dry) == 3 and max(widths) < state[:, 1].std() and all(c.usual for c in dry)
+    assert len(dry) == 4 and max(widths) < state[:, 1].std() and all(c.usual for c in dry)
     # Friction takes energy out.
     assert dry[0].effect.spec.parameters[0].range == (-np.inf, 0.0)
     carts = udd.Model(["x", "y", "v", "w"], {"x": "v", "y": "w", "v": "-x", "w": "-y"})

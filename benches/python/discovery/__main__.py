@@ -51,6 +51,7 @@ def main() -> int:
         "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, *MACHINES))}"
     )
     parser.add_argument("--records", type=int, default=1, help="of each kind in each batch")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them, to go on with a table")
     parser.add_argument("--only", default="", help="words of which a case's title must hold one")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--duration", type=float, default=120.0, help="s of film")
@@ -67,9 +68,10 @@ def main() -> int:
             f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join((*BATCHES, *MACHINES))}"
         )
     words = [word for word in given.only.split(",") if word]
-    wanted = [case for batch in batches if batch not in MACHINES for case in cases(batch, given.records)]
+    numbers = range(given.first, given.first + given.records)
+    wanted = [case for batch in batches if batch not in MACHINES for case in cases(batch, numbers)]
     wanted = [case for case in wanted if not words or any(word in case.title for word in words)]
-    twins = [case for b in batches if b in MACHINES for case in machine_cases(given.records, *MACHINES[b])]
+    twins = [case for b in batches if b in MACHINES for case in machine_cases(numbers, *MACHINES[b])]
     twins = [case for case in twins if not words or any(word in case.label for word in words)]
 
     scores: list[Score] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,10 +66,10 @@ _ROUNDS_STRONG = 3
 _LIVELY = (1.0, 0.01)  # rad/s and m, r.m.s.: what brakes or binds so hard that the disk rests is no record
 
 
-def cases(batch: str, records: int) -> Iterator[Case]:
-    """The cases of a batch, `records` of each kind."""
+def cases(batch: str, numbers: Iterable[int]) -> Iterator[Case]:
+    """The cases of a batch, of each kind those of these numbers."""
     names = list(LIBRARY)
-    for number in range(records):
+    for number in numbers:
         if batch == "three":
             yield from (Case(batch, (name,), number, (3.0, 3.0)) for name in names)
         elif batch == "library":

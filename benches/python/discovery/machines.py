@@ -343,10 +343,10 @@ class MachineCase:
 
 
 def machine_cases(
-    records: int, kinds: Iterable[str], options: Sequence[str] = OPTIONS
+    numbers: Iterable[int], kinds: Iterable[str], options: Sequence[str] = OPTIONS
 ) -> Iterator[MachineCase]:
-    """`records` of each kind, under each of the options."""
-    for number in range(records):
+    """Records of these numbers of each kind, under each of the options."""
+    for number in numbers:
         for title in kinds:
             yield from (MachineCase(title, number, one) for one in options)
 

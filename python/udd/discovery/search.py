@@ -283,7 +283,8 @@ class Search:
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
-            singles += self._pairs(current, scores, loose)
+            tight = [t.fit.chi2 for t in singles if t.fit.level >= current.part.level]
+            singles += self._pairs(current, scores, loose, min(tight, default=np.inf))
         return self.tests.best(current, singles, scores) or self._two_together(current, scores, loose)
 
     def _located(
@@ -340,10 +341,13 @@ class Search:
         found = self.clock.each(lambda one: of_library(current.part, [one[0]], one[1]), some)
         return one_of_each(fitted_ones(found))
 
-    def _pairs(self, current: SearchState, scores: ScoreRound, loose: set[str]) -> list[TrialFit]:
+    def _pairs(
+        self, current: SearchState, scores: ScoreRound, loose: set[str], most: float
+    ) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
 
-        One that drives where it should brake may do so because another one brakes too much.
+        One that drives where it should brake may do so because another one brakes too much. `most` is the
+        chi2 of the best of the others.
         """
         scored = sorted((s for s in scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
@@ -355,12 +359,14 @@ class Search:
         # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
         alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
         pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
-        return self._together(current, pairs)
+        return self._together(current, pairs, most)
 
-    def _together(self, current: SearchState, groups: list[list[Candidate]]) -> list[TrialFit]:
+    def _together(
+        self, current: SearchState, groups: list[list[Candidate]], most: float = np.inf
+    ) -> list[TrialFit]:
         """Several effects at once fitted in full, from none."""
         self._trying([" with ".join(c.title for c in group) for group in groups])
-        return fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
+        return fitted_ones(self.clock.each(lambda group: from_none(current.part, group, most), groups))
 
     def _two_together(
         self, current: SearchState, scores: ScoreRound, loose: set[str]

@@ -15,7 +15,7 @@ from udd.discovery.scoring.score_scan import physical
 from udd.discovery.symbolic.formulas import Formula
 from udd.effects.user_defined import along_of
 from udd.errors import FitError
-from udd.fitting import Fit, extend
+from udd.fitting import Fit, Goal, extend
 from udd.models.formula_model import FormulaModel
 
 from .curve_effects import fit_curve, fit_formula
@@ -119,10 +119,15 @@ class TrialFit:
         )
 
 
-def of_library(current: Fit, candidates: list[Candidate], start: list[float]) -> TrialFit | None:
-    """Effects of the library with free amplitudes."""
+def of_library(
+    current: Fit, candidates: list[Candidate], start: list[float], most: float = math.inf
+) -> TrialFit | None:
+    """Effects of the library with free amplitudes.
+
+    None where they cannot be fitted, or explain so little that chi2 is above `most`.
+    """
     try:
-        fitted = extend(current, [c.effect for c in candidates], start)
+        fitted = extend(current, [c.effect for c in candidates], start, Goal(current.level, most))
     except FitError:
         return None
     names = [name for c in candidates for name in c.amplitude_names]
@@ -131,9 +136,9 @@ def of_library(current: Fit, candidates: list[Candidate], start: list[float]) ->
     return trial if trial.physical and fitted.converged else None
 
 
-def from_none(current: Fit, candidates: list[Candidate]) -> TrialFit | None:
+def from_none(current: Fit, candidates: list[Candidate], most: float = math.inf) -> TrialFit | None:
     """Effects of the library with free amplitudes that start at zero."""
-    return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates))
+    return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates), most)
 
 
 def of_curve(current: Fit, curve: Curve) -> TrialFit | None:

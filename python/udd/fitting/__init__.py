@@ -15,7 +15,7 @@ from .fit import (
     started_at,
     widened,
 )
-from .model_error_schedule import at_level, eased, smoothed_states, with_larger_model_error
+from .model_error_schedule import Goal, at_level, eased, smoothed_states, with_larger_model_error
 from .problem import Fit
 from .record import Record, record_of
 from .solve import filtered, frame_costs, predicted, within
@@ -23,6 +23,7 @@ from .solve import filtered, frame_costs, predicted, within
 __all__ = [
     "UNEXPLAINED",
     "Fit",
+    "Goal",
     "Record",
     "as_stated",
     "at_level",

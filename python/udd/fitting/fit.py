@@ -18,7 +18,7 @@ from udd.models.formula_model import FormulaModel
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
 from .input_noise import LEVELS_APART, diffusion_by_noise
-from .model_error_schedule import ROUGH, provisional_fit, reduce_model_error
+from .model_error_schedule import ROUGH, Goal, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, Fit, Point, Problem, levels
@@ -320,7 +320,9 @@ def started_at(fitted: Fit, part: Fit, seen: NDArray[np.bool_]) -> Fit:
     return replace(fitted, point=Point(states, sets))
 
 
-def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) -> Fit:
+def extend(
+    fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], goal: Goal = Goal()
+) -> Fit:
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
     The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
@@ -333,6 +335,8 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
         The effects to add.
     amplitudes : sequence of float
         Where their amplitudes start, in order.
+    goal : Goal
+        What the fit must reach to be of use.
     """
     left = list(amplitudes)
     effects = [e.replace(**{p: left.pop(0) for p in e.amplitudes}) for e in effects]
@@ -346,16 +350,18 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float]) 
     shapes = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "shape"]
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
     problem = replace(problem, free=problem.free + more)
-    found = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:])
+    first = replace(goal, chi2=np.inf) if shapes else goal  # which is lower once the shapes are free
+    found = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:], goal=first)
     if not shapes:
         return found
     more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
     problem = replace(problem, free=problem.free + more)
-    shaped = reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[found.level :])
+    tight = problem.schedule[found.level :]
+    shaped = reduce_model_error(fitted.measurements, problem, found.point, tight, goal=goal)
     if shaped.converged:
         return shaped
     # Far from its shape a model that is held that tightly does not find the way.
-    return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[1:])
+    return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[1:], goal=goal)
 
 
 def as_stated(fitted: Fit) -> Fit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,22 @@ _LOOSE = 0.3  # leverage from which on misfits are not the noise
 _SAME = 0.03  # autocorrelations that differ by less need no other fit
 
 
+@dataclass(frozen=True)
+class Goal:
+    """What a fit must reach to be of use.
+
+    Attributes
+    ----------
+    level : int
+        How tightly the model must be held at the end: below it the fit is not brought to its minimum.
+    chi2 : float
+        At most that, there: it only rises on the way, so a fit above it is given up.
+    """
+
+    level: int = 0
+    chi2: float = np.inf
+
+
 def reduce_model_error(
     measurements: tuple[Measurement, ...],
     problem: Problem,
@@ -36,12 +52,18 @@ def reduce_model_error(
     schedule: Sequence[tuple[float, ...]],
     best: Fit | None = None,
     steps: int = STEPS,
+    goal: Goal = Goal(),
 ) -> Fit:
     """Homotopy in the model-error variance: solve, reduce it, solve again from there.
 
     It ends at the level where the minimiser no longer converges, which a wrong model reaches early, or, if
     the problem asks for the likeliest level, where the evidence falls. `best` is a fit at a larger model
     error; it is returned if no tighter one converges. `steps` bounds the iterations at each level.
+
+    Raises
+    ------
+    FitError
+        No level can be solved, or chi2 is above the goal's.
     """
     levels = list(schedule)
     if best is None:
@@ -57,7 +79,9 @@ def reduce_model_error(
         if not _stands(result, best):
             break
         best, point = result, result.point
-    return best if _is_last(best.problem) else _settled(best, schedule, steps)
+        if best.level <= goal.level and best.chi2 > goal.chi2:
+            raise FitError("the model explains less than another one that is held as tightly")
+    return best if _is_last(best.problem) or best.level < goal.level else _settled(best, schedule, steps)
 
 
 def provisional_fit(

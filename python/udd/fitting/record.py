@@ -222,8 +222,12 @@ def _joined_up(t: Array, there: Array, column: Array) -> Array:
     if present.all():
         result: Array = np.interp(t, there, column)
         return result
-    inside = np.clip(t, there[present][0], there[present][-1])
-    result = Akima1DInterpolator(there[present], column[present])(inside)
+    return _bent(t, there[present], column[present])
+
+
+def _bent(at: Array, there: Array, column: Array) -> Array:
+    """Akima interpolation, which follows a motion's bends; beyond the ends what is there."""
+    result: Array = Akima1DInterpolator(there, column)(np.clip(at, there[0], there[-1]))
     return result
 
 
@@ -321,11 +325,9 @@ def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray
 
 
 def _between(odd: NDArray[np.bool_], x: Array) -> Array:
-    """What the other frames make of the odd ones: a curve that follows the motion's bends."""
+    """What the other frames make of the odd ones."""
     good = np.flatnonzero(~odd)
-    inside = np.clip(np.flatnonzero(odd), good[0], good[-1])
-    result: Array = Akima1DInterpolator(good, x[good])(inside)
-    return result
+    return _bent(np.flatnonzero(odd), good, x[good])
 
 
 def _states(t: Array, guess: Array, linked: NDArray[np.bool_]) -> Array:

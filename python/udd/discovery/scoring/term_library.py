@@ -27,8 +27,9 @@ _DEGREE = 3
 _FEW = 4
 _MOST = 200  # terms of an equation; beyond it sines and cosines are not multiplied by states
 #: Widths over which dry friction turns, in units of the speed's root mean square. As narrow as the last it
-#: holds a body at rest for hundreds of swings.
-_WIDTHS = (0.3, 0.03, 0.002)
+#: holds a body at rest for thousands of swings; of a driven machine that rests now and then, read to 1e-3 of
+#: its motion, ten times as wide leaves an error that is taken for a second friction.
+_WIDTHS = (0.3, 0.03, 0.002, 0.0002)
 #: The same of what has a threshold, in units of its own root mean square.
 _BOUNDS = (0.7, 0.2)
 _SWINGS = 0.3  # of its root mean square that its standard deviation is, for that
