@@ -51,7 +51,7 @@ def main() -> int:
         "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, *MACHINES))}"
     )
     parser.add_argument("--records", type=int, default=1, help="of each kind in each batch")
-    parser.add_argument("--first", type=int, default=0, help="number of the first of them, to go on with a table")
+    parser.add_argument("--first", type=int, default=0, help="number of the first, to go on with a table")
     parser.add_argument("--only", default="", help="words of which a case's title must hold one")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--duration", type=float, default=120.0, help="s of film")

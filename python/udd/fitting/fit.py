@@ -18,7 +18,7 @@ from udd.models.formula_model import FormulaModel
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
 from .input_noise import LEVELS_APART, diffusion_by_noise
-from .model_error_schedule import ROUGH, Goal, provisional_fit, reduce_model_error
+from .model_error_schedule import ANY, ROUGH, Goal, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, Fit, Point, Problem, levels
@@ -320,9 +320,7 @@ def started_at(fitted: Fit, part: Fit, seen: NDArray[np.bool_]) -> Fit:
     return replace(fitted, point=Point(states, sets))
 
 
-def extend(
-    fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], goal: Goal = Goal()
-) -> Fit:
+def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], goal: Goal = ANY) -> Fit:
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
     The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its

@@ -45,6 +45,10 @@ class Goal:
     chi2: float = np.inf
 
 
+#: Whatever a fit comes to is of use.
+ANY = Goal()
+
+
 def reduce_model_error(
     measurements: tuple[Measurement, ...],
     problem: Problem,
@@ -52,7 +56,7 @@ def reduce_model_error(
     schedule: Sequence[tuple[float, ...]],
     best: Fit | None = None,
     steps: int = STEPS,
-    goal: Goal = Goal(),
+    goal: Goal = ANY,
 ) -> Fit:
     """Homotopy in the model-error variance: solve, reduce it, solve again from there.
 

@@ -326,8 +326,8 @@ def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray
 
 def _between(odd: NDArray[np.bool_], x: Array) -> Array:
     """What the other frames make of the odd ones."""
-    good = np.flatnonzero(~odd)
-    return _bent(np.flatnonzero(odd), good, x[good])
+    number = np.arange(len(x), dtype=np.float64)
+    return _bent(number[odd], number[~odd], x[~odd])
 
 
 def _states(t: Array, guess: Array, linked: NDArray[np.bool_]) -> Array:
