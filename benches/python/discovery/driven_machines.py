@@ -21,6 +21,8 @@ import udd
 #: A force, as a function of time, coordinate and speed.
 Force = Callable[[float, float, float], float]
 
+_SHORTEST = 1e-5  # s, of a swing from rest to rest: a shorter one moves nothing
+
 
 def waves(
     rng: np.random.Generator, lowest: float, highest: float, many: int = 6
@@ -193,13 +195,15 @@ def driven_one_degree(smooth: Force, dry: float, x: float, v: float, t: np.ndarr
             rtol=RTOL,
             atol=1e-11,
             max_step=0.05 * (end - float(t[0])),
+            # From rest: a first step in which it turns again would end where it began.
+            first_step=min(_SHORTEST, end - now) if dry else None,
             events=turned,
             dense_output=True,
         )
         own = (t >= now) & (t <= run.t[-1])
         if own.any():  # some swings are shorter than the time between two samples
             result[own] = run.sol(t[own])[0]
-        now, x, v = float(run.t[-1]), float(run.y[0, -1]), 0.0
+        now, x, v = max(float(run.t[-1]), now + _SHORTEST), float(run.y[0, -1]), 0.0
     return result
 
 
