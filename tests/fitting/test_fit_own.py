@@ -8,16 +8,9 @@ import numpy as np
 import pytest
 
 import udd
+from lorenz import lorenz
 from udd.errors import FitError
 from udd.measurement import Measurement, MeasurementError, read_measurement
-
-
-def lorenz(**parameters: float) -> udd.Model:
-    return udd.Model(
-        ["x", "y", "z"],
-        {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
-        {"sigma": 10.0, "rho": 28.0, "beta": 8.0 / 3.0, **parameters},
-    )
 
 
 def measured(

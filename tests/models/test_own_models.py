@@ -12,20 +12,13 @@ import numpy as np
 import pytest
 
 import udd
+from lorenz import lorenz
 from udd import effects
 from udd.effects import formula
 from udd.errors import ModelError
 from udd.models.serialization import model_from_dict, model_to_dict
 
 X = np.random.default_rng(2).normal(size=(50, 4)) * [5.0, 0.03, 0.03, 3.0]
-
-
-def lorenz(**parameters: float) -> udd.Model:
-    return udd.Model(
-        ["x", "y", "z"],
-        {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
-        {"sigma": 10.0, "rho": 28.0, "beta": 8.0 / 3.0, **parameters},
-    )
 
 
 def double_pendulum() -> udd.Model:

@@ -1,4 +1,4 @@
-"""The energy books: closed forms, and balance against the energy that is stored."""
+"""The energy balance: closed forms, and balance against the energy that is stored."""
 
 from __future__ import annotations
 

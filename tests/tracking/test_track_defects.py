@@ -1,4 +1,4 @@
-"""The tracker on films with one defect each, made by the package's own film maker, the truth beside."""
+"""The tracker on films with one defect each, made by `udd.render`, the truth beside."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 pytest.importorskip("av", reason="the tracker's extra is not installed")
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import udd
+from tracked_errors import errors, rms
 from udd.cli import main
 from udd.errors import IncompleteWarning, UddError
 from udd.film import Defects, Film
@@ -32,18 +32,6 @@ def shot(
 ) -> Film:
     run = udd.simulate(udd.Disk(0.039), np.arange(0, seconds, 0.005), list(start), dense=True)
     return udd.render(run, path, size=SMALL, **more)
-
-
-def errors(m: udd.Measurement, film: Film) -> NDArray[np.float64]:
-    """Errors in mm, mm, mrad; beta but for whole turns."""
-    row = np.abs(m.t[:, None] - film.t[None, :]).argmin(axis=1)
-    e = m.values - film.state[row, 1:]
-    e[:, 2] -= 2 * np.pi * np.round(np.nanmedian(e[:, 2]) / (2 * np.pi))
-    return np.asarray(1e3 * e)
-
-
-def rms(e: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.nanmean(e**2, axis=0)))
 
 
 def test_a_rolling_shutter_is_found_and_undone(tmp_path: Path) -> None:

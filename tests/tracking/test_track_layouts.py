@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 pytest.importorskip("av", reason="the tracker's extra is not installed")
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import udd
 from film_for_tests import FPS, swinging, write
+from tracked_errors import errors, rms
 from udd.cli import main
 from udd.film import Defects, Film
 from udd.markers.layout import read_layout
@@ -48,14 +48,6 @@ def shot(path: Path, layout: Marks, seconds: float = 3.0, **more: Any) -> Film:
     return udd.render(run, path, size=SMALL, layout=layout, **more)
 
 
-def rms(m: udd.Measurement, film: Film) -> NDArray[np.float64]:
-    """Errors in mm, mm, mrad; beta but for whole turns."""
-    row = np.abs(m.t[:, None] - film.t[None, :]).argmin(axis=1)
-    e = m.values - film.state[row, 1:]
-    e[:, 2] -= 2 * np.pi * np.round(np.nanmedian(e[:, 2]) / (2 * np.pi))
-    return np.asarray(1e3 * np.sqrt(np.nanmean(e**2, axis=0)))
-
-
 @pytest.mark.parametrize(
     ("layout", "most", "lost"),
     [
@@ -70,7 +62,7 @@ def test_any_coloured_marks(layout: Marks, most: tuple[float, ...], lost: float,
     film = shot(tmp_path / "marks.mp4", layout, defects=Defects(clutter=4))
     m = udd.track(film.path, layout=layout)
     assert m.seen.mean() >= 1 - lost
-    assert np.all(rms(m, film) < most)
+    assert np.all(rms(errors(m, film)) < most)
     # three marks and their layout set the scale: a mark's place to 0.02 pixel of 52
     assert float(m.meta["px_per_m"]) == pytest.approx(film.scale, rel=2e-3)
     assert m.quality["marks"].max() == len(layout)
@@ -82,7 +74,7 @@ def test_printed_tags(tmp_path: Path) -> None:
     m = udd.track(film.path, layout=TAGS)
     assert m.seen.mean() > 0.95
     # edges of 100 pixels each to about 0.03 pixel, four tags: 0.01 mm; five times that for the codec
-    assert np.all(rms(m, film) < (0.05, 0.05, 1.0))
+    assert np.all(rms(errors(m, film)) < (0.05, 0.05, 1.0))
     assert set(m.quality["marks"]) <= {0, 4, 8, 12, 16} and set(m.quality["method"]) <= {"fast", "none"}
     overlay(film.path, m, tmp_path / "seen.mp4")
     assert len(pictures_at(tmp_path / "seen.mp4", [20])) == 1

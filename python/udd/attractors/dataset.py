@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeAlias
 
+from udd._util.versions import version_of
 from udd.models import Model
 
 from .section_runs import ALL_OUTCOMES, SectionRunner
@@ -43,10 +43,6 @@ def time_unit(model: Model) -> str:
 
 def of_result(runner: SectionRunner, what: str, options: Mapping[str, Any]) -> dict[str, Any]:
     """For the whole: the model, the options, the version."""
-    try:
-        own = version("udd")
-    except PackageNotFoundError:
-        own = "(not installed)"
     return {
         "title": what,
         "model": repr(runner.model),
@@ -55,5 +51,5 @@ def of_result(runner: SectionRunner, what: str, options: Mapping[str, Any]) -> d
         "rtol": runner.rtol,
         "atol": runner.atol,
         **options,
-        "udd_version": own,
+        "udd_version": version_of("udd"),
     }

@@ -237,12 +237,10 @@ def poincare(
     Parameters
     ----------
     model : Model
-        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
     section : str or list of str, optional
         Surfaces, each an expression that is zero there, or an equation, of the state's components
         (``"z"``, ``"omega = y"``), their rates (``"z'"``), the time ``t``, the parameters and numbers, with
-        ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tanh``, ``atan2(y, x)``, ``abs`` and
-        ``pi``. Or a name:
+        ``+ - * / ^``, ``pi`` and the functions that :func:`udd.effects.formula` names. Or a name:
         ``"maxima of z"``, ``"minima of z"``, ``"turning points of z"`` of any component, ``"reversal"``
         (the angular velocity is zero). By default z = 0 of the DLE, Z = 0 of a disk, theta = 0 of a
         pendulum, and the maxima of the first state of a user's own model.

@@ -78,11 +78,11 @@ def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -
             save_picture(path, draw)
 
 
-def save_picture(path: Path, draw: Callable[[Axes], object]) -> None:
+def save_picture(path: Path, draw: Callable[[Axes], object], size: tuple[float, float] = (7.2, 4.4)) -> None:
     """Write a picture of one pair of axes, of the kind that the name's ending says."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+    figure = Figure(figsize=size, layout="constrained")
     draw(figure.add_subplot())
     save_figure(path, figure)
 

@@ -165,20 +165,16 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
         raise UddError(
             "a pendulum's film is tracked first (udd track --bob): --pendulum takes a table with t,theta"
         )
-    found = tracked(args, 0.08 if args.R is None else args.R)
+    from udd.tracking import track
+
+    radius = 0.08 if args.R is None else args.R
+    found = whole(args, lambda: track(args.file, disk_radius=radius, progress=is_terminal()))
     return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
 
 
 def add_partial(parser: argparse.ArgumentParser) -> None:
     """What to do with a film that is cut off."""
     parser.add_argument("--partial", action="store_true", help="use what there is of a film that is cut off")
-
-
-def tracked(args: argparse.Namespace, radius: float | None, **options: Any) -> Measurement:
-    """Track a film; one that is cut off is refused, unless its user knows."""
-    from udd.tracking import track
-
-    return whole(args, lambda: track(args.file, disk_radius=radius, progress=is_terminal(), **options))
 
 
 def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measurement:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import re
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
+
+from udd._util.versions import version_of
 
 from . import (
     app,
@@ -60,15 +61,8 @@ def make_parser() -> argparse.ArgumentParser:
         description="The laboratory of the upward-driven disk: film it, fit it, find what the model lacks.",
         epilog="Begin with `udd demo`. Each command has its own help: udd discover --help",
     )
-    parser.add_argument("--version", action="version", version=f"udd {_version()}")
+    parser.add_argument("--version", action="version", version=f"udd {version_of('udd')}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for command in _COMMANDS:
         command.add(commands)
     return parser
-
-
-def _version() -> str:
-    try:
-        return version("udd")
-    except PackageNotFoundError:
-        return "(not installed)"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning, UddError
 
-from .export import OutputFile, checked, save_figure
+from .export import OutputFile, checked, save_picture
 from .model_options import add_models, check_component, check_count, model_of
 from .options import new, numbers
 from .output import CommandResult
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         (args.map, lambda ax: return_map(found, ax, component=args.component)),
     ):
         if path is not None:
-            _picture(path, make)
+            save_picture(path, make, (6.4, 4.8))
             files.append(path)
     stopped = any(isinstance(one.message, IncompleteWarning) and one.message.interrupted for one in said)
     data = {
@@ -135,11 +135,3 @@ def _check(args: argparse.Namespace) -> None:
     if args.map is not None and args.section is not None and len(args.section) > 1:
         raise UddError("--map takes one --section: a return map is that of one surface")
     check_count("points", args.points, 1)
-
-
-def _picture(path: Path, make: Any) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 4.8), layout="constrained")
-    make(figure.add_subplot())
-    save_figure(path, figure)

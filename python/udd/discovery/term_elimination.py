@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from udd import _core
 from udd._util import chi_squared
@@ -21,8 +20,6 @@ from udd.fitting.record import Record
 from udd.fitting.solve import SolveError, solve
 from udd.measurement import Measurement
 from udd.models import Model
-
-Array = NDArray[np.float64]
 
 #: Chance that a term that is not there is kept, over all terms together.
 ALPHA = 1e-3

@@ -65,9 +65,10 @@ def fit(
         Names of the model's free parameters; by default ``k0, k1, k2, W`` (with a prior of 5 %) of a disk,
         ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects; all of a user's own model.
     camera : bool or iterable of str
-        Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, ``lag`` of the
-        orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens``,
-        ``clock``), or which of them. Of a pendulum that an encoder read only the zero ``theta0`` is:
+        Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, the marks' centre
+        ``right, up`` of the disk's, ``lag`` of the orientation, ``row`` time of a rolling shutter,
+        ``shutter`` for means over an exposure, ``lens``, ``clock``; of a pendulum ``theta0, aside, above``),
+        or which of them. Of a pendulum that an encoder read only the zero ``theta0`` is:
         the measurement says ``sensor = encoder`` (in its `meta`, or a line of its file), or its angles come
         in steps that drown all other noise.
     priors : mapping of str to (mean, standard deviation), optional
@@ -78,7 +79,8 @@ def fit(
     state0 : mapping of str to float, optional
         Where states of your own model that are not seen start, by their names; of several measurements also a
         list of such tables. The search for them begins with the motion from there, driven by what was seen.
-        Without it they begin at zero, or at the rate of what is seen.
+        Without it a state begins at the rate, or the integral, of what is seen; one whose law is undefined or
+        flat below zero at the size of what is seen; any other at zero.
 
     Returns
     -------

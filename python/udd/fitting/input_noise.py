@@ -57,11 +57,11 @@ def noise_of(signal: InputSignal) -> float:
     """
     if len(signal) < _SHORTEST or signal.hold == "zero" or len(np.unique(signal.values)) < _LEVELS:
         return 0.0
-    lower, higher = (_by_differences(signal.values, order) for order in _ORDERS)
+    lower, higher = (noise_by_differences(signal.values, order) for order in _ORDERS)
     return higher if higher > _WHITE * lower else 0.0
 
 
-def _by_differences(values: Array, order: int) -> float:
+def noise_by_differences(values: Array, order: int) -> float:
     """The standard deviation of white noise that makes differences of this order as large as they are."""
     size = np.median(np.abs(np.diff(values, order))) / 0.6745
     return float(size / np.sqrt(math.comb(2 * order, order)))

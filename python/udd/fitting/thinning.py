@@ -12,6 +12,7 @@ from udd.measurement import Measurement
 from udd.measurement.table import ANGLES
 from udd.models import profile_of
 
+from .input_noise import noise_by_differences
 from .record import odd_frames
 from .sensor import lattice
 
@@ -108,7 +109,7 @@ def _change(t: Array, values: Array, step: float) -> float:
 
 def _noise(x: Array) -> float:
     """Standard deviation of a column's noise, from fifth differences: those of a motion are small."""
-    return float(np.median(np.abs(np.diff(x, 5))) / 0.6745 / np.sqrt(252.0))
+    return noise_by_differences(x, 5)
 
 
 def _averaged(

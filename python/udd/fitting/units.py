@@ -6,13 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
-
-Array = NDArray[np.float64]
 
 _DECADE = 4.0  # times that what the frames show may be off a drive in the right unit
 _FRAMES = 250  # of each measurement: enough to tell units apart, and soon done

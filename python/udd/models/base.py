@@ -82,9 +82,10 @@ class Model:
     The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
 
     Where ``abs``, ``sign``, ``min``, ``max`` and ``where`` change, the equations have a kink or jump. Runs
-    land on up to four such surfaces, which are their events ``"kink"`` and ``"jump"``; power series start
-    anew there, and derivatives pass through, with a jump's saltation matrix. Any more are only compared:
-    runs go over them by small steps, and there is no power series.
+    land on up to six such surfaces (one on which the state can stick counts for two, all measured inputs
+    together for one), which are their events ``"kink"``, ``"jump"``, ``"stick"`` and ``"slip"``; power series
+    start anew there, and derivatives pass through, with a jump's saltation matrix. Any more are only
+    compared: runs go over them by small steps, and there is no power series.
 
     Examples
     --------

@@ -68,7 +68,8 @@ class Disk(CompiledModel):
 
     References
     ----------
-    The equations are the paper's full model (paper/upward_driven_disk.tex), with its constants as defaults.
+    L. Maas, "The upward-driven disk, a steadily forced chaotic pendulum": its full model, with its
+    constants as defaults.
 
     Examples
     --------

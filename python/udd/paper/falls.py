@@ -31,8 +31,6 @@ class Falls:
         the fall.
     plateau : float
         Share of time in which theta is within 0.3 rad of hanging.
-    upright : float
-        The same of standing on its head.
     rising : float
         Share of time in which Z grows.
     ascent, descent : float
@@ -43,7 +41,6 @@ class Falls:
     rose: NDArray[np.int64]
     turns: NDArray[np.int64]
     plateau: float
-    upright: float
     rising: float
     ascent: float
     descent: float
@@ -85,7 +82,6 @@ def falls(t: Array, Y: Array, Z: Array) -> Falls:
         rose=np.array([int(np.sign(Y[first])) for first, _ in pairs], dtype=np.int64),
         turns=np.array(turns, dtype=np.int64),
         plateau=float(step[np.pi - swing[1:] < PLATEAU].sum() / step.sum()),
-        upright=float(step[swing[1:] < PLATEAU].sum() / step.sum()),
         rising=float(step[np.diff(Z) > 0].sum() / step.sum()),
         ascent=float(np.median(ascents)) if ascents else float("nan"),
         descent=float(np.median(descents)) if descents else float("nan"),

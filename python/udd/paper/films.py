@@ -1,4 +1,4 @@
-"""Films of the paper's runs by the film maker, and what the tracker sees in them."""
+"""Synthetic films of the paper's runs, and what the tracker sees in them."""
 
 from __future__ import annotations
 

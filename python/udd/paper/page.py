@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import base64
-import platform
 import re
 from collections import Counter
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from typing import TYPE_CHECKING
 
 from udd._util.html_templates import templates
+from udd._util.versions import versions
 
 from .registry import FAILS, HOLDS, REMARK
 
@@ -62,23 +61,10 @@ def render(
         order=(HOLDS, REMARK, FAILS),
         left_out=left_out,
         filmed=any(one.figure.filmed for one in figures),
-        versions=_versions(),
+        versions=versions("udd", "numpy", "scipy", "matplotlib"),
     )
 
 
 def _embedded(one: Drawn) -> str:
     kind = "svg+xml" if one.figure.vector else "png"
     return f"data:image/{kind};base64,{base64.b64encode(one.path.read_bytes()).decode()}"
-
-
-def _versions() -> str:
-    """What the numbers may depend on."""
-    found = []
-    for name in ("udd", "numpy", "scipy", "matplotlib"):
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            found.append(f"{name} (of unknown version)")
-    return (
-        f"{', '.join(found)}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
-    )

@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from udd._util.atomic_files import write_whole
 from udd._util.html_templates import templates
+from udd._util.versions import version_of, versions
 from udd.errors import UddError
 from udd.fitting.innovations import innovations
 
@@ -119,15 +119,14 @@ def refuse_folder(path: str | os.PathLike[str]) -> None:
 
 def write_page(report: Report, path: str | os.PathLike[str]) -> None:
     """Write a report as one HTML page."""
-    version, all_versions = versions()
     page = templates("udd.report").get_template("report.html")
     html = page.render(
         head=report.head,
         sections=report.sections,
         source=report.source,
         command=report.command,
-        version=version,
-        versions=all_versions,
+        version=version_of("udd"),
+        versions=versions("udd", "numpy", "scipy"),
     )
     write_whole(Path(path), html.encode())
 
@@ -141,21 +140,3 @@ def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
             return Path(path).name, hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise UddError(f"{path} cannot be read: {error.strerror}") from None
-
-
-def version_of(name: str) -> str:
-    """A package's version."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "(of unknown version)"
-
-
-def versions() -> tuple[str, str]:
-    """The version of udd, and in words all that the numbers may depend on."""
-    import platform
-
-    packages = ", ".join(f"{name} {version_of(name)}" for name in ("udd", "numpy", "scipy"))
-    return version_of(
-        "udd"
-    ), f"{packages}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from udd import _core
+from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
 from udd.plot.whiteness import shown_lags
 
@@ -74,13 +74,12 @@ def fixed(discovery: Discovery) -> list[dict[str, str]]:
     rows = []
     for name, value in model.parameters.items():
         if name not in {_base(n) for n in discovery.fit.parameters} | _knots(discovery):
-            unit, factor = model.units[name], 1.0
             rows.append(
                 {
                     "name": wording.pretty(name.split(".")[-1]),
                     "meaning": _meaning(name, discovery),
-                    "value": f"{factor * value:.5g}",
-                    "unit": wording.pretty(unit),
+                    "value": f"{value:.5g}",
+                    "unit": wording.pretty(model.units[name]),
                 }
             )
     return rows
@@ -108,12 +107,6 @@ def _meaning(name: str, discovery: Discovery) -> str:
         return meaning(name, discovery.measurement.kind) or name
     found = next((f for f in discovery.effects if f.effect.name == effect), None)
     return f"{found.title if found else effect}: {wording.pretty(parameter)}"
-
-
-def units(fit: Fit) -> dict[str, str]:
-    """The SI unit of every free parameter."""
-    known = fit.model.units | dict(_core.camera_parameters(fit.measurement.kind))
-    return {name: known.get(_base(name), "") for name in fit.parameters}
 
 
 def measured(discovery: Discovery) -> Markup:

@@ -1,4 +1,4 @@
-"""The energy books of a run: what the motor puts in, what friction takes out, what is stored."""
+"""The energy balance of a run: what the motor puts in, what friction takes out, what is stored."""
 
 from __future__ import annotations
 

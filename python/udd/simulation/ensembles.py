@@ -100,7 +100,6 @@ def ensemble(
     Parameters
     ----------
     model : Model
-        :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
     t : array_like, shape (times,), or float
         Times at which the states are wanted, increasing; the first is the initial time. A number stands for
         the end of runs from 0, of which only the states there are wanted.
@@ -109,8 +108,10 @@ def ensemble(
     parameters : mapping of str to array_like, optional
         Other values of some of the model's parameters, of shapes that broadcast with one another and with
         the leading axes of `state0`; the result has these axes.
-    rtol, atol, method
+    rtol, atol : float
         As for :func:`udd.simulate`.
+    method : {"auto", "taylor", "dopri5", "dop853"}
+        As for :func:`udd.simulate`; ``"auto"`` is the fastest at equal error.
     threads : int, optional
         How many threads to use, by default one per core. No bit of the result depends on it.
     progress : bool, optional

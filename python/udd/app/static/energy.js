@@ -1,4 +1,4 @@
-// The energy books: what the motor puts in against what friction takes out.
+// The energy balance: what the motor puts in against what friction takes out.
 import { Axes, COLOURS, span } from "./plot.js";
 import { t } from "./texts.js";
 

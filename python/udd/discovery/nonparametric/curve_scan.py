@@ -136,11 +136,6 @@ class CurveScan:
     comparisons: int
 
     @property
-    def alike(self) -> list[Curve]:
-        """The curves that are at most 10 nats less likely than the first, which comes first."""
-        return [c for c in self.curves if c.evidence > self.curves[0].evidence - EVIDENCE_MARGIN]
-
-    @property
     def p(self) -> float:
         """Probability that any of them looks as good as the least likely one by chance."""
         return min(min((c.p for c in self.curves), default=1.0) * self.comparisons, 1.0)

@@ -16,8 +16,6 @@ from udd.fitting import Fit, Record, frame_costs, smoothed_states, within
 from .confirmation import same_level
 from .held_out_errors import Ratio, cost_improvement
 
-Array = NDArray[np.float64]
-
 #: Shares of a record that forms are fitted to, to foretell the rest of it. From less than what effects are
 #: sought in, a law of two terms is known worse than a wrong one of one term.
 SPLITS = (0.6, 0.7, 0.8)

@@ -114,4 +114,4 @@ def falls_filmed(lab: Lab) -> Verdict:
         f"{found.rising:.0%} of the time. The first {agree} falls go to the sides of the computed run"
     )
     holds = found.ascent > 4 * found.descent and len(np.unique(found.side)) == 2
-    return judged(bool(holds), evidence, "a film that the film maker made of a run of the model, tracked")
+    return judged(bool(holds), evidence, "a synthetic film of a run of the model, tracked")

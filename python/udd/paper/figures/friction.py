@@ -63,7 +63,7 @@ def friction_law(_lab: Lab) -> Figure:
     "fitted k(Ω) with one standard "
     "error, the law that the film was made with dashed. The film was made with the paper's law: that the "
     "fit gives it back "
-    "is a check of film maker, tracker and fit on one another, not of the law. The scale of the picture "
+    "is a check of renderer, tracker and fit on one another, not of the law. The scale of the picture "
     "is taken "
     "from the disk's known radius; were it free within 1 %, all three constants would share that 1 % at "
     "least.",

@@ -1,4 +1,4 @@
-"""The centre's motion as a camera sees it: films by the film maker, tracked."""
+"""The centre's motion as a camera sees it: synthetic films, tracked."""
 
 from __future__ import annotations
 

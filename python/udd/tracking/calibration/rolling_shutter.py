@@ -12,7 +12,6 @@ from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose, moved_by_po
 from udd.tracking.marks.pose_fit import align
 from udd.video.reader import Plane
 
-Array = NDArray[np.float64]
 ROUNDS = 5
 MOST = 36  # frames to judge by
 FEWEST = 6

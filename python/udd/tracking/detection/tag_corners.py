@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 POINTS = 24  # along an edge
 TRIM = 0.12  # of the edge left out at either end: there the other edge blurs into it

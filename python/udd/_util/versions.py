@@ -1,0 +1,20 @@
+"""Which versions made a result."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+
+def version_of(name: str) -> str:
+    """A package's version."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "(of unknown version)"
+
+
+def versions(*names: str) -> str:
+    """The versions of packages, of Python and of the machine, on which numbers may depend."""
+    packages = ", ".join(f"{name} {version_of(name)}" for name in names)
+    return f"{packages}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
