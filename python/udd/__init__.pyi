@@ -2,9 +2,11 @@
 
 from . import effects as effects
 from . import errors as errors
+from . import film as film
 from . import paper as paper
 from . import plot as plot
 from . import related_systems as related_systems
+from . import tracking as tracking
 from .attractors import basins as basins
 from .attractors import bifurcation as bifurcation
 from .bifurcations import BifurcationPoint as BifurcationPoint
