@@ -276,15 +276,15 @@ class Search:
             singles = self._singles(current, passing)
         singles += self._look_alikes(current, scores, singles)
         # With these the model cannot even be held as tightly as without: nor with another one beside.
-        loose = {t.candidates[0].effect.name for t in singles if t.fit.level < current.part.level}
+        tight = [t for t in singles if t.fit.level >= current.part.level]
+        loose = {t.candidates[0].effect.name for t in singles} - {t.candidates[0].effect.name for t in tight}
         if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
             # Formulas that may explain the data as well as what the library has.
             known = max(scores.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             singles += self._written(current, curve, rivals)
         if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
-            tight = [t.fit.chi2 for t in singles if t.fit.level >= current.part.level]
-            singles += self._pairs(current, scores, loose, min(tight, default=np.inf))
+            singles += self._pairs(current, scores, loose, min((t.fit.chi2 for t in tight), default=np.inf))
         return self.tests.best(current, singles, scores) or self._two_together(current, scores, loose)
 
     def _located(
