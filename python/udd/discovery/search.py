@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd._util import chi_squared
 from udd._util.parallel import parallel_map
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
-from udd.discovery.scoring.look_alikes import look_alikes
 from udd.discovery.scoring.score_scan import Scored
-from udd.discovery.symbolic.formulas import Formula, formulas_for
 from udd.discovery.validation.by_record import by_record, contested
 from udd.discovery.validation.confirmation import same_level
 from udd.discovery.validation.held_out_errors import (
@@ -25,36 +20,21 @@ from udd.discovery.validation.held_out_errors import (
     confirmed,
 )
 from udd.discovery.validation.sensor_drift import as_random
-from udd.effects.user_defined import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, ran_away, released, started_at
 from udd.fitting.parameters import Free
 
 from .acceptance import Acceptance, SearchState, Step
+from .proposals import Proposals
 from .results import RejectedEffect
 from .score_rounds import ScoreRound, score_round, states_first, with_surfaces
 from .thresholds import ALPHA, RejectionReason
 from .time_budget import Clock, TimeUpError
-from .trial_fits import (
-    TrialFit,
-    fitted_ones,
-    from_none,
-    needed_in,
-    of_curve,
-    of_formula,
-    of_library,
-    one_of_each,
-)
+from .trial_fits import fitted_ones, needed_in, of_library
 
-_EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
-_TRIED = 12  # of the best candidates, fitted in full
-_ALIKE = 6  # more of them, that do nearly the same as the best
-_TOGETHER = 6  # pairs that may pass only together
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
-_FORMULAS = 3  # for each, fitted in full
-_PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
 
 
 def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
@@ -73,20 +53,6 @@ def _cheaper(
     several, one = same_level(end.part, state.part)
     unit = one.inflation(at_level(start.part, one.level))
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
-
-
-def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
-    """The best to be tried, of a machine the forces that machines have, each in the width that scores best.
-
-    Around a model that is far off many a product of states scores as high as they do.
-    """
-    usual = [s for s in passing if s.candidate.usual] or passing
-    if not any(along_of(s.candidate.effect.slots[0]) for s in passing):
-        return list(passing[:_TRIED])
-    first: dict[str, Scored] = {}
-    for one in usual:
-        first.setdefault(one.candidate.effect.name, one)
-    return list(first.values())[:_TRIED]
 
 
 @dataclass(frozen=True)
@@ -235,7 +201,8 @@ class Search:
             strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
         shown = [s.candidate for s in scores.passing()]
         rejected, apart = [], []
-        for trial in self._tried(base, list(strongest.values())[:_NEAREST]):
+        proposals = Proposals(base.part, scores, self.clock)
+        for trial in proposals.tried(list(strongest.values())[:_NEAREST]):
             if trial.fit.level < base.part.level:
                 continue
             judged, errors = self.tests.judged(base, trial, scores), self.tests.errors_or_none(trial.fit)
@@ -264,28 +231,13 @@ class Search:
         return [replace(best, why="records"), *(r for r in near if r is not best)]
 
     def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
-        """The best addition of the library that passes: an effect, or two of them together.
-
-        What physics knows comes first: as long as something else is missing too, a curve bends to explain a
-        part of that. Once effects of the library explain the data, formulas compete with them.
-        """
-        passing = scores.passing()
-        curve = next((c for c in states_first(scores.curves) if len(c.coordinates) == 1), None)
-        with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
-            sought = beside.submit(self._formulas, current, curve) if curve and passing else None
-            singles = self._singles(current, passing)
-        singles += self._look_alikes(current, scores, singles)
-        # With these the model cannot even be held as tightly as without: nor with another one beside.
-        tight = [t for t in singles if t.fit.level >= current.part.level]
-        loose = {t.candidates[0].effect.name for t in singles} - {t.candidates[0].effect.name for t in tight}
-        if curve and sought and singles and min(t.fit.scatter for t in singles) < _EXPLAINED:
-            # Formulas that may explain the data as well as what the library has.
-            known = max(scores.nats(s) for s in passing)
-            rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
-            singles += self._written(current, curve, rivals)
-        if singles and (current.part.model.profile.discovery.pairs or any(t.formula for t in singles)):
-            singles += self._pairs(current, scores, loose, min((t.fit.chi2 for t in tight), default=np.inf))
-        return self.tests.best(current, singles, scores) or self._two_together(current, scores, loose)
+        """The best addition of the library that passes: an effect, or two of them together."""
+        proposals = Proposals(current.part, scores, self.clock)
+        trials, loose = proposals.effects()
+        if found := self.tests.best(current, trials, scores):
+            return found
+        together, number = proposals.only_together(loose)
+        return self.tests.best(current, together, replace(scores, comparisons=number))
 
     def _located(
         self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
@@ -299,98 +251,8 @@ class Search:
 
         known = [c.name for c in best(tried)]
         likely = [c for c in best(scores.curves) if c.name not in known]
-        return self.tests.best(current, self._curves(current, likely), scores)
-
-    def _written(self, current: SearchState, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
-        """Formulas for a curve, fitted."""
-        self._trying([f.text for f in formulas])
-        return fitted_ones(
-            self.clock.each(lambda written: of_formula(current.part, curve, written), formulas)
-        )
-
-    def _trying(self, titles: list[str]) -> None:
-        if titles:
-            self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
-
-    def _formulas(self, current: SearchState, curve: Curve) -> list[Formula]:
-        part = current.part
-        return formulas_for(curve, part.observations, taken=part.model.state_names).formulas[:_FORMULAS]
-
-    def _singles(self, current: SearchState, passing: list[Scored]) -> list[TrialFit]:
-        best = _machines_first(passing)
-        self._trying([s.candidate.title for s in best])
-        return self._tried(current, best)
-
-    def _look_alikes(self, current: SearchState, scores: ScoreRound, tried: list[TrialFit]) -> list[TrialFit]:
-        """What does nearly the same along the motion as the best of those tried, whatever its score."""
-        if not tried or not current.part.model.profile.written:
-            return []
-        names = {t.candidates[0].effect.name for t in tried}
-        others = [s.candidate for s in scores.library.scored if s.candidate.effect.name not in names]
-        best = min(tried, key=lambda t: (-t.fit.level, t.fit.chi2))
-        likest = look_alikes(current.part.model, best.fit, others)[:_ALIKE]
-        self._trying([candidate.title for candidate, _amplitude in likest])
-        return self._in_full(current, [(candidate, [amplitude]) for candidate, amplitude in likest])
-
-    def _tried(self, current: SearchState, some: list[Scored]) -> list[TrialFit]:
-        """Candidates fitted in full, from the amplitudes that the score foretells."""
-        return self._in_full(current, [(s.candidate, list(s.amplitudes)) for s in some])
-
-    def _in_full(self, current: SearchState, some: list[tuple[Candidate, list[float]]]) -> list[TrialFit]:
-        """Candidates fitted in full, each from its amplitudes."""
-        found = self.clock.each(lambda one: of_library(current.part, [one[0]], one[1]), some)
-        return one_of_each(fitted_ones(found))
-
-    def _pairs(
-        self, current: SearchState, scores: ScoreRound, loose: set[str], most: float
-    ) -> list[TrialFit]:
-        """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
-
-        One that drives where it should brake may do so because another one brakes too much. `most` is the
-        chi2 of the best of the others.
-        """
-        scored = sorted((s for s in scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
-        first: dict[str, Candidate] = {}
-        for one in scored:
-            if one.candidate.usual and one.candidate.effect.name not in loose:
-                first.setdefault(one.candidate.effect.name, one.candidate)
-        best = list(first.values())[:_PAIRED]
-        pairs = [list(pair) for pair in itertools.combinations(best, 2)]
-        # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
-        alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
-        pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
-        return self._together(current, pairs, most)
-
-    def _together(
-        self, current: SearchState, groups: list[list[Candidate]], most: float = np.inf
-    ) -> list[TrialFit]:
-        """Several effects at once fitted in full, from none."""
-        self._trying([" with ".join(c.title for c in group) for group in groups])
-        return fitted_ones(self.clock.each(lambda group: from_none(current.part, group, most), groups))
-
-    def _two_together(
-        self, current: SearchState, scores: ScoreRound, loose: set[str]
-    ) -> tuple[Step, SearchState] | None:
-        """Two effects at once that pass only together."""
-        best, number = scores.library.pairs(_TOGETHER)
-        likely = [
-            [s.candidate for s in group]
-            for group, fall in best
-            if len({s.candidate.effect.name for s in group} - loose) == 2
-            and fall > scores.fit.faults
-            and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
-        ]
-        return self.tests.best(current, self._together(current, likely), replace(scores, comparisons=number))
-
-    def _curves(self, current: SearchState, likely: list[Curve]) -> list[TrialFit]:
-        """The likeliest curves, as splines and by short formulas."""
-        trials: list[TrialFit] = []
-        self._trying([curve.title for curve in likely])
-        for located in fitted_ones(self.clock.each(lambda curve: of_curve(current.part, curve), likely)):
-            trials.append(located)
-            if located.curve is not None:
-                trials += self._written(current, located.curve, self._formulas(current, located.curve))
-        return trials
+        trials = Proposals(current.part, scores, self.clock).curves(likely)
+        return self.tests.best(current, trials, scores)
 
     def _backward_elimination(
         self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
@@ -408,7 +270,8 @@ class Search:
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
             before = states[k]
-            found = self.tests.best(before, self._curves(before, [last.curve]), rounds[k])
+            trials = Proposals(before.part, rounds[k], self.clock).curves([last.curve])
+            found = self.tests.best(before, trials, rounds[k])
             if found is None:
                 continue
             if _cheaper(found, accepted[k:], states[k], states[-1]):

@@ -1,0 +1,166 @@
+"""What a round of the search tries: candidates that score well, and their kin, fitted in full."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from udd._util import chi_squared
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.scoring.look_alikes import look_alikes
+from udd.discovery.scoring.score_scan import Scored
+from udd.discovery.symbolic.formulas import Formula, formulas_for
+from udd.effects.user_defined import along_of
+from udd.fitting import Fit
+
+from .score_rounds import ScoreRound, states_first
+from .thresholds import ALPHA
+from .time_budget import Clock
+from .trial_fits import TrialFit, fitted_ones, from_none, of_curve, of_formula, of_library, one_of_each
+
+_EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
+_TRIED = 12  # of the best candidates, fitted in full
+_ALIKE = 6  # more of them, that do nearly the same as the best
+_TOGETHER = 6  # pairs that may pass only together
+_FORMULAS = 3  # for each curve, fitted in full
+_PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
+
+
+def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
+    """The best to be tried, of a machine the forces that machines have, each in the width that scores best.
+
+    Around a model that is far off many a product of states scores as high as they do.
+    """
+    usual = [s for s in passing if s.candidate.usual] or passing
+    if not any(along_of(s.candidate.effect.slots[0]) for s in passing):
+        return list(passing[:_TRIED])
+    first: dict[str, Scored] = {}
+    for one in usual:
+        first.setdefault(one.candidate.effect.name, one)
+    return list(first.values())[:_TRIED]
+
+
+class Proposals:
+    """Trial fits around a model, from the scores of what it may lack.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the first part of the record.
+    scores : ScoreRound
+    clock : Clock
+    """
+
+    def __init__(self, fit: Fit, scores: ScoreRound, clock: Clock) -> None:
+        self.fit, self.scores, self.clock = fit, scores, clock
+
+    def effects(self) -> tuple[list[TrialFit], set[str]]:
+        """What the library has, one effect or two, and the names of those with which the model does worse.
+
+        What physics knows comes first: as long as something else is missing too, a curve bends to explain a
+        part of that. Once effects of the library explain the data, formulas compete with them.
+        """
+        passing = self.scores.passing()
+        curve = next((c for c in states_first(self.scores.curves) if len(c.coordinates) == 1), None)
+        with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
+            sought = beside.submit(self._formulas, curve) if curve and passing else None
+            trials = self._singles(passing)
+        trials += self._look_alikes(trials)
+        # With these the model cannot even be held as tightly as without: nor with another one beside.
+        tight = [t for t in trials if t.fit.level >= self.fit.level]
+        loose = {t.candidates[0].effect.name for t in trials} - {t.candidates[0].effect.name for t in tight}
+        if curve and sought and trials and min(t.fit.scatter for t in trials) < _EXPLAINED:
+            # Formulas that may explain the data as well as what the library has.
+            known = max(self.scores.nats(s) for s in passing)
+            rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
+            trials += self._written(curve, rivals)
+        if trials and (self.fit.model.profile.discovery.pairs or any(t.formula for t in trials)):
+            trials += self._pairs(loose, min((t.fit.chi2 for t in tight), default=np.inf))
+        return trials, loose
+
+    def only_together(self, loose: set[str]) -> tuple[list[TrialFit], int]:
+        """Two effects at once that may pass only together, but for the `loose`, and of how many pairs."""
+        best, number = self.scores.library.pairs(_TOGETHER)
+        likely = [
+            [s.candidate for s in group]
+            for group, fall in best
+            if len({s.candidate.effect.name for s in group} - loose) == 2
+            and fall > self.scores.fit.faults
+            and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
+        ]
+        return self._together(likely), number
+
+    def curves(self, likely: list[Curve]) -> list[TrialFit]:
+        """Curves, as splines and by short formulas."""
+        trials: list[TrialFit] = []
+        self._trying([curve.title for curve in likely])
+        for located in fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely)):
+            trials.append(located)
+            if located.curve is not None:
+                trials += self._written(located.curve, self._formulas(located.curve))
+        return trials
+
+    def tried(self, some: list[Scored]) -> list[TrialFit]:
+        """Candidates fitted in full, from the amplitudes that the score foretells."""
+        return self._in_full([(s.candidate, list(s.amplitudes)) for s in some])
+
+    def _singles(self, passing: list[Scored]) -> list[TrialFit]:
+        best = _machines_first(passing)
+        self._trying([s.candidate.title for s in best])
+        return self.tried(best)
+
+    def _look_alikes(self, tried: list[TrialFit]) -> list[TrialFit]:
+        """What does nearly the same along the motion as the best of those tried, whatever its score."""
+        if not tried or not self.fit.model.profile.written:
+            return []
+        names = {t.candidates[0].effect.name for t in tried}
+        others = [s.candidate for s in self.scores.library.scored if s.candidate.effect.name not in names]
+        best = min(tried, key=lambda t: (-t.fit.level, t.fit.chi2))
+        likest = look_alikes(self.fit.model, best.fit, others)[:_ALIKE]
+        self._trying([candidate.title for candidate, _amplitude in likest])
+        return self._in_full([(candidate, [amplitude]) for candidate, amplitude in likest])
+
+    def _in_full(self, some: list[tuple[Candidate, list[float]]]) -> list[TrialFit]:
+        """Candidates fitted in full, each from its amplitudes."""
+        found = self.clock.each(lambda one: of_library(self.fit, [one[0]], one[1]), some)
+        return one_of_each(fitted_ones(found))
+
+    def _formulas(self, curve: Curve) -> list[Formula]:
+        taken = self.fit.model.state_names
+        return formulas_for(curve, self.fit.observations, taken=taken).formulas[:_FORMULAS]
+
+    def _written(self, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
+        """Formulas for a curve, fitted."""
+        self._trying([f.text for f in formulas])
+        return fitted_ones(self.clock.each(lambda written: of_formula(self.fit, curve, written), formulas))
+
+    def _pairs(self, loose: set[str], most: float) -> list[TrialFit]:
+        """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
+
+        One that drives where it should brake may do so because another one brakes too much. `most` is the
+        chi2 of the best of the others.
+        """
+        scored = sorted((s for s in self.scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
+        first: dict[str, Candidate] = {}
+        for one in scored:
+            if one.candidate.usual and one.candidate.effect.name not in loose:
+                first.setdefault(one.candidate.effect.name, one.candidate)
+        best = list(first.values())[:_PAIRED]
+        pairs = [list(pair) for pair in itertools.combinations(best, 2)]
+        # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
+        alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
+        pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
+        return self._together(pairs, most)
+
+    def _together(self, groups: list[list[Candidate]], most: float = np.inf) -> list[TrialFit]:
+        """Several effects at once fitted in full, from none."""
+        self._trying([" with ".join(c.title for c in group) for group in groups])
+        return fitted_ones(self.clock.each(lambda group: from_none(self.fit, group, most), groups))
+
+    def _trying(self, titles: list[str]) -> None:
+        if titles:
+            self.clock.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
