@@ -21,7 +21,8 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import udd
 from film_for_tests import FPS, PIVOT, Motion, frame, write
-from test_track_layouts import THREE, Marks, rms, shot
+from test_track_layouts import THREE, Marks, shot
+from tracked_errors import errors, rms
 from udd.calibration_items import Calibrate
 from udd.cli import main
 from udd.film import Defects
@@ -376,7 +377,9 @@ def test_what_the_search_does_not_find_is_tracked_by_clicks(
     known = udd.track(made.path, layout=THREE)
     assert m.seen.mean() >= known.seen.mean() - 0.02
     # twice what tracking with the true layout gives: the clicks' 1.5 pixels are 1.7 mm, a mark's 20 mrad
-    assert np.all(rms(m, made) < 2 * rms(known, made)) and np.all(rms(m, made) < (0.06, 0.06, 1.0))
+    assert np.all(rms(errors(m, made)) < 2 * rms(errors(known, made))) and np.all(
+        rms(errors(m, made)) < (0.06, 0.06, 1.0)
+    )
     said = m.meta["calibration"]
     assert said["pivot"][2] == "rolling constraint" and said["scale"][2] == "distance of two marks"
     assert abs(said["scale"][0] - made.scale) < 3 * said["scale"][1]
@@ -394,7 +397,7 @@ def test_without_a_distance_the_radius_sets_the_scale(made: Made, sat: list[Any]
     value, sigma, how = m.meta["calibration"]["scale"]
     assert how.startswith("rim") and abs(value - made.scale) < 3 * sigma and sigma < 0.01 * value
     # 0.4 % of 40 mm
-    assert np.all(rms(m, made) < (0.2, 0.2, 1.0))
+    assert np.all(rms(errors(m, made)) < (0.2, 0.2, 1.0))
 
 
 def test_leaving_writes_nothing(
