@@ -392,11 +392,14 @@ def refit(fitted: Fit) -> Fit:
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     shown, point = not _least(fitted.measurements) > 0, fitted.point
-    if shown:
-        shown, problem, point = _estimate_noise(fitted.measurements, problem, point)
-    if not shown:
-        problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
-    result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
+    try:
+        if shown:
+            shown, problem, point = _estimate_noise(fitted.measurements, problem, point)
+        if not shown:
+            problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
+        result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
+    except SolveError:  # as where a threshold ends at zero, and beyond
+        return fitted
     return result if result.converged else fitted
 
 
