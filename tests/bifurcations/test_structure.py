@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 import udd
 from exact_cycles import symmetric_period
+from lorenz import lorenz
 from udd.bifurcations import bifurcation_curves
 from udd.errors import ModelError
 
@@ -185,14 +186,8 @@ def test_a_step_off_a_bifurcation_does_not_jump_over_the_next() -> None:
     assert born.stable[0] and not born.stable[-1]
 
 
-def lorenz(rho: float) -> udd.Model:
-    """The Lorenz equations with the usual sigma and beta."""
-    rates = {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"}
-    return udd.Model(["x", "y", "z"], rates, {"sigma": 10.0, "rho": rho, "beta": 8 / 3})
-
-
 def test_weak_multipliers_beside_strong_ones_bring_no_false_bifurcations() -> None:
-    rest = next(rest for rest in udd.equilibria(lorenz(24.0), near=[7.8, 7.8, 23.0]) if rest.state[0] > 1)
+    rest = next(rest for rest in udd.equilibria(lorenz(rho=24.0), near=[7.8, 7.8, 23.0]) if rest.state[0] > 1)
     (hopf,) = udd.continuation(rest, "rho", (20.0, 30.0)).points
     branch = udd.continuation(hopf)
     # From the Hopf bifurcation at 470/19 to the homoclinic one rho falls all the way.
@@ -215,10 +210,10 @@ def test_the_readmes_cycles_come_to_their_connection_without_bifurcations(rotati
 
 def test_the_period_is_the_least_whatever_the_number_of_rounds() -> None:
     # In Lorenz's window about rho = 160 the run nearly comes back after each of 19 rounds.
-    orbit = udd.periodic_orbit(lorenz(160.0), [1.0, 1.0, 1.0], settle=100.0)
+    orbit = udd.periodic_orbit(lorenz(rho=160.0), [1.0, 1.0, 1.0], settle=100.0)
     assert orbit.period == pytest.approx(1.152948928, abs=1e-8)
     # 32 rounds in as many pieces: the nodes are one state.
-    orbit = udd.periodic_orbit(lorenz(232.42857142857144), [1.0, 1.0, 1.0], settle=100.0)
+    orbit = udd.periodic_orbit(lorenz(rho=232.42857142857144), [1.0, 1.0, 1.0], settle=100.0)
     assert orbit.period == pytest.approx(0.4776215936, abs=1e-8)
     # Thirteen rounds of the figure-eight, asked for by their period.
     known = udd.periodic_orbit(udd.DLE(10.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from importlib.metadata import PackageNotFoundError, version
 
 
@@ -16,5 +15,7 @@ def version_of(name: str) -> str:
 
 def versions(*names: str) -> str:
     """The versions of packages, of Python and of the machine, on which numbers may depend."""
+    import platform  # takes milliseconds, of a program's start too
+
     packages = ", ".join(f"{name} {version_of(name)}" for name in names)
     return f"{packages}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
