@@ -56,7 +56,7 @@ def test_an_encoder_has_no_camera_and_is_as_good_as_its_steps():
     assert "theta0" in found.parameters and not {"aside", "above"} & set(found.parameters)
     sd = float(np.median(found.noise.sd(found.record, found.states[:, 0])))
     assert sd == pytest.approx(step / np.sqrt(12), rel=0.3)
-    assert f"read in steps of {step:.3g} rad" in found.summary()
+    assert f"read in steps of {1e3 * step:.3g} mrad" in found.summary()
     (said,) = found.to_dict()["doubts"]["noise"]
     assert said["name"] == "theta" and said["step"] == pytest.approx(step, rel=1e-6)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from udd import effects
 from udd.discovery.nonparametric.confounding import identifiable_part
@@ -16,10 +17,16 @@ from udd.discovery.symbolic.formulas import Formula
 from udd.effects import Effect
 from udd.errors import FitError
 from udd.fitting import Fit, widened
-from udd.fitting.model_error_schedule import FEW, reduce_model_error
+from udd.fitting.model_error_schedule import FEW, ROUGH, STEPS, reduce_model_error
 from udd.fitting.parameters import Free
+from udd.fitting.solve import DONE, solve
 
-_ROUNDS = 6
+Array = NDArray[np.float64]
+
+_ROUNDS = 16
+_SHORTEST = 0.2  # share of a move, below which there is none that makes the fit better
+_WORSE = 1.02  # times chi2
+_SLOW = 0.01  # of chi2: where it falls by less the model may be held more tightly
 _SOFT = 1e-3
 _STILL = 0.05  # nats that another round would bring
 
@@ -83,10 +90,12 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
 
 
 def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
-    """Add a curve to a fitted model and refit everything.
+    """Add a curve to a fitted model and refit everything: Gauss-Newton in the curve, the rest projected out.
 
-    In turns the model's parameters and states are fitted with the curve held, and the curve is moved to where
-    it is most likely, everything else following; each turn takes nearly all of what is left.
+    In turns the curve is moved to where it is most likely, everything else following, and the model's
+    parameters and states are fitted with the curve held: first with the largest model error, around which all
+    is nearly linear, and once the curve is nearly still with a smaller one, as far as that goes. A move that
+    makes the fit worse is halved.
 
     Parameters
     ----------
@@ -101,25 +110,73 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     FitError
         The curve cannot be added to a model, or the fit does not converge with it.
     """
-    curve, start, settled = refined(curve, fit), fit, False
-    for _ in range(_ROUNDS):
-        effect, at = curve_effect(curve, name), curve.coefficients
-        problem, point = widened(fit, [effect], start)
-        current = reduce_model_error(fit.measurements, problem, point, problem.schedule[1:])
-        if start is not fit and not (start.converged or current.converged):
-            raise FitError("the fit does not converge with the curve")  # twice: nor would it later
-        curve, start = rescored(curve, current, at), current
-        moved = curve.coefficients - at
-        settled = bool(moved @ curve.score.information @ moved / 2 < _STILL)
-        if settled:
+    curve = refined(curve, fit)
+    at, share = curve.coefficients, 1.0
+    current = _with_curve(fit, curve, name, fit, 0)
+    slow = still = refused = False
+    for left in reversed(range(_ROUNDS)):
+        curve = rescored(curve, current, at)
+        move, unit = curve.coefficients - at, max(1.0, current.scatter)
+        settled = bool(move @ curve.score.information @ move / 2 < _STILL * unit)
+        still = still or settled
+        if not left:
             break
+        if still or (slow and not refused):
+            tighter = _tightened(fit, replace(curve, coefficients=at), name, current)
+            if tighter is not None:
+                current, slow, still, refused = tighter, False, False, False
+                continue
+            if still:
+                break
+            refused = True
+        while share >= _SHORTEST:
+            to = at + share * move
+            moved = _moved(fit, replace(curve, coefficients=to), name, current)
+            if moved is not None:
+                break
+            share /= 2
+        else:
+            break
+        fall = current.chi2 - moved.chi2
+        slow, still = fall < _SLOW * current.chi2, abs(fall) < 2 * _STILL * unit
+        at, current, share = to, moved, min(2 * share, 1.0)
     # What the model holds; the next move would be within the last one.
     curve, score = replace(curve, coefficients=at), curve.score
+    current = _with_curve(fit, curve, name, current, current.level, STEPS, DONE * max(1.0, current.scatter))
     gain = float(score.gradient @ at - at @ score.information @ at / 2)
     price = gain - curve.evidence
     if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
         price = max(price, curve.df * math.log(fit.observations) / 2)
     return CurveFit(current, identifiable_part(curve, current), price)
+
+
+def _with_curve(
+    fit: Fit, curve: Curve, name: str, start: Fit, level: int, steps: int = FEW, decrease: float = ROUGH
+) -> Fit:
+    """The model with the curve held, as tightly as a level says, fitted from where another fit ended."""
+    problem, point = widened(fit, [curve_effect(curve, name)], start)
+    problem = problem.with_model_error(problem.schedule[level])
+    return solve(fit.measurements, problem, point, steps, decrease)
+
+
+def _moved(fit: Fit, curve: Curve, name: str, current: Fit) -> Fit | None:
+    """The fit with the curve moved, or None where that makes it worse."""
+    try:
+        moved = _with_curve(fit, curve, name, current, current.level)
+    except FitError:
+        return None
+    return moved if moved.chi2 < _WORSE * current.chi2 else None
+
+
+def _tightened(fit: Fit, curve: Curve, name: str, current: Fit) -> Fit | None:
+    """The model with the same curve held more tightly, or None where it cannot be."""
+    if current.level + 1 == len(fit.problem.schedule):
+        return None
+    try:
+        tighter = _with_curve(fit, curve, name, current, current.level + 1)
+    except FitError:
+        return None
+    return tighter if tighter.converged else None
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:

@@ -25,6 +25,8 @@ _COLOURED = 1e-8
 _NEARLY = 1
 _OFF = 3.0  # standard deviations from what was stated
 _LEAST = 30  # frames of which innovations tell anything
+#: Units of frames as they are told, and how many of them a unit holds.
+_TOLD = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
 
@@ -98,13 +100,14 @@ class Reading:
 
     @property
     def text(self) -> str:
-        """In words."""
-        unit = f" {self.unit}" if self.unit else ""
-        said = f"{self.name} {self.noise:.3g}{unit}"
+        """In words: in mm and mrad, as errors are told."""
+        unit, factor = _TOLD.get(self.unit, (self.unit, 1.0))
+        unit = f" {unit}" if unit else ""
+        said = f"{self.name} {factor * self.noise:.3g}{unit}"
         if self.step:
-            said += f", read in steps of {self.step:.3g}{unit}"
+            said += f", read in steps of {factor * self.step:.3g}{unit}"
         if self.memory:
-            said += f", of which {self.memory:.2f} is still there in the next frame"
+            said += f" ({self.memory:.2f} of a frame's error is still there in the next)"
         return said
 
 

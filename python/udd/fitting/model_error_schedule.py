@@ -13,7 +13,7 @@ from udd.measurement import Measurement
 from .noise import estimated, remembered
 from .problem import Fit, Point, Problem
 from .record import Record
-from .solve import DONE, solve
+from .solve import DONE, done, solve
 
 #: Most steps at one level: a right model takes three to seven, but for kinks of its law.
 STEPS = 30
@@ -25,6 +25,7 @@ ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
 LESS = 3.0
 _LITTLE = 3  # steps more, of a fit that may be near its minimum
+_FAR = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
 _LOOSE = 0.3  # leverage from which on misfits are not the noise
 _SAME = 0.03  # autocorrelations that differ by less need no other fit
 
@@ -36,7 +37,8 @@ class Goal:
     Attributes
     ----------
     level : int
-        How tightly the model must be held at the end: below it the fit is not brought to its minimum.
+        How tightly the model must be held at the end: below it the fit is not brought to its minimum, above
+        it what is far from explaining the data is given few steps.
     chi2 : float
         At most that, there: it only rises on the way, so a fit above it is given up.
     """
@@ -79,7 +81,9 @@ def reduce_model_error(
     if far:
         best = _increase_model_error(far, levels)
     for diffusion in () if far else levels:
-        result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, steps)
+        beyond = goal is not ANY and best.level >= goal.level and best.scatter > _FAR
+        most = min(FEW, steps) if beyond else steps
+        result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, most)
         if not _stands(result, best):
             break
         best, point = result, result.point
@@ -157,7 +161,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     own = fitted.problem.diffusion
     for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
         problem = fitted.problem.with_model_error(diffusion)
-        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps), steps)
+        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps, done(fitted)), steps)
         if fitted.converged:
             break
     return fitted
@@ -201,7 +205,7 @@ def at_level(fitted: Fit, level: int) -> Fit:
     if level == fitted.level:
         return fitted
     problem = fitted.problem.with_model_error(fitted.problem.schedule[level])
-    return solve(fitted.measurements, problem, fitted.point)
+    return solve(fitted.measurements, problem, fitted.point, decrease=done(fitted))
 
 
 def eased(fitted: Fit) -> Fit:

@@ -195,7 +195,13 @@ def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:
     """The same model fitted to some of the frames (a mask), held as tightly, from where the fit ended."""
     noise = replace(fitted.noise, weight=fitted.noise.weight[frames])
     problem = replace(fitted.problem, record=fitted.record.part(frames), noise=noise)
-    return solve(fitted.measurements, problem, Point(fitted.states[frames], fitted.point.sets))
+    start = Point(fitted.states[frames], fitted.point.sets)
+    return solve(fitted.measurements, problem, start, decrease=done(fitted))
+
+
+def done(fitted: Fit) -> float:
+    """As `DONE`, where chi2 per degree of freedom, by which standard errors are told, is that of a fit."""
+    return DONE * max(1.0, fitted.scatter)
 
 
 def frame_costs(fitted: Fit) -> Array:

@@ -116,20 +116,10 @@ def measured(discovery: Discovery) -> Markup:
     usable = int(m.seen.sum())
     rate = 1.0 / float(np.median(np.diff(m.t)))
     frames = f"{len(m)} frames" + ("" if usable == len(m) else f", {usable} of them usable,")
-    sd = discovery.fit.noise.sd(discovery.fit.record, discovery.fit.states[:, 0])
-    each = [
-        f"{wording.rough(float(np.median(own[np.isfinite(own)])), 'm' if name in ('Y', 'Z') else 'rad')} "
-        f"in {wording.pretty(name)}"
-        for name, own in zip(m.names, sd.T, strict=True)
-    ]
-    noise = ", ".join(each[:-1]) + (" and " if len(each) > 1 else "") + each[-1]
     what = model.profile.shown.measured(model, discovery.baseline.problem.models[0])
     if several > 1:
         what = f"{several} records, fitted together; the pictures of the motion show the first. {what}"
-    return Markup(
-        f"{what}: {frames} over {m.duration:.1f}\u00a0s, {rate:.3g} in a second. "
-        f"A typical frame is good to {noise}."
-    )
+    return Markup(f"{what}: {frames} over {m.duration:.1f}\u00a0s, {rate:.3g} in a second.")
 
 
 def whiteness(innovations: Sequence[Innovations]) -> list[dict[str, str]]:

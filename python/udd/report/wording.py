@@ -227,18 +227,9 @@ def length(value: float, unit: str) -> str:
     """An error with its unit: mm or mrad, or per cent of a motion's spread."""
     if not math.isfinite(value):
         return "–"
-    return _with_unit(value, unit, 3)
-
-
-def rough(value: float, unit: str) -> str:
-    """As :func:`length`, with two digits."""
-    return _with_unit(value, unit, 2)
-
-
-def _with_unit(value: float, unit: str, digits: int) -> str:
     if unit == "spread":
-        return f"{_digits(100 * value, digits)} %"
-    return f"{_digits(1e3 * value, digits)} {'mm' if unit == 'm' else 'mrad'}"
+        return f"{_digits(100 * value, 3)} %"
+    return f"{_digits(1e3 * value, 3)} {'mm' if unit == 'm' else 'mrad'}"
 
 
 def _digits(value: float, n: int) -> str:
