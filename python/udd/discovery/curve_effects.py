@@ -23,12 +23,12 @@ from udd.fitting.solve import DONE, solve
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 16
+_MOVES = 12  # of a curve, most, for one model error
 _SHORTEST = 0.2  # share of a move, below which there is none that makes the fit better
 _WORSE = 1.02  # times chi2
 _SLOW = 0.01  # of chi2: where it falls by less the model may be held more tightly
 _SOFT = 1e-3
-_STILL = 0.05  # nats that another round would bring
+_STILL = 0.05  # nats that another move would bring
 
 
 @dataclass(frozen=True)
@@ -111,72 +111,78 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
         The curve cannot be added to a model, or the fit does not converge with it.
     """
     curve = refined(curve, fit)
-    at, share = curve.coefficients, 1.0
-    current = _with_curve(fit, curve, name, fit, 0)
-    slow = still = refused = False
-    for left in reversed(range(_ROUNDS)):
-        curve = rescored(curve, current, at)
+    here = _Held(curve, curve.coefficients, _solved(fit, curve, name, fit, 0))
+    slow = _SLOW
+    while True:
+        here, settled = _moved(fit, here, name, slow)
+        tighter = _tightened(fit, here, name)
+        if tighter is None and not slow:
+            break
+        here, slow = (here, 0.0) if tighter is None else (tighter, _SLOW)
+    # What the model holds; the next move would be within the last one.
+    curve, at, score = replace(here.curve, coefficients=here.at), here.at, here.curve.score
+    done = DONE * max(1.0, here.fit.scatter)
+    fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, done)
+    gain = float(score.gradient @ at - at @ score.information @ at / 2)
+    price = gain - curve.evidence
+    if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
+        price = max(price, curve.df * math.log(fit.observations) / 2)
+    return CurveFit(fitted, identifiable_part(curve, fitted), price)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """The coefficients that a model holds its curve with, its fit, and the curve as it is likeliest there."""
+
+    curve: Curve
+    at: Array
+    fit: Fit
+
+
+def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
+    """Move the curve until chi2 falls by no more than a share of itself, or is still; whether it settled."""
+    at, current, fall, share = here.at, here.fit, math.inf, 1.0
+    for left in reversed(range(_MOVES)):
+        curve = rescored(here.curve, current, at)
         move, unit = curve.coefficients - at, max(1.0, current.scatter)
         settled = bool(move @ curve.score.information @ move / 2 < _STILL * unit)
-        still = still or settled
-        if not left:
+        if settled or not left or abs(fall) < max(slow * current.chi2, 2 * _STILL * unit):
             break
-        if still or (slow and not refused):
-            tighter = _tightened(fit, replace(curve, coefficients=at), name, current)
-            if tighter is not None:
-                current, slow, still, refused = tighter, False, False, False
-                continue
-            if still:
-                break
-            refused = True
         while share >= _SHORTEST:
             to = at + share * move
-            moved = _moved(fit, replace(curve, coefficients=to), name, current)
-            if moved is not None:
+            try:
+                moved = _solved(fit, replace(curve, coefficients=to), name, current, current.level)
+            except FitError:
+                moved = None
+            if moved is not None and moved.chi2 < _WORSE * current.chi2:
                 break
             share /= 2
         else:
             break
         fall = current.chi2 - moved.chi2
-        slow, still = fall < _SLOW * current.chi2, abs(fall) < 2 * _STILL * unit
         at, current, share = to, moved, min(2 * share, 1.0)
-    # What the model holds; the next move would be within the last one.
-    curve, score = replace(curve, coefficients=at), curve.score
-    current = _with_curve(fit, curve, name, current, current.level, STEPS, DONE * max(1.0, current.scatter))
-    gain = float(score.gradient @ at - at @ score.information @ at / 2)
-    price = gain - curve.evidence
-    if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
-        price = max(price, curve.df * math.log(fit.observations) / 2)
-    return CurveFit(current, identifiable_part(curve, current), price)
+    return _Held(curve, at, current), settled
 
 
-def _with_curve(
+def _tightened(fit: Fit, here: _Held, name: str) -> _Held | None:
+    """The same with a smaller model error, or None where it cannot be."""
+    level = here.fit.level + 1
+    if level == len(fit.problem.schedule):
+        return None
+    try:
+        tighter = _solved(fit, replace(here.curve, coefficients=here.at), name, here.fit, level)
+    except FitError:
+        return None
+    return replace(here, fit=tighter) if tighter.converged else None
+
+
+def _solved(
     fit: Fit, curve: Curve, name: str, start: Fit, level: int, steps: int = FEW, decrease: float = ROUGH
 ) -> Fit:
     """The model with the curve held, as tightly as a level says, fitted from where another fit ended."""
     problem, point = widened(fit, [curve_effect(curve, name)], start)
     problem = problem.with_model_error(problem.schedule[level])
     return solve(fit.measurements, problem, point, steps, decrease)
-
-
-def _moved(fit: Fit, curve: Curve, name: str, current: Fit) -> Fit | None:
-    """The fit with the curve moved, or None where that makes it worse."""
-    try:
-        moved = _with_curve(fit, curve, name, current, current.level)
-    except FitError:
-        return None
-    return moved if moved.chi2 < _WORSE * current.chi2 else None
-
-
-def _tightened(fit: Fit, curve: Curve, name: str, current: Fit) -> Fit | None:
-    """The model with the same curve held more tightly, or None where it cannot be."""
-    if current.level + 1 == len(fit.problem.schedule):
-        return None
-    try:
-        tighter = _with_curve(fit, curve, name, current, current.level + 1)
-    except FitError:
-        return None
-    return tighter if tighter.converged else None
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:
