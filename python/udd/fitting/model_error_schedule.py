@@ -37,8 +37,8 @@ class Goal:
     Attributes
     ----------
     level : int
-        How tightly the model must be held at the end: below it the fit is not brought to its minimum, above
-        it what is far from explaining the data is given few steps.
+        How tightly the model must be held at the end: below it the fit is not brought to its minimum, beyond
+        it what is far from explaining the data is not held.
     chi2 : float
         At most that, there: it only rises on the way, so a fit above it is given up.
     """
@@ -81,9 +81,9 @@ def reduce_model_error(
     if far:
         best = _increase_model_error(far, levels)
     for diffusion in () if far else levels:
-        beyond = goal is not ANY and best.level >= goal.level and best.scatter > _FAR
-        most = min(FEW, steps) if beyond else steps
-        result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, most)
+        if goal is not ANY and best.level >= goal.level and best.scatter > _FAR:
+            break
+        result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, steps)
         if not _stands(result, best):
             break
         best, point = result, result.point
