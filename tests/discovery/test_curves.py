@@ -451,6 +451,18 @@ def test_a_located_curve_is_fitted_in_full():
     assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < found.fit.chi2 / 2 + found.price
 
 
+def test_moves_that_lead_astray_are_halved():
+    """Four times as strong a law, of which full Gauss-Newton moves of the curve find no end."""
+    case = unmodelled.CASES[0]
+    measured = unmodelled.record(weak(case, 4.0), 1)
+    base = fit_record(measured, record_of(measured), udd.Disk(W), search=True)
+    curves = scan_curves(with_larger_model_error(base, 3.0)).curves
+    found = fit_curve(base, next(c for c in curves if c.name == case.found[0]))
+    assert found.fit.converged and found.fit.level == base.level
+    # Not to the noise, for so far from the known model one curve does not do; full moves end in no fit.
+    assert found.fit.scatter < 0.2 * base.scatter
+
+
 def test_a_broken_power_can_be_fitted():
     case = unmodelled.CASES[1]
     measured = unmodelled.record(case.law, 1)
