@@ -25,7 +25,7 @@ ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
 LESS = 3.0
 _LITTLE = 3  # steps more, of a fit that may be near its minimum
-_FAR = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
+_UNEXPLAINED = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
 _LOOSE = 0.3  # leverage from which on misfits are not the noise
 _SAME = 0.03  # autocorrelations that differ by less need no other fit
 
@@ -37,8 +37,8 @@ class Goal:
     Attributes
     ----------
     level : int
-        How tightly the model must be held at the end: below it the fit is not brought to its minimum, beyond
-        it what is far from explaining the data is not held.
+        How tightly the model must be held at the end: below it the fit is not brought to its minimum. Nor
+        is, there, what is far from explaining the data, which is not held more tightly either.
     chi2 : float
         At most that, there: it only rises on the way, so a fit above it is given up.
     """
@@ -81,15 +81,23 @@ def reduce_model_error(
     if far:
         best = _increase_model_error(far, levels)
     for diffusion in () if far else levels:
-        if goal is not ANY and best.level >= goal.level and best.scatter > _FAR:
-            break
+        if _explains_little(best, goal):
+            return best
         result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, steps)
         if not _stands(result, best):
             break
         best, point = result, result.point
         if best.level <= goal.level and best.chi2 > goal.chi2:
             raise FitError("the model explains less than another one that is held as tightly")
-    return best if _is_last(best.problem) or best.level < goal.level else _settled(best, schedule, steps)
+    if _is_last(best.problem) or best.level < goal.level or _explains_little(best, goal):
+        return best
+    return _settled(best, schedule, steps)
+
+
+def _explains_little(best: Fit, goal: Goal) -> bool:
+    """Whether a fit with a goal is as tight as that asks, and far from explaining the data."""
+    tight = goal is not ANY and best.level >= goal.level
+    return tight and best.converged and best.scatter > _UNEXPLAINED
 
 
 def provisional_fit(
