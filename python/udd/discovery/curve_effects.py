@@ -19,7 +19,7 @@ from udd.errors import FitError
 from udd.fitting import Fit, widened
 from udd.fitting.model_error_schedule import FEW, ROUGH, STEPS, reduce_model_error
 from udd.fitting.parameters import Free
-from udd.fitting.solve import DONE, solve
+from udd.fitting.solve import done, solve
 
 Array = NDArray[np.float64]
 
@@ -121,8 +121,7 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
         here, slow = (here, 0.0) if tighter is None else (tighter, _SLOW)
     # What the model holds; the next move would be within the last one.
     curve, at, score = replace(here.curve, coefficients=here.at), here.at, here.curve.score
-    done = DONE * max(1.0, here.fit.scatter)
-    fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, done)
+    fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, done(here.fit))
     gain = float(score.gradient @ at - at @ score.information @ at / 2)
     price = gain - curve.evidence
     if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
