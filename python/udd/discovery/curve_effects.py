@@ -108,7 +108,7 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     Raises
     ------
     FitError
-        The curve cannot be added to a model, or the fit does not converge with it.
+        The curve cannot be added to a model, or the model with it cannot be solved.
     """
     curve = refined(curve, fit)
     here = _Held(curve, curve.coefficients, _solved(fit, curve, name, fit, 0))
