@@ -7,6 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from udd._util.small_units import small_unit
+
 from .export import add_out, checked, save_figure
 from .fit import options
 from .inputs import add_input, check_early, inputs_of
@@ -75,13 +77,9 @@ def run(args: argparse.Namespace) -> CommandResult:
     return CommandResult(text, {**given.told, **found.to_dict(), "files": args.out})
 
 
-#: In which unit an error is told, and by what to multiply.
-_ERROR = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "spread": (1e2, "% of the spread")}
-
-
 def describe(found: Forecast) -> str:
     """A forecast in a few lines."""
-    factor, unit = _ERROR[found.fit.model.profile.sensor.error_unit]
+    unit, factor = small_unit(found.fit.model.profile.sensor.error_unit)
     within = f"{factor * found.error:.3g} {unit}"
     reach = found.t[-1] - found.start
     lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd import _core
+from udd._util.small_units import small_unit
 
 from .input_noise import LEVELS_APART, NoisyInput, diffusion_by_noise, noisy_inputs
 from .parameters import Free
@@ -25,8 +26,6 @@ _COLOURED = 1e-8
 _NEARLY = 1
 _OFF = 3.0  # standard deviations from what was stated
 _LEAST = 30  # frames of which innovations tell anything
-#: Units of frames as they are told, and how many of them a unit holds.
-_TOLD = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
 
@@ -101,7 +100,7 @@ class Reading:
     @property
     def text(self) -> str:
         """In words: in mm and mrad, as errors are told."""
-        unit, factor = _TOLD.get(self.unit, (self.unit, 1.0))
+        unit, factor = small_unit(self.unit)
         unit = f" {unit}" if unit else ""
         said = f"{self.name} {factor * self.noise:.3g}{unit}"
         if self.step:

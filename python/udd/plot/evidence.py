@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.small_units import small_unit
 from udd.errors import UddError
 
 from .inputs import require
@@ -100,8 +101,7 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     from matplotlib.ticker import LogLocator
 
     before, after = discovery.error_before, discovery.error_after
-    shown = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "spread": (100.0, "% of the spread")}
-    factor, unit = shown[before.unit]
+    unit, factor = small_unit(before.unit)
     ax = new_axes(ax)
     lines = [(before, BEFORE, "o", "the known model")]
     if discovery.effects:

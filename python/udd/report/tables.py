@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from udd._util.small_units import small_unit
 from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
 from udd.plot.whiteness import shown_lags
@@ -55,7 +56,7 @@ def _rows(
     known = units(discovery.fit)
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
-        unit, factor = _shown(known[name]) if known[name] else share
+        unit, factor = small_unit(known[name]) if known[name] else share
         rows.append(
             {
                 "name": wording.pretty(_base(name).split(".")[-1]),
@@ -89,16 +90,6 @@ def _value(fit: Fit, name: str, factor: float) -> str:
     if name not in fit.parameters:
         return "–"
     return wording.with_error(factor * fit.parameters[name], factor * fit.errors[name])
-
-
-def _shown(unit: str) -> tuple[str, float]:
-    """The unit in which small things are told, and by what to multiply."""
-    return {
-        "rad": ("mrad", 1e3),
-        "s": ("ms", 1e3),
-        "m": ("mm", 1e3),
-        "s/m": ("ms/m", 1e3),
-    }.get(unit, (unit, 1.0))
 
 
 def _meaning(name: str, discovery: Discovery) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
 
+from udd._util.small_units import small_unit
 from udd.discovery.thresholds import SAME as IDENTICAL
 from udd.discovery.validation.held_out_errors import reaches_noise_floor as floor_reached
 from udd.effects.user_defined import is_spline as is_spline
@@ -227,9 +228,8 @@ def length(value: float, unit: str) -> str:
     """An error with its unit: mm or mrad, or per cent of a motion's spread."""
     if not math.isfinite(value):
         return "–"
-    if unit == "spread":
-        return f"{_digits(100 * value, 3)} %"
-    return f"{_digits(1e3 * value, 3)} {'mm' if unit == 'm' else 'mrad'}"
+    small, factor = small_unit(unit)
+    return f"{_digits(factor * value, 3)} {small.removesuffix(' of the spread')}"
 
 
 def _digits(value: float, n: int) -> str:

@@ -1,0 +1,16 @@
+"""The units in which errors and other small things are told: mm, mrad, ms."""
+
+from __future__ import annotations
+
+_SMALL = {
+    "m": ("mm", 1e3),
+    "rad": ("mrad", 1e3),
+    "s": ("ms", 1e3),
+    "s/m": ("ms/m", 1e3),
+    "spread": ("% of the spread", 1e2),
+}
+
+
+def small_unit(unit: str) -> tuple[str, float]:
+    """The unit for small values, and by what values in `unit` are multiplied; others stay as they are."""
+    return _SMALL.get(unit, (unit, 1.0))
