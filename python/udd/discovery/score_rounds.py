@@ -11,7 +11,7 @@ from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
-from udd.fitting import Fit, with_larger_model_error
+from udd.fitting import Fit, beyond_schedule, with_larger_model_error
 from udd.models.profile import Coordinate
 
 from .thresholds import ALPHA
@@ -40,6 +40,11 @@ class ScoreRound:
     library: Scan
     curves: list[Curve]
     comparisons: int
+
+    @property
+    def off_track(self) -> bool:
+        """Whether the model follows the data only with more model error than the schedule has."""
+        return beyond_schedule(self.fit)
 
     def usable(self) -> list[Scored]:
         """The candidates with physical numbers whose work no free parameter does, the strongest first."""
@@ -77,8 +82,10 @@ def score_round(
     """Score every candidate and curve around the fit and, where it explains little, around a looser one.
 
     A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
-    where it is held tightly. The scores with the stronger explanation count. `given` are the user's own
-    candidates; `watched` makes work that does not begin once a search's time is up.
+    where it is held tightly. The scores with the stronger explanation count. Where the model needs more model
+    error than the schedule has, what scores high around a tighter fit need not be what is missing: those
+    around the looser one alone count then. `given` are the user's own candidates; `watched` makes work that
+    does not begin once a search's time is up.
     """
 
     def score(current: Fit) -> ScoreRound:
@@ -89,7 +96,9 @@ def score_round(
         comparisons = len(scanned.scored) + frequencies + curves.comparisons
         return ScoreRound(current, scanned, curves.curves, comparisons)
 
-    found = parallel_map(watched(score), dict.fromkeys((fitted, with_larger_model_error(fitted, _SCATTER))))
+    looser = with_larger_model_error(fitted, _SCATTER)
+    fits = [looser] if beyond_schedule(looser) else dict.fromkeys((fitted, looser))
+    found = parallel_map(watched(score), fits)
     return replace(max(found, key=ScoreRound.strongest), comparisons=sum(one.comparisons for one in found))
 
 

@@ -21,7 +21,15 @@ from udd.discovery.validation.held_out_errors import (
 )
 from udd.discovery.validation.sensor_drift import as_random
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, ran_away, released, started_at
+from udd.fitting import (
+    Fit,
+    Record,
+    at_level,
+    ran_away,
+    released_anew,
+    started_at,
+    with_noise_of,
+)
 from udd.fitting.parameters import Free
 
 from .acceptance import Acceptance, SearchState, Step
@@ -50,7 +58,7 @@ def _cheaper(
 ) -> bool:
     """Whether one step explains the data as well as several from the same start, their freedom paid for."""
     step, state = found
-    several, one = same_level(end.part, state.part)
+    one, several = same_level(with_noise_of(state.part, end.part), end.part)
     unit = one.inflation(at_level(start.part, one.level))
     return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
 
@@ -85,7 +93,7 @@ class Search:
     ) -> None:
         self.clock, self.tell = clock, clock.tell
         self.given, self.free = given, free
-        self.tests = Acceptance(record, held_out, clock, unit)
+        self.tests = Acceptance(record, held_out, clock, unit, free)
 
     def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
         """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
@@ -111,9 +119,10 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
             rounds.append(scores)
-            # What the library has been asked for already, and what a curve still says far more of than
-            # anything in it, is no bent view of something known.
-            tried = scores.curves if accepted and scores.curve_leads() else []
+            # What the library has been asked for already, or what is strong, and what a curve still says far
+            # more of than anything in it, is no bent view of something known.
+            leads = scores.curve_leads() and (accepted or scores.off_track)
+            tried = scores.curves if leads else []
             found = self._located(states[-1], scores) if tried else None
             found = found or self._known(states[-1], scores)
             if found is None:
@@ -177,7 +186,7 @@ class Search:
         if all(f.name in names for f in self.free):
             return state
         try:
-            part, whole = both(partial(released, free=self.free), state.part, state.whole)
+            part, whole = both(partial(released_anew, free=self.free), state.part, state.whole)
             if not (part.converged and whole.converged):
                 return state
             errors = self.tests.errors(part)
@@ -270,10 +279,12 @@ class Search:
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
             before = states[k]
-            trials = Proposals(before.part, rounds[k], self.clock).curves([last.curve])
+            from_there = started_at(before.part, states[-1].part)
+            trials = Proposals(from_there, rounds[k], self.clock).curves([last.curve])
             found = self.tests.best(before, trials, rounds[k])
             if found is None:
                 continue
+            found = found[0], self._released(found[1])
             if _cheaper(found, accepted[k:], states[k], states[-1]):
                 accepted[k:], states[k + 1 :], rounds[k + 1 :] = [found[0]], [found[1]], []
                 return
@@ -296,11 +307,13 @@ class Search:
             self.tell(f"trying without {' and '.join(one.title for _k, one in group)}")
             kept = [c for s in later for c in s.candidates if c.effect.name not in names]
             values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
-            last = states[-1].part
-            from_there = started_at(states[k].part, last, np.ones(len(last.record.t), dtype=bool))
+            from_there = started_at(states[k].part, states[-1].part)
             trial = of_library(from_there, kept, values)
             found = self.tests.best(states[k], fitted_ones([trial]), rounds[k])
-            if found is None or not _cheaper(found, later, states[k], states[-1]):
+            if found is None:
+                continue
+            found = found[0], self._released(found[1])
+            if not _cheaper(found, later, states[k], states[-1]):
                 continue
             left = {c.effect.name for c in kept}
             others = [a for s in later for a in s.alternatives if a.instead_of in left]

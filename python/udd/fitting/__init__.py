@@ -12,10 +12,20 @@ from .fit import (
     ran_away,
     refit,
     released,
+    released_anew,
     started_at,
     widened,
 )
-from .model_error_schedule import Goal, at_level, eased, smoothed_states, with_larger_model_error
+from .model_error_schedule import (
+    Goal,
+    at_level,
+    beyond_schedule,
+    eased,
+    far_off,
+    smoothed_states,
+    with_larger_model_error,
+    with_noise_of,
+)
 from .problem import Fit
 from .record import Record, record_of
 from .solve import filtered, frame_costs, predicted, within
@@ -27,9 +37,11 @@ __all__ = [
     "Record",
     "as_stated",
     "at_level",
+    "beyond_schedule",
     "checked_units",
     "eased",
     "extend",
+    "far_off",
     "filtered",
     "fit",
     "fit_record",
@@ -39,9 +51,11 @@ __all__ = [
     "record_of",
     "refit",
     "released",
+    "released_anew",
     "smoothed_states",
     "started_at",
     "widened",
     "with_larger_model_error",
+    "with_noise_of",
     "within",
 ]

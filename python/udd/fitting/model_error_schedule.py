@@ -25,7 +25,7 @@ ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
 LESS = 3.0
 _LITTLE = 3  # steps more, of a fit that may be near its minimum
-_UNEXPLAINED = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
+_FAR_OFF = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
 _LOOSE = 0.3  # leverage from which on misfits are not the noise
 _SAME = 0.03  # autocorrelations that differ by less need no other fit
 
@@ -77,6 +77,7 @@ def reduce_model_error(
             raise FitError("the fit has no level to solve at")
         best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps)
         point = best.point
+        _within_reach(best, goal)
     far = _skip_levels(best, point, levels) if problem.likeliest else None
     if far:
         best = _increase_model_error(far, levels)
@@ -87,17 +88,32 @@ def reduce_model_error(
         if not _stands(result, best):
             break
         best, point = result, result.point
-        if best.level <= goal.level and best.chi2 > goal.chi2:
-            raise FitError("the model explains less than another one that is held as tightly")
+        _within_reach(best, goal)
     if _is_last(best.problem) or best.level < goal.level or _explains_little(best, goal):
         return best
     return _settled(best, schedule, steps)
 
 
+def _within_reach(best: Fit, goal: Goal) -> None:
+    """Give up a fit that is above its goal already."""
+    if best.level <= goal.level and best.chi2 > goal.chi2:
+        raise FitError("the model explains less than another one that is held as tightly")
+
+
 def _explains_little(best: Fit, goal: Goal) -> bool:
     """Whether a fit with a goal is as tight as that asks, and far from explaining the data."""
     tight = goal is not ANY and best.level >= goal.level
-    return tight and best.converged and best.scatter > _UNEXPLAINED
+    return tight and best.converged and far_off(best)
+
+
+def far_off(fitted: Fit) -> bool:
+    """Whether a fit is far from explaining the data."""
+    return fitted.scatter > _FAR_OFF
+
+
+def beyond_schedule(fitted: Fit) -> bool:
+    """Whether a fit has more model error than the largest of its schedule."""
+    return fitted.problem.diffusion not in fitted.problem.schedule
 
 
 def provisional_fit(
@@ -198,13 +214,19 @@ def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
     """Increase the model-error variance until chi2 per degree of freedom is below a limit.
 
     With a small model error a wrong model distorts states and parameters. With a larger one its residuals
-    show what is missing. If no level is below the limit, the fit has the largest model error.
+    show what is missing. Where the fit is far from explaining the data with the largest of the schedule, the
+    error is increased tenfold beyond it, twice at most; such a fit has no level.
     """
-    problem, result = fitted.problem, fitted
-    for diffusion in reversed(problem.schedule[: fitted.level]):
+    schedule, result = fitted.problem.schedule, fitted
+    for diffusion in reversed(schedule[: fitted.level]):
+        if result.scatter < scatter:
+            return result
+        result = solve(fitted.measurements, fitted.problem.with_model_error(diffusion), result.point)
+    for factor in (10.0, 100.0) if far_off(result) else ():
         if result.scatter < scatter:
             break
-        result = solve(fitted.measurements, problem.with_model_error(diffusion), result.point)
+        beyond = fitted.problem.with_model_error(tuple(factor * q for q in schedule[0]))
+        result = solve(fitted.measurements, beyond, result.point)
     return result
 
 
@@ -213,6 +235,14 @@ def at_level(fitted: Fit, level: int) -> Fit:
     if level == fitted.level:
         return fitted
     problem = fitted.problem.with_model_error(fitted.problem.schedule[level])
+    return solve(fitted.measurements, problem, fitted.point, decrease=done(fitted))
+
+
+def with_noise_of(fitted: Fit, other: Fit) -> Fit:
+    """The same model, the noise as another fit of the same data has it: then their chi2 compare."""
+    if fitted.problem.noise is other.problem.noise:
+        return fitted
+    problem = replace(fitted.problem, noise=other.problem.noise)
     return solve(fitted.measurements, problem, fitted.point, decrease=done(fitted))
 
 

@@ -9,7 +9,7 @@ from udd.discovery.score_rounds import score_round
 from udd.discovery.thresholds import ALPHA
 from udd.discovery.trial_fits import of_library, price_of
 from udd.errors import FitError
-from udd.fitting import Fit, extend, ran_away, released
+from udd.fitting import Fit, extend, ran_away, released, with_noise_of
 from udd.fitting.parameters import Free, free_parameters
 from udd.fitting.sensor import is_encoder
 
@@ -39,7 +39,7 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     if not more or not effects:
         return None
     names = [e.name for e in effects]
-    alone = _freed(known, more)
+    alone = _freed(with_noise_of(known, found), more)
     for kept in (some for size in range(len(names)) for some in itertools.combinations(names, size)):
         if alone is not None and _explains(alone, found, kept):
             return [name for name in names if name not in kept]
