@@ -20,7 +20,16 @@ from udd.fitting import Fit
 from .score_rounds import ScoreRound, states_first
 from .thresholds import ALPHA
 from .time_budget import Clock
-from .trial_fits import TrialFit, fitted_ones, from_none, of_curve, of_formula, of_library, one_of_each
+from .trial_fits import (
+    TrialFit,
+    fitted_ones,
+    from_none,
+    of_curve,
+    of_formula,
+    of_library,
+    one_of_each,
+    with_more,
+)
 
 _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
 _TRIED = 12  # of the best candidates, fitted in full
@@ -79,7 +88,7 @@ class Proposals:
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
             trials += self._written(curve, rivals)
         if trials and (self.fit.model.profile.discovery.pairs or any(t.formula for t in trials)):
-            trials += self._pairs(loose, min((t.fit.chi2 for t in tight), default=np.inf))
+            trials += self._pairs(loose, tight)
         return trials, loose
 
     def only_together(self, loose: set[str]) -> tuple[list[TrialFit], int]:
@@ -138,11 +147,11 @@ class Proposals:
         self._trying([f.text for f in formulas])
         return fitted_ones(self.clock.each(lambda written: of_formula(self.fit, curve, written), formulas))
 
-    def _pairs(self, loose: set[str], most: float) -> list[TrialFit]:
+    def _pairs(self, loose: set[str], singles: list[TrialFit]) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
 
-        One that drives where it should brake may do so because another one brakes too much. `most` is the
-        chi2 of the best of the others.
+        One that drives where it should brake may do so because another one brakes too much. What does not
+        explain as much as one of the `singles` is given up.
         """
         scored = sorted((s for s in self.scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
@@ -154,12 +163,21 @@ class Proposals:
         # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
         alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
         pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
-        return self._together(pairs, most)
+        return self._together(pairs, singles)
 
-    def _together(self, groups: list[list[Candidate]], most: float = np.inf) -> list[TrialFit]:
-        """Several effects at once fitted in full, from none."""
+    def _together(self, groups: list[list[Candidate]], singles: Sequence[TrialFit] = ()) -> list[TrialFit]:
+        """Several effects at once fitted in full, each from where the best of the `singles` in it ended."""
+        most = min((t.fit.chi2 for t in singles), default=np.inf)
+        starts = sorted((t for t in singles if t.curve is None), key=lambda t: t.fit.chi2)
+
+        def together(group: list[Candidate]) -> TrialFit | None:
+            first = next((t for t in starts if t.candidates[0] in group), None)
+            if first is None:
+                return from_none(self.fit, group, most)
+            return with_more(self.fit, first, group, most)
+
         self._trying([" with ".join(c.title for c in group) for group in groups])
-        return fitted_ones(self.clock.each(lambda group: from_none(self.fit, group, most), groups))
+        return fitted_ones(self.clock.each(together, groups))
 
     def _trying(self, titles: list[str]) -> None:
         if titles:

@@ -15,7 +15,7 @@ from udd.discovery.scoring.score_scan import physical
 from udd.discovery.symbolic.formulas import Formula
 from udd.effects.user_defined import along_of
 from udd.errors import FitError
-from udd.fitting import Fit, Goal, extend
+from udd.fitting import Fit, Goal, extend, started_at
 from udd.models.formula_model import FormulaModel
 
 from .curve_effects import fit_curve, fit_formula
@@ -139,6 +139,16 @@ def of_library(
 def from_none(current: Fit, candidates: list[Candidate], most: float = math.inf) -> TrialFit | None:
     """Effects of the library with free amplitudes that start at zero."""
     return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates), most)
+
+
+def with_more(
+    current: Fit, first: TrialFit, candidates: list[Candidate], most: float = math.inf
+) -> TrialFit | None:
+    """Effects of the library, one of which was fitted already, from where that fit ended."""
+    start = started_at(current, first.fit)
+    known = first.fit.parameters
+    amplitudes = [known.get(name, 0.0) for c in candidates for name in c.amplitude_names]
+    return of_library(start, candidates, amplitudes, most)
 
 
 def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
