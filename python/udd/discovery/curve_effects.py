@@ -24,6 +24,7 @@ from udd.fitting.solve import done, solve
 Array = NDArray[np.float64]
 
 _MOVES = 12  # of a curve, most, for one model error
+_LOST = 3  # solves on end that do not converge, after which the curve leads nowhere
 _SHORTEST = 0.2  # share of a move, below which there is none that makes the fit better
 _WORSE = 1.02  # times chi2
 _SLOW = 0.01  # of chi2: where it falls by less the model may be held more tightly
@@ -140,7 +141,7 @@ class _Held:
 
 def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
     """Move the curve until chi2 falls by no more than a share of itself, or is still; whether it settled."""
-    at, current, fall, share = here.at, here.fit, math.inf, 1.0
+    at, current, fall, share, lost = here.at, here.fit, math.inf, 1.0, 0
     for left in reversed(range(_MOVES)):
         curve = rescored(here.curve, current, at)
         move, unit = curve.coefficients - at, max(1.0, current.scatter)
@@ -153,6 +154,9 @@ def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
                 moved = _solved(fit, replace(curve, coefficients=to), name, current, current.level)
             except FitError:
                 moved = None
+            lost = 0 if moved is not None and moved.converged else lost + 1
+            if lost == _LOST:
+                raise FitError("the model with the curve does not converge")
             if moved is not None and moved.chi2 < _WORSE * current.chi2:
                 break
             share /= 2
