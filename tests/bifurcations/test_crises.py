@@ -48,6 +48,7 @@ def test_lifetimes_diverge_at_the_boundary_crisis(boundary: udd.Crisis) -> None:
     assert 0.4 < power < 1.0
 
 
+@pytest.mark.nightly
 def test_the_start_of_the_search_does_not_matter(boundary: udd.Crisis) -> None:
     (other,) = udd.crises(window(), n=61, depth=30)
     assert abs(other.value - boundary.value) <= other.error + boundary.error
