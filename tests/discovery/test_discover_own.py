@@ -12,7 +12,7 @@ import pytest
 
 import udd
 from udd.cli import main
-from udd.discovery.acceptance import SearchState
+from udd.discovery.acceptance import Acceptance, SearchState
 from udd.discovery.discover import TRAIN
 from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import library
@@ -204,7 +204,7 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
     frames = record_of(record, known)
     train = frames.first(TRAIN)
     part, whole = (fit_record(record, some, known, search=True) for some in (frames.part(train), frames))
-    search = Search(frames, ~train, Clock(None, lambda _text: None), motion_time_scale(part))
+    search = Search(Acceptance(frames, ~train, Clock(None, lambda _text: None), motion_time_scale(part)))
     states, accepted, rounds = [SearchState(part, whole, search.tests.errors(part))], [], []
     for title in ("v^3 in v'", "v in v'"):
         rounds.append(score_round(states[-1].part))

@@ -293,14 +293,18 @@ class Acceptance:
                 continue
         return result, {id(t): w for t, w in wholes}
 
+    def all_are_free(self, fitted: Fit) -> bool:
+        """Whether everything is free that the user leaves free, as where a search begins it may not be."""
+        names = set(fitted.parameters)
+        return all(f.name in names for f in self.free)
+
     def _all_free(self, fitted: Fit) -> Fit:
         """With everything free that the user leaves free, where that does not go astray.
 
         A drive that is held 0.1 % off bends forms more than they differ.
         """
         # Without this a slip in the constraint alone is taken for a consistent one with a radial friction.
-        names = set(fitted.parameters)
-        if all(f.name in names for f in self.free):
+        if self.all_are_free(fitted):
             return fitted
         try:
             found = released(fitted, self.free)

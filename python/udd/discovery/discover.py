@@ -37,7 +37,7 @@ from udd.measurement import Measurement
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
-from .acceptance import SearchState, Step
+from .acceptance import Acceptance, SearchState, Step
 from .results import AddedEffect, Discovery, RejectedEffect
 from .search import Search, both
 from .thresholds import SAME
@@ -189,7 +189,8 @@ def discover(
     # Where whole records are held out, all data that a fit may see are those that effects are sought in.
     base, *others_too = checked_units(measurement, model, options, fits)
     baseline = others_too[0] if others_too else base
-    search = Search(record, ~train, clock, motion_time_scale(base), given, base.problem.free)
+    tests = Acceptance(record, ~train, clock, motion_time_scale(base), base.problem.free)
+    search = Search(tests, given)
     before = search.tests.errors(base)
     known = SearchState(base, baseline, before)
     begin = _begin(search, known)

@@ -6,9 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
@@ -23,21 +20,19 @@ from udd.discovery.validation.sensor_drift import as_random
 from udd.errors import FitError
 from udd.fitting import (
     Fit,
-    Record,
     at_level,
     ran_away,
     released_anew,
     started_at,
     with_noise_of,
 )
-from udd.fitting.parameters import Free
 
 from .acceptance import Acceptance, SearchState, Step
 from .proposals import Proposals
 from .results import RejectedEffect
 from .score_rounds import ScoreRound, score_round, states_first, with_surfaces
 from .thresholds import ALPHA, RejectionReason
-from .time_budget import Clock, TimeUpError
+from .time_budget import TimeUpError
 from .trial_fits import fitted_ones, needed_in, of_library
 
 _NEAREST = 4  # of them where none passes, to tell what they would do
@@ -82,18 +77,9 @@ class Outcome:
 class Search:
     """The search on the first part of a record, tested on the rest."""
 
-    def __init__(
-        self,
-        record: Record,
-        held_out: NDArray[np.bool_],
-        clock: Clock,
-        unit: float = 1.0,
-        given: Sequence[Candidate] = (),
-        free: Sequence[Free] = (),
-    ) -> None:
-        self.clock, self.tell = clock, clock.tell
-        self.given, self.free = given, free
-        self.tests = Acceptance(record, held_out, clock, unit, free)
+    def __init__(self, tests: Acceptance, given: Sequence[Candidate] = ()) -> None:
+        self.tests, self.given = tests, given
+        self.clock, self.tell = tests.clock, tests.clock.tell
 
     def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
         """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
@@ -182,11 +168,10 @@ class Search:
         with what it came to say that it is.
         """
         # Without this a strong cubic drag is followed by an eccentric mass and a curve that are not there.
-        names = set(state.part.parameters)
-        if all(f.name in names for f in self.free):
+        if self.tests.all_are_free(state.part):
             return state
         try:
-            part, whole = both(partial(released_anew, free=self.free), state.part, state.whole)
+            part, whole = both(partial(released_anew, free=self.tests.free), state.part, state.whole)
             if not (part.converged and whole.converged):
                 return state
             errors = self.tests.errors(part)

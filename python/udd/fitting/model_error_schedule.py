@@ -77,7 +77,7 @@ def reduce_model_error(
             raise FitError("the fit has no level to solve at")
         best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps)
         point = best.point
-        _within_reach(best, goal)
+        _give_up_above(goal, best)
     far = _skip_levels(best, point, levels) if problem.likeliest else None
     if far:
         best = _increase_model_error(far, levels)
@@ -88,13 +88,13 @@ def reduce_model_error(
         if not _stands(result, best):
             break
         best, point = result, result.point
-        _within_reach(best, goal)
+        _give_up_above(goal, best)
     if _is_last(best.problem) or best.level < goal.level or _explains_little(best, goal):
         return best
     return _settled(best, schedule, steps)
 
 
-def _within_reach(best: Fit, goal: Goal) -> None:
+def _give_up_above(goal: Goal, best: Fit) -> None:
     """Give up a fit that is above its goal already."""
     if best.level <= goal.level and best.chi2 > goal.chi2:
         raise FitError("the model explains less than another one that is held as tightly")
