@@ -44,6 +44,12 @@ def test_a_rolling_shutter_is_found_and_undone(tmp_path: Path) -> None:
     assert e[0] < 0.2 and e[1] < 0.2 and e[2] < 3  # the limits at twice this resolution
 
 
+def test_a_film_of_which_no_frame_is_measured_is_told(tmp_path: Path, capsys: Any) -> None:
+    film = shot(tmp_path / "brief.mp4", 0.84, (0, 0.001, 0.04, 0), rng=5, defects=Defects(readout=0.8))
+    assert main(["fit", str(film.path), "--W", "0.05"]) == 1
+    assert "no usable row" in capsys.readouterr().err
+
+
 def test_a_camera_that_stands_aside_is_found_and_undone(tmp_path: Path) -> None:
     film = shot(tmp_path / "aside.mp4", defects=Defects(off_axis=(math.radians(15), 0.0)))
     m = udd.track(film.path)

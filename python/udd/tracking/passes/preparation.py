@@ -163,6 +163,8 @@ def recalibrate(
         here = around.at(picture.index) if picture.index < len(tracks) else None
         if here is not None and here.tracked and not tracks.flag[picture.index]:
             frames.append((picture.y, here))
+    if not frames:
+        return known
     if known.look.readout and wanted.given("readout") is None:
         moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
         rolling = readout(moving, known.look, known.view, around.interval)
