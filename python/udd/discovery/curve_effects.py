@@ -16,8 +16,8 @@ from udd.discovery.symbolic.expressions import softened, write
 from udd.discovery.symbolic.formulas import Formula
 from udd.effects import Effect
 from udd.errors import FitError
-from udd.fitting import Fit, widened
-from udd.fitting.model_error_schedule import FEW, ROUGH, STEPS, reduce_model_error
+from udd.fitting import Fit, Goal, widened
+from udd.fitting.model_error_schedule import ANY, FEW, ROUGH, STEPS, reduce_model_error
 from udd.fitting.parameters import Free
 from udd.fitting.solve import done, solve
 
@@ -207,7 +207,9 @@ def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Eff
     )
 
 
-def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula") -> Fit:
+def fit_formula(
+    fit: Fit, curve: Curve, formula: Formula, name: str = "formula", goal: Goal | None = None
+) -> Fit:
     """Add a formula for a curve to a fitted model and refit everything, all of its constants free.
 
     The noise stays as it was estimated, so that chi2 compares with that of the curve.
@@ -215,7 +217,7 @@ def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula")
     Raises
     ------
     FitError
-        The formula cannot be added to the model, or the fit fails.
+        The formula cannot be added to the model, the fit fails, or does not reach its goal.
     """
     problem, point = widened(fit, [formula_effect(curve, formula, name)])
     order = list(problem.models[0].parameters)
@@ -223,4 +225,6 @@ def fit_formula(fit: Fit, curve: Curve, formula: Formula, name: str = "formula")
     more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
     problem = replace(problem, free=problem.free + more)
     # Where its constants run away, or trade for each other, there is no end to come to.
-    return reduce_model_error(fit.measurements, problem, point, problem.schedule[1:], steps=FEW)
+    return reduce_model_error(
+        fit.measurements, problem, point, problem.schedule[1:], steps=FEW, goal=goal or ANY
+    )

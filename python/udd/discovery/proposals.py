@@ -15,7 +15,7 @@ from udd.discovery.scoring.look_alikes import look_alikes
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.symbolic.formulas import Formula, formulas_for
 from udd.effects.user_defined import along_of
-from udd.fitting import Fit
+from udd.fitting import Fit, Goal
 
 from .score_rounds import ScoreRound, states_first
 from .thresholds import ALPHA
@@ -36,6 +36,7 @@ _TRIED = 12  # of the best candidates, fitted in full
 _ALIKE = 6  # more of them, that do nearly the same as the best
 _TOGETHER = 6  # pairs that may pass only together
 _FORMULAS = 3  # for each curve, fitted in full
+_HOPELESS = 2.0  # times the chi2 of the best fit: one above it that does not converge is given up
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
 
 
@@ -86,7 +87,7 @@ class Proposals:
             # Formulas that may explain the data as well as what the library has.
             known = max(self.scores.nats(s) for s in passing)
             rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
-            trials += self._written(curve, rivals)
+            trials += self._written(curve, rivals, self._beside(trials))
         if trials and (self.fit.model.profile.discovery.pairs or any(t.formula for t in trials)):
             trials += self._pairs(loose, tight)
         return trials, loose
@@ -110,17 +111,19 @@ class Proposals:
         for located in fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely)):
             trials.append(located)
             if located.curve is not None:
-                trials += self._written(located.curve, self._formulas(located.curve))
+                trials += self._written(located.curve, self._formulas(located.curve), self._beside([located]))
         return trials
 
     def tried(self, some: list[Scored]) -> list[TrialFit]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
-        return self._in_full([(s.candidate, list(s.amplitudes)) for s in some])
+        return one_of_each(self._in_full([(s.candidate, list(s.amplitudes)) for s in some]))
 
     def _singles(self, passing: list[Scored]) -> list[TrialFit]:
-        best = _machines_first(passing)
-        self._trying([s.candidate.title for s in best])
-        return self.tried(best)
+        best = [(s.candidate, list(s.amplitudes)) for s in _machines_first(passing)]
+        self._trying([candidate.title for candidate, _amplitudes in best])
+        # A wrong one may take a hundred times as long as the right one, which most often is the first.
+        first = self._in_full(best[:1])
+        return one_of_each(first + self._in_full(best[1:], self._beside(first)))
 
     def _look_alikes(self, tried: list[TrialFit]) -> list[TrialFit]:
         """What does nearly the same along the motion as the best of those tried, whatever its score."""
@@ -131,21 +134,28 @@ class Proposals:
         best = min(tried, key=lambda t: (-t.fit.level, t.fit.chi2))
         likest = look_alikes(self.fit.model, best.fit, others)[:_ALIKE]
         self._trying([candidate.title for candidate, _amplitude in likest])
-        return self._in_full([(candidate, [amplitude]) for candidate, amplitude in likest])
+        some = [(candidate, [amplitude]) for candidate, amplitude in likest]
+        return one_of_each(self._in_full(some, self._beside(tried)))
 
-    def _in_full(self, some: list[tuple[Candidate, list[float]]]) -> list[TrialFit]:
+    def _beside(self, trials: list[TrialFit]) -> Goal | None:
+        """What a fit must reach to be of use beside the best of those tried."""
+        best = min(trials, key=lambda t: (-t.fit.level, t.fit.chi2), default=None)
+        if best is None:
+            return None
+        return Goal(self.fit.level, lost=_HOPELESS * best.fit.chi2, rival=best.fit.level)
+
+    def _in_full(self, some: list[tuple[Candidate, list[float]]], goal: Goal | None = None) -> list[TrialFit]:
         """Candidates fitted in full, each from its amplitudes."""
-        found = self.clock.each(lambda one: of_library(self.fit, [one[0]], one[1]), some)
-        return one_of_each(fitted_ones(found))
+        return fitted_ones(self.clock.each(lambda one: of_library(self.fit, [one[0]], one[1], goal), some))
 
     def _formulas(self, curve: Curve) -> list[Formula]:
         taken = self.fit.model.state_names
         return formulas_for(curve, self.fit.observations, taken=taken).formulas[:_FORMULAS]
 
-    def _written(self, curve: Curve, formulas: list[Formula]) -> list[TrialFit]:
+    def _written(self, curve: Curve, formulas: list[Formula], goal: Goal | None) -> list[TrialFit]:
         """Formulas for a curve, fitted."""
         self._trying([f.text for f in formulas])
-        return fitted_ones(self.clock.each(lambda written: of_formula(self.fit, curve, written), formulas))
+        return fitted_ones(self.clock.each(lambda one: of_formula(self.fit, curve, one, goal), formulas))
 
     def _pairs(self, loose: set[str], singles: list[TrialFit]) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.
@@ -167,14 +177,14 @@ class Proposals:
 
     def _together(self, groups: list[list[Candidate]], singles: Sequence[TrialFit] = ()) -> list[TrialFit]:
         """Several effects at once fitted in full, each from where the best of the `singles` in it ended."""
-        most = min((t.fit.chi2 for t in singles), default=np.inf)
+        goal = Goal(self.fit.level, min((t.fit.chi2 for t in singles), default=np.inf))
         starts = sorted((t for t in singles if t.curve is None), key=lambda t: t.fit.chi2)
 
         def together(group: list[Candidate]) -> TrialFit | None:
             first = next((t for t in starts if t.candidates[0] in group), None)
             if first is None:
-                return from_none(self.fit, group, most)
-            return with_more(self.fit, first, group, most)
+                return from_none(self.fit, group, goal)
+            return with_more(self.fit, first, group, goal)
 
         self._trying([" with ".join(c.title for c in group) for group in groups])
         return fitted_ones(self.clock.each(together, groups))

@@ -120,14 +120,14 @@ class TrialFit:
 
 
 def of_library(
-    current: Fit, candidates: list[Candidate], start: list[float], most: float = math.inf
+    current: Fit, candidates: list[Candidate], start: list[float], goal: Goal | None = None
 ) -> TrialFit | None:
     """Effects of the library with free amplitudes.
 
-    None where they cannot be fitted, or explain so little that chi2 is above `most`.
+    None where they cannot be fitted, or explain less than the `goal` asks.
     """
     try:
-        fitted = extend(current, [c.effect for c in candidates], start, Goal(current.level, most))
+        fitted = extend(current, [c.effect for c in candidates], start, goal or Goal(current.level))
     except FitError:
         return None
     names = [name for c in candidates for name in c.amplitude_names]
@@ -136,19 +136,19 @@ def of_library(
     return trial if trial.physical and fitted.converged else None
 
 
-def from_none(current: Fit, candidates: list[Candidate], most: float = math.inf) -> TrialFit | None:
+def from_none(current: Fit, candidates: list[Candidate], goal: Goal | None = None) -> TrialFit | None:
     """Effects of the library with free amplitudes that start at zero."""
-    return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates), most)
+    return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates), goal)
 
 
 def with_more(
-    current: Fit, first: TrialFit, candidates: list[Candidate], most: float = math.inf
+    current: Fit, first: TrialFit, candidates: list[Candidate], goal: Goal | None = None
 ) -> TrialFit | None:
     """Effects of the library, one of which was fitted already, from where that fit ended."""
     start = started_at(current, first.fit)
     known = first.fit.parameters
     amplitudes = [known.get(name, 0.0) for c in candidates for name in c.amplitude_names]
-    return of_library(start, candidates, amplitudes, most)
+    return of_library(start, candidates, amplitudes, goal)
 
 
 def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
@@ -184,11 +184,11 @@ def _excess(current: Fit, curve: Curve) -> float:
     return 2 * curve.df * math.log(max(ratio, 1.0))
 
 
-def of_formula(current: Fit, curve: Curve, written: Formula) -> TrialFit | None:
-    """A formula for a curve, all its constants free."""
+def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None = None) -> TrialFit | None:
+    """A formula for a curve, all its constants free; None as for effects of the library."""
     name = _unused(current, "formula")
     try:
-        fitted = fit_formula(current, curve, written, name)
+        fitted = fit_formula(current, curve, written, name, goal)
     except FitError:
         return None
     effect = fitted.model.effects[-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ UNEXPLAINED = 2.5
 _OFF = 3.0  # times the drive that was stated: more than what is missing does
 _PACE = 2.0  # times a pendulum's stated ratio of length to inertia
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
+
+#: What misfits show: the noise, next to nothing where the states follow every frame, or the model's faults.
+Misfits = Literal["noise", "little", "faults"]
 
 
 def fit(
@@ -357,10 +360,14 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
         return found
     more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
     problem = replace(problem, free=problem.free + more)
-    tight = problem.schedule[found.level :]
-    shaped = reduce_model_error(fitted.measurements, problem, found.point, tight, goal=goal)
-    if shaped.converged:
-        return shaped
+    if found.level > 1:
+        try:
+            tight = problem.schedule[found.level :]
+            shaped = reduce_model_error(fitted.measurements, problem, found.point, tight, goal=goal)
+            if shaped.converged:
+                return shaped
+        except FitError:
+            pass
     # Far from its shape a model that is held that tightly does not find the way.
     return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[1:], goal=goal)
 
@@ -406,11 +413,12 @@ def refit(fitted: Fit) -> Fit:
     """
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
-    shown, point = not _least(fitted.measurements) > 0, fitted.point
+    misfits: Misfits = "little"
+    point = fitted.point
     try:
-        if shown:
-            shown, problem, point = _estimate_noise(fitted.measurements, problem, point)
-        if not shown:
+        if not _least(fitted.measurements) > 0:
+            misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
+        if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
         result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
     except SolveError:  # as where a threshold ends at zero, and beyond
@@ -428,8 +436,10 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
     as_stated, first = problem.noise, point
     for number, diffusion in enumerate(problem.schedule):
         problem = replace(problem, diffusion=diffusion, noise=as_stated)
-        shown, problem, point = _estimate_noise(measurements, problem, point)
-        if shown:
+        misfits, problem, point = _estimate_noise(measurements, problem, point)
+        if misfits == "faults":
+            break  # held more tightly, they show even more of them
+        if misfits == "noise":
             loose = provisional_fit(measurements, problem, point)
             return reduce_model_error(
                 measurements, loose.problem, _afresh(loose), problem.schedule[number + 1 :], loose
@@ -469,19 +479,19 @@ def _least(measurements: Sequence[Measurement]) -> float:
 
 def _estimate_noise(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point
-) -> tuple[bool, Problem, Point]:
-    """Fit and estimate the noise in turns; whether the misfits show it, and what was found."""
+) -> tuple[Misfits, Problem, Point]:
+    """Fit and estimate the noise in turns; what the misfits show, and what was found."""
     for _ in range(_NOISE_ROUNDS):
         result = solve(measurements, problem, point, decrease=ROUGH)
         point, before = result.point, problem.noise
         if result.leverage > FOLLOWS:
-            return False, problem, point
+            return "little", problem, point
         noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
         if _is_known(measurements[0]) and noise.beyond(problem.record, result.blurring, _BELIEVED):
-            return False, problem, point
+            return "faults", problem, point
         if not problem.likeliest:
             noise = replace(noise, factor=np.maximum(noise.factor, _least(measurements)))
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, result.blurring):
             break
-    return True, problem, point
+    return "noise", problem, point

@@ -41,10 +41,16 @@ class Goal:
         is, there, what is far from explaining the data, which is not held more tightly either.
     chi2 : float
         At most that, there: it only rises on the way, so a fit above it is given up.
+    lost : float
+        A fit above it that does not converge is given up, as far as the level `rival`.
+    rival : int
+        How tightly a fit is held whose chi2 is far below `lost`.
     """
 
     level: int = 0
     chi2: float = np.inf
+    lost: float = np.inf
+    rival: int = 0
 
 
 #: Whatever a fit comes to is of use.
@@ -96,7 +102,9 @@ def reduce_model_error(
 
 def _give_up_above(goal: Goal, best: Fit) -> None:
     """Give up a fit that is above its goal already."""
-    if best.level <= goal.level and best.chi2 > goal.chi2:
+    above = best.level <= goal.level and best.chi2 > goal.chi2
+    lost = best.level <= goal.rival and best.chi2 > goal.lost and not best.converged
+    if above or lost:
         raise FitError("the model explains less than another one that is held as tightly")
 
 
