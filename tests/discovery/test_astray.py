@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
+import pytest
 
 import udd
 from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.look_alikes import look_alikes
-from udd.fitting import at_level, extend, fit_record, record_of, released, released_anew
+from udd.errors import FitError
+from udd.fitting import (
+    Fit,
+    Goal,
+    at_level,
+    extend,
+    fit_record,
+    record_of,
+    released,
+    released_anew,
+    started_at,
+)
+from udd.fitting.model_error_schedule import reduce_model_error
 
 
 def noisy(model: udd.Model, start: list[float], share: float) -> udd.Measurement:
@@ -103,13 +118,47 @@ def test_scores_around_a_looser_fit_name_what_a_model_far_astray_lacks() -> None
     assert best[0].chi2 > 2 * others[0].chi2
 
 
-def test_once_a_strong_effect_is_found_the_noise_is_estimated_anew() -> None:
+@pytest.fixture(scope="module")
+def astray() -> Fit:
+    """A drive that gives way to the load by far more than the known model, without it, can follow."""
+    measured = filmed(udd.Disk(0.08, effects=[udd.effects.load_drive(a=1.8)]), 40.0)
+    return fit_record(measured, record_of(measured), udd.Disk(0.079), ["k0"], camera=False, search=True)
+
+
+def test_what_does_not_converge_is_given_up_beside_what_fits(astray: Fit) -> None:
+    right = extend(astray, [udd.effects.load_drive(a=1.8)], [1.0])
+    goal = Goal(lost=2 * right.chi2, rival=right.level)
+    problem, start = astray.problem, started_at(astray, right).point
+    there = reduce_model_error(astray.measurements, problem, start, problem.schedule, goal=goal)
+    assert there.converged and there.chi2 > goal.lost
+    with pytest.raises(FitError, match="explains less than another one"):
+        reduce_model_error(astray.measurements, problem, start, problem.schedule, steps=1, goal=goal)
+
+
+def test_where_misfits_show_the_models_faults_no_noise_is_sought_at_tighter_levels(
+    astray: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = importlib.import_module("udd.fitting.fit")
+    asked: list[str] = []
+    estimate = module._estimate_noise
+
+    def watched(*given: object) -> object:
+        found = estimate(*given)
+        asked.append(found[0])
+        return found
+
+    monkeypatch.setattr(module, "_estimate_noise", watched)
+    again = fit_record(astray.measurements, astray.record, astray.models, ["k0"], camera=False, search=True)
+    assert asked == ["faults"]
+    assert again.chi2 == pytest.approx(astray.chi2, rel=1e-6)  # 0.01 is where a fit ends
+
+
+def test_once_a_strong_effect_is_found_the_noise_is_estimated_anew(astray: Fit) -> None:
     """Around the known model it could not be told from what the model misses, and was taken as stated."""
-    effect = udd.effects.load_drive(a=1.8)
-    measured = filmed(udd.Disk(0.08, effects=[effect]), 40.0)
-    known = fit_record(measured, record_of(measured), udd.Disk(0.079), ["k0"], camera=False, search=True)
-    found = extend(known, [effect], [1.8])
-    free = fit_record(measured, record_of(measured), udd.Disk(0.079), ["k0", "W"], camera=False, search=True)
+    found = extend(astray, [udd.effects.load_drive(a=1.8)], [1.8])
+    free = fit_record(
+        astray.measurements, astray.record, astray.models, ["k0", "W"], camera=False, search=True
+    )
     kept, anew = (work(found, free.problem.free) for work in (released, released_anew))
     assert abs(anew.parameters["W"] - 0.08) < 4 * anew.errors["W"]
     assert kept.scatter > 1.5
