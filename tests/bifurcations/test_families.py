@@ -108,7 +108,7 @@ def test_what_is_not_kept_is_refused() -> None:
     with pytest.raises(ModelError, match="over a second parameter"):
         udd.locus(point, "q", (-0.1, 0.1))
     # Twice the period, twice the value.
-    born = udd.continuation(point)
+    born = udd.continuation(point, max_points=20)
     assert born.values[0] == pytest.approx(2.0 * point.value, abs=0.1)
     # One of a family: how long it lasts is nothing that has a bound.
     assert np.isnan(orbit.period_error)

@@ -497,7 +497,7 @@ def _staying(t: Floats, x: Floats, attractor: Floats, size: Floats) -> Floats:
     close = 3.0 * float(np.quantile(gaps, 0.999)) + 1e-6
     there = np.isfinite(t)
     scaled = np.where(there[..., None], x / size, 0.0)
-    near = there & (tree.query(scaled)[0] < close)
+    near = there & (tree.query(scaled, distance_upper_bound=close)[0] < close)
     if near.shape[1] < _STAYS:
         return np.full(len(t), np.inf)
     held = np.all(np.lib.stride_tricks.sliding_window_view(near, _STAYS, axis=1), axis=2)
