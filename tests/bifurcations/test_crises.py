@@ -72,10 +72,17 @@ def test_mirror_images_merge_before_the_boundary_crisis() -> None:
     assert sides(high.value + 1e-3) < 0.5 < 0.9 < sides(high.value - 1e-3)
 
 
-@pytest.mark.slow
-def test_from_a_terminal(boundary: udd.Crisis, capsys: pytest.CaptureFixture[str]) -> None:
+def test_from_a_terminal(
+    boundary: udd.Crisis, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     from udd.cli import main
 
+    def known(branch: udd.Branch) -> list[udd.Crisis]:  # which takes ten seconds to find again
+        assert branch.parameter == "w"
+        assert branch.values.min() < boundary.value < branch.values.max()
+        return [boundary]
+
+    monkeypatch.setattr("udd.bifurcations.crises", known)
     where = ["--from", "5.9", "--to", "6.1", "--at", "6", "--state", "0.72665,-8.82437,0"]
     assert main(["continuation", "w", *where, "--crises", "--json"]) == 0
     (one,) = json.loads(capsys.readouterr().out)["crises"]

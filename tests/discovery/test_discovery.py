@@ -273,6 +273,7 @@ def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most
     assert 0.013 < drag < 0.022  # one aerodynamic constant for all lengths, 0.014 to 0.021 there
 
 
+@pytest.mark.nightly
 def test_a_formula_that_free_runs_contradict_ends_the_search(shared):
     """A pendulum of a cup: its formula of Omega fits and foretells worse; nothing around it is better."""
     measured = udd.read_measurement(shared / "data/real/cup_pendulum.txt", columns="t,theta,_")

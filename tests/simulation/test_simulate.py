@@ -269,7 +269,7 @@ def test_ctrl_c_is_answered_within_0_2_s(call: str) -> None:
 LARGE = """
 import resource
 import numpy as np, udd
-resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+resource.setrlimit(resource.RLIMIT_AS, (3 << 29, 3 << 29))
 try:
     {call}
 except MemoryError as error:
