@@ -40,6 +40,8 @@ _DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion 
 _TIED = 4 * EVIDENCE_MARGIN
 _ASTRAY = 1.5  # times the scatter of the first part, of all data: that fit may have ended elsewhere
 _FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
+#: Times chi2, by which what is held as stated may part forms: with it free, all data compare them.
+_BENT = 2.0
 _EQUALS = 10  # forms between which all data decide
 
 
@@ -195,7 +197,10 @@ class Acceptance:
         # knows comes before a formula, and a formula before a curve, that fit about as well.
         trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.prior_penalty, 3))
         paid = {id(t): t.criterion(unit) + (t.prior_penalty if t.is_curve else 0.0) for t in trials}
-        near = self._once([t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED])
+        near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
+        if not self.all_are_free(current.part):
+            near = [t for t in trials if t.compared.chi2 < _BENT * first.chi2]
+        near = self._once(near)
         costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
         near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
         foretelling = Foretelling(current.whole.record, wholes, self.unit)
