@@ -142,16 +142,12 @@ class _Held:
 def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
     """Move the curve until chi2 falls by no more than a share of itself, or is still; whether it settled."""
     at, current, fall, share, lost = here.at, here.fit, math.inf, 1.0, 0
-    nats = math.inf
     for left in reversed(range(_MOVES)):
         curve = rescored(here.curve, current, at)
         move, unit = curve.coefficients - at, max(1.0, current.scatter)
-        before, nats = nats, float(move @ curve.score.information @ move / 2)
-        settled = nats < _STILL * unit
+        settled = bool(move @ curve.score.information @ move / 2 < _STILL * unit)
         if settled or not left or abs(fall) < max(slow * current.chi2, 2 * _STILL * unit):
             break
-        # Moves that do not get shorter go to and fro.
-        share = min(2 * share, 1.0) if nats < before / 2 else max(share / 2, _SHORTEST)
         while share >= _SHORTEST:
             to = at + share * move
             try:
@@ -167,7 +163,7 @@ def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
         else:
             break
         fall = current.chi2 - moved.chi2
-        at, current = to, moved
+        at, current, share = to, moved, min(2 * share, 1.0)
     return _Held(curve, at, current), settled
 
 
