@@ -357,7 +357,7 @@ class Acceptance:
             if one and one.fit.level >= trial.fit.level and one.fit.scatter < _ASTRAY * trial.fit.scatter:
                 return one
             found.append(one)
-        return min(fitted_ones(found), key=lambda t: (-t.fit.level, t.fit.chi2), default=None)
+        return min(fitted_ones(found), key=lambda t: t.rank, default=None)
 
     def worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""

@@ -131,7 +131,7 @@ class Proposals:
             return []
         names = {t.candidates[0].effect.name for t in tried}
         others = [s.candidate for s in self.scores.library.scored if s.candidate.effect.name not in names]
-        best = min(tried, key=lambda t: (-t.fit.level, t.fit.chi2))
+        best = min(tried, key=lambda t: t.rank)
         likest = look_alikes(self.fit.model, best.fit, others)[:_ALIKE]
         self._trying([candidate.title for candidate, _amplitude in likest])
         some = [(candidate, [amplitude]) for candidate, amplitude in likest]
@@ -139,7 +139,7 @@ class Proposals:
 
     def _beside(self, trials: list[TrialFit]) -> Goal | None:
         """What a fit must reach to be of use beside the best of those tried."""
-        best = min(trials, key=lambda t: (-t.fit.level, t.fit.chi2), default=None)
+        best = min(trials, key=lambda t: t.rank, default=None)
         if best is None:
             return None
         return Goal(self.fit.level, lost=_HOPELESS * best.fit.chi2, rival=best.fit.level)

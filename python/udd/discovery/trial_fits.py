@@ -77,6 +77,11 @@ class TrialFit:
         return [self.fit.parameters[name] for name in self.names]
 
     @property
+    def rank(self) -> tuple[int, float]:
+        """Order of several: what is held more tightly comes first, then what has the smaller chi2."""
+        return -self.fit.level, self.fit.chi2
+
+    @property
     def is_curve(self) -> bool:
         """Whether it is a curve without a formula."""
         return self.curve is not None and self.formula is None
@@ -206,7 +211,7 @@ def fitted_ones(trials: list[TrialFit | None]) -> list[TrialFit]:
 def one_of_each(trials: list[TrialFit]) -> list[TrialFit]:
     """The best of those that tried one effect with several values of a shape that a fit then found."""
     found: dict[object, TrialFit] = {}
-    for trial in sorted(trials, key=lambda t: (-t.fit.level, t.fit.chi2)):
+    for trial in sorted(trials, key=lambda t: t.rank):
         effect = trial.candidates[0].effect
         fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
         found.setdefault((effect.name, effect.momentum, *fixed), trial)
