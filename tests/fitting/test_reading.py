@@ -77,3 +77,15 @@ def test_readings_that_repeat_tell_what_one_would():
     noise = frame_noise(values)
     assert noise[5] == pytest.approx(step / np.sqrt(12), rel=0.01)
     assert (1 / noise[20:420] ** 2).sum() == pytest.approx(12 / step**2, rel=0.02)
+
+
+def test_a_film_that_is_better_than_its_geometry_is_told_both_ways():
+    """A search counts on no more than half of 5 mrad; what the frames scatter by is told beside it."""
+    noise = 1e-3
+    (found,) = udd.discover(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).noise
+    # 3000 frames tell their scatter to 1.3 %; three of it.
+    assert found.shown == pytest.approx(noise, rel=0.04)
+    assert found.noise == pytest.approx(2.5e-3, rel=0.01)
+    assert f"theta {1e3 * found.shown:.3g} mrad (counted as 2.5 mrad, for the geometry" in found.text
+    # A fit alone takes the frames at their word.
+    assert "counted" not in udd.fit(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).summary()

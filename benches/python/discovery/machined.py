@@ -96,9 +96,8 @@ def _judge(result: MachineScore, found: udd.Discovery, sigma: dict[str, float]) 
     _value, result.low, result.high = found.ratio
     fit = found.fit
     result.scatter = float(fit.scatter)
-    sd = fit.noise.sd(fit.record, fit.states[:, 0])
-    channels = [k for k, name in enumerate(fit.channels) if name in sigma]
-    result.noise = float(np.median([np.median(sd[:, k]) / sigma[fit.channels[k]] for k in channels]))
+    shown = [one.shown / sigma[one.name] for one in found.noise if one.name in sigma]
+    result.noise = float(np.median(shown))
 
 
 def _matches(lacks: Sequence[str], names: Sequence[str]) -> bool:

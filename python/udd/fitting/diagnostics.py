@@ -28,6 +28,7 @@ _OFF = 3.0  # standard deviations from what was stated
 _LEAST = 30  # frames of which innovations tell anything
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
+_BETTER = 0.8  # of the noise that a fit assumes: misfits below show that it is less
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,8 @@ class Reading:
     name, unit : str
     noise : float
         Standard deviation that the fit assumed of a typical frame.
+    shown : float
+        The same as the misfits show it.
     step : float
         That the channel was read in; 0 where its values lie on no lattice.
     memory : float
@@ -89,6 +92,7 @@ class Reading:
     name: str
     unit: str
     noise: float
+    shown: float
     step: float
     memory: float
 
@@ -103,6 +107,9 @@ class Reading:
         unit, factor = small_unit(self.unit)
         unit = f" {unit}" if unit else ""
         said = f"{self.name} {factor * self.noise:.3g}{unit}"
+        if self.shown < _BETTER * self.noise and not self.step:
+            counted = f"{factor * self.noise:.3g}{unit}, for the geometry of a film is known no better"
+            said = f"{self.name} {factor * self.shown:.3g}{unit} (counted as {counted})"
         if self.step:
             said += f", read in steps of {factor * self.step:.3g}{unit}"
         if self.memory:
@@ -266,7 +273,10 @@ def readings(fit: Fit) -> list[Reading]:
             first = own & (fit.record.film == 0)
             step = lattice(fit.record.seen[first, k])
             noise, memory = float(np.median(sd[own, k])), float(fit.noise.memory[k])
-            result.append(Reading(name, known[k] if known else "", noise, step, memory))
+            # A misfit is smaller than an error by what the states follow it.
+            errors = (np.square(fit.misfit[own, k]) + fit.misfit_variance[own, k]) / np.square(sd[own, k])
+            shown = noise * float(np.sqrt(np.average(errors, weights=fit.noise.weight[own])))
+            result.append(Reading(name, known[k] if known else "", noise, shown, step, memory))
     return result
 
 

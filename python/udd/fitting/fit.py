@@ -117,6 +117,8 @@ def fit(
     (found,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
+    if not found.doubts.missing:  # a wrong model's faults would pass for noise
+        found = refit(found)
     return found.without_cache().doubted()
 
 
@@ -409,14 +411,15 @@ def _with_free(fitted: Fit, free: Sequence[Free]) -> Problem:
 def refit(fitted: Fit) -> Fit:
     """The same model fitted again, the noise estimated anew, and held as tightly as is likeliest.
 
-    In a search the noise stays as the first model showed it, so that chi2 compares.
+    At the loose level where it was estimated first the states follow the frames a little, and it came out too
+    small; in a search it stays as the first model showed it, so that chi2 compares.
     """
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     misfits: Misfits = "little"
     point = fitted.point
     try:
-        if not _least(fitted.measurements) > 0:
+        if fitted.problem.likeliest or not _least(fitted.measurements) > 0:
             misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
         if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point

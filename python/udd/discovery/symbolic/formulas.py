@@ -145,7 +145,8 @@ def _different(trials: list[_Fitted], x: Array) -> list[_Fitted]:
     shapes: set[str] = set()
     for one in sorted(trials, key=lambda f: -round(f.nats, 2)):
         made = evaluate(one.node, x, one.values)
-        same = any(np.abs(made - other).max() < 1e-3 * np.ptp(other) for _, other in kept)
+        with np.errstate(invalid="ignore"):  # one that is infinite somewhere is like no other
+            same = any(np.abs(made - other).max() < 1e-3 * np.ptp(other) for _, other in kept)
         if not same and shape(one.node) not in shapes:
             kept.append((one, made))
             shapes.add(shape(one.node))
