@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import udd
-from udd.fitting.sensor import frame_noise, is_encoder, lattice, reads, roughness
+from udd.fitting.sensor import frame_noise, is_encoder, lattice, reads, roughness, stated_noise
 
 
 def swing(step: float, noise: float = 0.0, seed: int = 0, duration: float = 20.0) -> udd.Measurement:
@@ -89,3 +89,29 @@ def test_a_film_that_is_better_than_its_geometry_is_told_both_ways():
     assert f"theta {1e3 * found.shown:.3g} mrad (counted as 2.5 mrad, for the geometry" in found.text
     # A fit alone takes the frames at their word.
     assert "counted" not in udd.fit(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).summary()
+
+
+def test_stated_noise_is_shared_by_readings_that_repeat():
+    step, sigma = 0.1, 0.05
+    values = step * np.concatenate([np.arange(20), np.full(400, 20), 20 + np.arange(20)])
+    noise = stated_noise(values, np.full(len(values), sigma))
+    assert noise[5] == pytest.approx(sigma)
+    # 401 readings of one step, whose own error they share, and of other noise, which each has its own.
+    assert noise[100] ** 2 == pytest.approx(sigma**2 + 400 * step**2 / 12)
+    smooth = np.random.default_rng(0).normal(0, 1, 400)
+    assert (stated_noise(smooth, np.full(400, sigma)) == sigma).all()
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_an_encoder_at_rest_shows_nothing_missing_whether_its_noise_is_stated_or_not(stated):
+    """Two thirds of the record are one reading, which says as much as one: not that there is no noise."""
+    t, step = np.arange(0, 60, 0.02), 2 * np.pi / 4096
+    theta = udd.simulate(udd.Pendulum(0.34, k0=0.1), t, [0.0, 0.7]).state[:, 1]
+    theta = theta + 2e-4 * np.random.default_rng(0).standard_normal(len(t))
+    sd = float(np.hypot(2e-4, step / np.sqrt(12)))
+    sigma = np.full((len(t), 1), sd) if stated else None
+    measured = udd.Measurement(t, {"theta": np.round(theta / step) * step}, sigma=sigma)
+    found = udd.discover(measured, udd.Pendulum(0.34, k0=0.1))
+    assert found.verdict == "nothing missing" and not found.fit.doubts.missing
+    # The encoder's own error is told, to what 2e-4 beside it add: not that of 2000 frames that share one.
+    assert found.noise[0].noise == pytest.approx(sd, rel=0.15)

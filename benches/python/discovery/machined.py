@@ -96,8 +96,8 @@ def _judge(result: MachineScore, found: udd.Discovery, sigma: dict[str, float]) 
     _value, result.low, result.high = found.ratio
     fit = found.fit
     result.scatter = float(fit.scatter)
-    shown = [one.shown / sigma[one.name] for one in found.noise if one.name in sigma]
-    result.noise = float(np.median(shown))
+    told = [one.told / sigma[one.name] for one in found.noise if one.name in sigma]
+    result.noise = float(np.median(told))
 
 
 def _matches(lacks: Sequence[str], names: Sequence[str]) -> bool:

@@ -102,14 +102,19 @@ class Reading:
         return self.step > _COARSE * self.noise
 
     @property
+    def told(self) -> float:
+        """What a frame is good to: less than was assumed, where its misfits show that."""
+        return self.shown if self.shown < _BETTER * self.noise and not self.step else self.noise
+
+    @property
     def text(self) -> str:
         """In words: in mm and mrad, as errors are told."""
         unit, factor = small_unit(self.unit)
         unit = f" {unit}" if unit else ""
-        said = f"{self.name} {factor * self.noise:.3g}{unit}"
-        if self.shown < _BETTER * self.noise and not self.step:
+        said = f"{self.name} {factor * self.told:.3g}{unit}"
+        if self.told < self.noise:
             counted = f"{factor * self.noise:.3g}{unit}, for the geometry of a film is known no better"
-            said = f"{self.name} {factor * self.shown:.3g}{unit} (counted as {counted})"
+            said += f" (counted as {counted})"
         if self.step:
             said += f", read in steps of {factor * self.step:.3g}{unit}"
         if self.memory:
@@ -158,8 +163,9 @@ class Diagnostics:
 
     @property
     def coloured(self) -> list[str]:
-        """The channels whose innovations are not white."""
-        return [name for name, p in self.white.items() if p < _COLOURED]
+        """The channels whose innovations are not white; steps that no other noise blurs leave none white."""
+        stepped = [one.name for one in self.sensor if one.coarse]
+        return [name for name, p in self.white.items() if p < _COLOURED and name not in stepped]
 
     @property
     def missing(self) -> bool:
@@ -199,6 +205,8 @@ class Diagnostics:
         if self.white:
             least = min(self.white, key=lambda name: self.white[name])
             state = f"not white in {', '.join(self.coloured)}" if self.coloured else "white"
+            if not self.coloured and self.white[least] < _COLOURED:
+                state = "no more coloured than steps make them"
             said.append(
                 f"with that, innovations are {state} (probability of so much colour by chance: "
                 f"{self.white[least]:.1g} in {least})"
@@ -272,7 +280,9 @@ def readings(fit: Fit) -> list[Reading]:
         if own.any():
             first = own & (fit.record.film == 0)
             step = lattice(fit.record.seen[first, k])
-            noise, memory = float(np.median(sd[own, k])), float(fit.noise.memory[k])
+            # Readings that repeat share the step's error: the others tell what one is good to.
+            noise = float(sd[own, k].min() if step else np.median(sd[own, k]))
+            memory = float(fit.noise.memory[k])
             # A misfit is smaller than an error by what the states follow it.
             errors = (np.square(fit.misfit[own, k]) + fit.misfit_variance[own, k]) / np.square(sd[own, k])
             shown = noise * float(np.sqrt(np.average(errors, weights=fit.noise.weight[own])))

@@ -475,9 +475,9 @@ def _least(measurements: Sequence[Measurement]) -> float:
     """What the noise of a search is at least, in units of what is known beforehand."""
     first = measurements[0]
     least = profile_of(first.kind).sensor.faithful
-    if not least or first.sigma is not None:
-        return 0.0
-    return 1.0 if is_encoder(first) else least
+    if not least or is_encoder(first):
+        return 1.0 if least else 0.0
+    return least if first.sigma is None else 0.0
 
 
 def _estimate_noise(

@@ -18,7 +18,7 @@ from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .formula_models import checked_start, driven, guessed, slope, typical_noise
-from .sensor import frame_noise, is_encoder, lattice, moving, noise_by_size
+from .sensor import frame_noise, is_encoder, lattice, moving, noise_by_size, stated_noise
 
 Array = NDArray[np.float64]
 
@@ -190,6 +190,8 @@ def record_of(
         sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, read), np.inf)
     else:
         own_sigma = np.where(present, measurement.sigma[row[there]], np.inf)
+        for column, noise, read_there in zip(read.T, own_sigma.T, present.T, strict=True):
+            noise[read_there] = stated_noise(column[read_there], noise[read_there])
         sigma[np.ix_(there, places)] = own_sigma
         if measurement.rho is not None:
             covariance, stated = measurement.covariance()[row[there]], measurement.sigma[row[there]]

@@ -81,17 +81,27 @@ def reads(values: Array) -> tuple[float, float]:
 
 
 def frame_noise(values: Array) -> Array:
-    """The noise of each frame of one channel, (n,), of which the steps' errors repeat where readings do.
+    """The noise of each frame of one channel, (n,), of which the steps' errors repeat where readings do."""
+    noise, step = reads(values)
+    return _repeated(values, np.full(len(values), noise), step)
+
+
+def stated_noise(values: Array, sigma: Array) -> Array:
+    """As :func:`frame_noise`, where the noise `sigma` of each frame, (n,), is stated."""
+    return _repeated(values, sigma, lattice(values))
+
+
+def _repeated(values: Array, noise: Array, step: float) -> Array:
+    """The noise of each frame, larger where readings repeat.
 
     As long as a motion stays within a step its frames share one error: together they tell what one would.
     """
-    noise, step = reads(values)
     if not step:
-        return np.full(len(values), noise)
+        return noise
     changes = np.flatnonzero(np.abs(np.diff(values)) > step / 2) + 1
     lengths = np.diff(np.concatenate([[0], changes, [len(values)]]))
-    own = step**2 / 12.0
-    result: Array = np.sqrt(noise**2 - own + np.repeat(lengths, lengths) * own)
+    own = np.minimum(step**2 / 12.0, noise**2)
+    result: Array = np.sqrt(noise**2 + (np.repeat(lengths, lengths) - 1) * own)
     return result
 
 
