@@ -112,7 +112,8 @@ fn run<F: Family<D>, const D: usize>(
         }
         By::MethodChoice(MethodChoice::Dop853) => stages(),
         By::MethodChoice(MethodChoice::Taylor) => {
-            let message = "the model's law depends on comparisons, which no power series follows; use method=\"dop853\"";
+            let message = "the model's law has a comparison or an arc tangent, which no power series follows here; use \
+                           method=\"dop853\"";
             series().ok_or_else(|| ModelError::new_err(message))?
         }
         By::MethodChoice(MethodChoice::Auto) => match series() {

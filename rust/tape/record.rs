@@ -14,7 +14,7 @@ use crate::scalar::Scalar;
 
 /// Why a model has no tape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("the model's law depends on comparisons, which no power series follows")]
+#[error("the model's law has a comparison or an arc tangent, which no power series follows here")]
 pub struct Unrecordable;
 
 impl<const D: usize> Tape<D> {

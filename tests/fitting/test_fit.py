@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 import simulated
 import udd
 from udd.errors import FitError
-from udd.fitting import fit_record, model_error_schedule, record_of, widened
+from udd.fitting import as_stated, fit_record, model_error_schedule, record_of, widened
 from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.fit import _afresh
 from udd.fitting.parameters import Free
@@ -193,6 +193,9 @@ def test_a_wrapped_angle_is_followed():
         ({"free": "k0"}, "lists of names"),
         ({"free": ["k0", "k0"]}, "k0 is named twice"),
         ({"measurement": 3}, "a measurement is needed"),
+        ({"model": None}, "a model is needed"),
+        ({"model": []}, "one measurement but 0 models"),
+        ({"model": [udd.Disk(0.04), udd.Disk(0.04)]}, "one measurement but 2 models"),
     ],
 )
 def test_bad_input_is_named(change, message):
@@ -201,6 +204,24 @@ def test_bad_input_is_named(change, message):
     arguments = {"measurement": measured, "model": udd.Disk(0.04), **change}
     with pytest.raises(FitError, match=message):
         udd.fit(**arguments)
+
+
+def test_lists_may_be_given_as_generators():
+    t = np.arange(0, 20, 0.04)
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]
+    measured = udd.Measurement(t, {"theta": theta + 1e-3 * np.random.default_rng(0).standard_normal(len(t))})
+    found = udd.fit(measured, udd.Pendulum(0.79), (n for n in ["k0"]), camera=(n for n in ["theta0"]))
+    assert list(found.parameters) == ["k0", "theta0"]
+
+
+def test_what_is_kept_of_a_fit_that_ran_away_keeps_what_each_record_has_and_what_is_known_of_it():
+    two = [simulated.film(udd.Disk(0.04), np.random.default_rng(seed), 8.0)[0] for seed in (1, 2)]
+    known = {"y0": (0.0, 1e-5), "k0[0]": (0.012, 1e-3)}
+    models = [udd.Disk(0.04), udd.Disk(0.04)]
+    base = fit_record(two, record_of(two, models), models, each=["W", "k0"], priors=known, search=True)
+    kept = {f.name: f for f in as_stated(base).problem.free}
+    assert {"k0[0]", "k0[1]", "y0[0]", "y0[1]"} <= set(kept) and "W[0]" not in kept
+    assert kept["k0[0]"].sd == 1e-3 and kept["y0[0]"].sd == 1e-5
 
 
 def test_too_little_is_refused():

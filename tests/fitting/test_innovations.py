@@ -126,3 +126,17 @@ def test_the_means_of_residuals_have_honest_errors(fits: list[udd.Fit]) -> None:
                     _, mean, error = binned(x, loose.defect[:, k])
                     z.append(mean / error)
     assert 0.8 < np.sqrt(np.mean(np.square(z))) < 1.25  # 1.04 in a larger experiment
+
+
+def test_what_any_of_several_records_sees_is_looked_at() -> None:
+    """Two records of an own model, one of which sees x and the other v, with a force that it lacks."""
+    t = np.arange(0, 20, 0.05)
+    known = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v"}, {"k": 9.0, "c": 0.1})
+    pushed = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v + 0.3*sin(5*t)"}, {"k": 9.0, "c": 0.1})
+    rng = np.random.default_rng(0)
+    x = udd.simulate(known, t, [1.0, 0.0]).state[:, 0] + 5e-3 * rng.standard_normal(len(t))
+    v = udd.simulate(pushed, t, [1.0, 0.0]).state[:, 1] + 5e-3 * rng.standard_normal(len(t))
+    two = [udd.Measurement(t, {"x": x}), udd.Measurement(t, {"v": v})]
+    said = [udd.fit(order, known, state0=[{}, {}]).doubts for order in (two, two[::-1])]
+    assert said[0].missing and said[1].missing
+    assert set(said[0].white) == set(said[1].white) == {"x", "v"}

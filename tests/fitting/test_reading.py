@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import udd
+from udd.errors import FitError
 from udd.fitting.sensor import frame_noise, is_encoder, lattice, reads, roughness, stated_noise
+from udd.fitting.thinning import thinned
 
 
 def swing(step: float, noise: float = 0.0, seed: int = 0, duration: float = 20.0) -> udd.Measurement:
@@ -115,3 +117,26 @@ def test_an_encoder_at_rest_shows_nothing_missing_whether_its_noise_is_stated_or
     assert found.verdict == "nothing missing" and not found.fit.doubts.missing
     # The encoder's own error is told, to what 2e-4 beside it add: not that of 2000 frames that share one.
     assert found.noise[0].noise == pytest.approx(sd, rel=0.15)
+
+
+def test_an_encoder_that_moves_by_few_steps_is_as_good_as_these():
+    step = 2 * np.pi / 400
+    t = np.arange(0, 20, 0.02)
+    theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.04]).state[:, 1]
+    measured = udd.Measurement(t, {"theta": np.round(theta / step) * step}, meta={"sensor": "encoder"})
+    assert len(np.unique(measured.values)) < 9  # which show no lattice
+    found = udd.fit(measured, udd.Pendulum(0.79))
+    assert found.doubts.sensor[0].noise == pytest.approx(step / np.sqrt(12), rel=0.3)
+    assert "film" not in found.summary()
+
+
+def test_an_encoder_that_never_moves_says_so():
+    still = udd.Measurement(np.arange(0, 20, 0.02), {"theta": np.zeros(1000)}, meta={"sensor": "encoder"})
+    with pytest.raises(FitError, match="the same angle in every row"):
+        udd.fit(still, udd.Pendulum(0.79))
+
+
+def test_means_of_an_encoders_readings_are_still_an_encoders():
+    record = swing(2 * np.pi / 4096, 1e-4, duration=400.0)
+    means = thinned(record, (0,))
+    assert is_encoder(record) and means.every > 1 and is_encoder(means.measurement)

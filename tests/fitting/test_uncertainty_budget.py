@@ -68,3 +68,26 @@ def test_a_budget_that_cannot_be_made_says_why(
 ) -> None:
     with pytest.raises((FitError, UddError), match=words):
         fitted.budget(held, k)
+
+
+def test_what_was_free_is_not_among_what_was_fixed(fitted: udd.Fit) -> None:
+    held = udd.fit(fitted.measurement, udd.Disk(0.042), free=["k0", "g"])
+    assert "g" in fitted.budget().sources and "g" not in held.budget().sources
+
+
+def test_a_budget_of_what_a_search_found_says_what_the_model_may_miss() -> None:
+    """As that of a fit: its errors contain the doubt, which the budget shows apart."""
+    t = np.arange(0, 60, 0.05)
+    truth = udd.Pendulum(1.0, k0=0.01, effects=[udd.effects.quadratic_drag(c=0.3)])
+    theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+    measured = udd.Measurement(t, {"theta": theta + noise}, sigma=np.full((len(t), 1), 1e-4))
+    found = udd.discover(measured, udd.Pendulum(1.0, k0=0.03), budget=1e-3)
+    assert found.stopped and found.fit.doubts.missing
+    assert found.fit.widened == found.fit.doubts.factor > 10
+    budget = found.fit.budget(fixed={})
+    assert budget.standard["k0"] == pytest.approx(found.fit.errors["k0"], rel=1e-9)
+    assert "model error" in budget.sources
+    # Forecasts draw from what the frames say; what the model misses kicks their runs.
+    ahead = udd.forecast(measured, udd.Pendulum(1.0, k0=0.03), start=30.0, t=2.0)
+    assert np.isfinite(ahead.median).all()

@@ -25,7 +25,9 @@ from udd.fitting import (
     Fit,
     as_stated,
     checked_units,
+    eased,
     fit_record,
+    options_of,
     ran_away,
     record_of,
     refit,
@@ -144,7 +146,7 @@ def discover(
     ['quadratic drag']
     """
     clock = Clock(budget, progress or (lambda _text: None))
-    free = free if free is None or isinstance(free, str) else list(free)
+    options = options_of(free, camera, priors, each)
     order, apart = _held_out(measurement, held_out)
     if apart and (each is not None or any("[" in name for name in priors or {})):
         raise FitError(
@@ -155,16 +157,15 @@ def discover(
         measurement, model, state0 = (_ordered(one, order) for one in (measurement, model, state0))
     thin = _thinned(measurement, model)
     measurement = [own.measurement for own in thin]
-    measurement = measurement[0] if len(measurement) == 1 else measurement
+    if len(measurement) == 1:
+        measurement, model, state0 = measurement[0], _only(model), _only(state0)
     record = record_of(measurement, model, state0)
-    one = model if isinstance(model, Model) else next(iter(model))
+    one = next(iter(model)) if isinstance(model, (list, tuple)) else model
     given = _given(one, candidates)
     n = len(record.t)
     if n < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
     train = ~np.isin(record.film, range(len(order) - apart, len(order))) if apart else record.first(TRAIN)
-    options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
-
     clock.finish("fitting the known model")
     background_import.importing("scipy.stats", "pyoperon.sklearn")
 
@@ -197,10 +198,11 @@ def discover(
     end = search.run(begin, known)
     clock.finish("fitting the model as found")
     final = refit(end.whole)
+    told = (eased(final) if final.scatter > UNEXPLAINED else final).without_cache().doubted()
     found = [
         replace(f, by_record=by_record(baseline, end.whole, f.effect, order)[0])
         for step in end.accepted
-        for f in _describe(step, final)
+        for f in _describe(step, told)
     ]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
@@ -226,8 +228,8 @@ def discover(
     verdict = verdict_of(found, final, bool(end.unconfirmed), bool(open_form), bool(stopped))
     return Discovery(
         verdict=verdict,
-        baseline=(baseline if found else final).without_cache(),
-        fit=final.without_cache(),
+        baseline=baseline.without_cache().doubted() if found else told,
+        fit=told,
         effects=found,
         alternatives=others,
         error_before=before,
@@ -296,6 +298,11 @@ def _ordered(one: Any, order: Sequence[int]) -> Any:
     return [one[k] for k in order] if isinstance(one, (list, tuple)) and len(one) == len(order) else one
 
 
+def _only(one: Any) -> Any:
+    """What is in a list of one thing; all else as it is."""
+    return one[0] if isinstance(one, (list, tuple)) and len(one) == 1 else one
+
+
 def _thinned(
     measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
 ) -> list[Thinned]:
@@ -305,7 +312,7 @@ def _thinned(
         some = list(measurement)
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
-    one = model if isinstance(model, Model) else next(iter(model))
+    one = next(iter(model), None) if isinstance(model, (list, tuple)) else model
     angles = one.turning if isinstance(one, FormulaModel) else one.angles if isinstance(one, Model) else ()
     return [thinned(own, angles) for own in some]
 

@@ -183,7 +183,7 @@ def _determined(
         left = [name for name in free if name not in gone]
         own = {name: prior for name, prior in priors.items() if name not in gone}
         try:
-            return fit_record(measurement, record, model, left, priors=own, search=True), [
+            return fit_record(measurement, record, model, left, priors=own, each=(), search=True), [
                 name for name in names if name in gone
             ]
         except SolveError as error:

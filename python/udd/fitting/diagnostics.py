@@ -12,7 +12,7 @@ from udd._util.small_units import small_unit
 
 from .input_noise import LEVELS_APART, NoisyInput, diffusion_by_noise, noisy_inputs
 from .parameters import Free
-from .sensor import is_film, lattice, moving
+from .sensor import is_encoder, is_film, lattice, moving, repeats
 
 if TYPE_CHECKING:
     from .problem import Fit
@@ -87,6 +87,9 @@ class Reading:
         That the channel was read in; 0 where its values lie on no lattice.
     memory : float
         How much of the noise is still there in the next frame.
+    trusted : bool
+        Whether the frames are counted on for what they show; those of a film are not where they scatter by
+        less than its geometry is good to.
     """
 
     name: str
@@ -95,6 +98,7 @@ class Reading:
     shown: float
     step: float
     memory: float
+    trusted: bool = True
 
     @property
     def coarse(self) -> bool:
@@ -103,8 +107,8 @@ class Reading:
 
     @property
     def told(self) -> float:
-        """What a frame is good to: less than was assumed, where its misfits show that."""
-        return self.shown if self.shown < _BETTER * self.noise and not self.step else self.noise
+        """What a frame is good to by itself."""
+        return self.noise if self.trusted else self.shown
 
     @property
     def text(self) -> str:
@@ -112,7 +116,7 @@ class Reading:
         unit, factor = small_unit(self.unit)
         unit = f" {unit}" if unit else ""
         said = f"{self.name} {factor * self.told:.3g}{unit}"
-        if self.told < self.noise:
+        if not self.trusted:
             counted = f"{factor * self.noise:.3g}{unit}, for the geometry of a film is known no better"
             said += f" (counted as {counted})"
         if self.step:
@@ -203,7 +207,7 @@ class Diagnostics:
         elif self.missed:
             said.append(f"the model misses {rates} at most, r.m.s. over a frame, as a right one does")
         if self.white:
-            least = min(self.white, key=lambda name: self.white[name])
+            least = min(self.coloured or self.white, key=lambda name: self.white[name])
             state = f"not white in {', '.join(self.coloured)}" if self.coloured else "white"
             if not self.coloured and self.white[least] < _COLOURED:
                 state = "no more coloured than steps make them"
@@ -274,6 +278,8 @@ def readings(fit: Fit) -> list[Reading]:
     """The noise of each channel that was seen, and the steps that it was read in."""
     known = fit.model.profile.sensor.units
     sd = fit.noise.sd(fit.record, fit.blurring)
+    film = fit.measurement.sigma is None and fit.model.profile.sensor.faithful > 0
+    film = film and not is_encoder(fit.measurement)
     result = []
     for k, name in enumerate(fit.channels):
         own = fit.record.observed[:, k]
@@ -281,12 +287,14 @@ def readings(fit: Fit) -> list[Reading]:
             first = own & (fit.record.film == 0)
             step = lattice(fit.record.seen[first, k])
             # Readings that repeat share the step's error: the others tell what one is good to.
-            noise = float(sd[own, k].min() if step else np.median(sd[own, k]))
+            alone = own & (repeats(fit.record.seen[:, k], step) == 1) if step else own
+            noise = float(np.median(sd[alone, k]) if alone.any() else sd[own, k].min())
             memory = float(fit.noise.memory[k])
             # A misfit is smaller than an error by what the states follow it.
             errors = (np.square(fit.misfit[own, k]) + fit.misfit_variance[own, k]) / np.square(sd[own, k])
             shown = noise * float(np.sqrt(np.average(errors, weights=fit.noise.weight[own])))
-            result.append(Reading(name, known[k] if known else "", noise, shown, step, memory))
+            trusted = not film or shown > _BETTER * noise
+            result.append(Reading(name, known[k] if known else "", noise, shown, step, memory, trusted))
     return result
 
 

@@ -18,13 +18,13 @@ from udd.models.formula_model import FormulaModel
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
 from .input_noise import LEVELS_APART, diffusion_by_noise
-from .model_error_schedule import ANY, ROUGH, Goal, provisional_fit, reduce_model_error
+from .model_error_schedule import ANY, FEW, LEAP, ROUGH, Goal, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera
 from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .sensor import is_encoder
-from .solve import SolveError, solve
+from .solve import MOST, SolveError, solve
 from .units import ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
@@ -111,15 +111,25 @@ def fit(
     True
     """
     record = record_of(measurement, model, state0)
-    free = free if free is None or isinstance(free, str) else list(free)
-
-    options: dict[str, Any] = {"free": free, "camera": camera, "priors": priors, "each": each}
+    options = options_of(free, camera, priors, each)
     (found,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
-    if not found.doubts.missing:  # a wrong model's faults would pass for noise
-        found = refit(found)
     return found.without_cache().doubted()
+
+
+def options_of(
+    free: Iterable[str] | None,
+    camera: bool | Iterable[str],
+    priors: Mapping[str, tuple[float, float]] | None,
+    each: Iterable[str] | None,
+) -> dict[str, Any]:
+    """What a user may say of a fit's parameters, to be read more than once."""
+    lists = {
+        name: given if given is None or isinstance(given, (bool, str)) else list(given)
+        for name, given in (("free", free), ("camera", camera), ("each", each))
+    }
+    return {**lists, "priors": priors}
 
 
 def fit_record(
@@ -149,11 +159,7 @@ def fit_record(
     else:
         schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
-    sets = tuple(
-        FilmParameters(list(own.parameters.values()), known_camera(kind, film.meta), 0.0)
-        for own, film in zip(models, measurements, strict=True)
-    )
-    point = Point(record.states, sets)
+    point = _start(models, measurements, record)
     if search and models[0].inputs:  # a fit finds out by itself how tightly the model is held
         problem = _with_input_noise(measurements, problem, point)
     return _anneal(measurements, problem, point)
@@ -273,11 +279,16 @@ def _loosest(measurements: Sequence[Measurement], models: Sequence[Model], free:
     problem = Problem(
         tuple(models), record, parameters, stated(record), schedule, schedule[0], likeliest=False
     )
+    return _anneal(tuple(measurements), problem, _start(models, measurements, record)).evidence
+
+
+def _start(models: Sequence[Model], measurements: Sequence[Measurement], record: Record) -> Point:
+    """The states as they were read, all parameters as they are known."""
     sets = tuple(
         FilmParameters(list(own.parameters.values()), known_camera(own.kind, film.meta), 0.0)
         for own, film in zip(models, measurements, strict=True)
     )
-    return _anneal(tuple(measurements), problem, Point(record.states, sets)).evidence
+    return Point(record.states, sets)
 
 
 def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement]) -> tuple[Model, ...]:
@@ -286,8 +297,9 @@ def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement])
     if len(models) != len(measurements):
         raise FitError(f"there are {len(measurements)} measurements but {len(models)} models")
     for own, measurement in zip(models, measurements, strict=True):
-        known = isinstance(own, Model)
-        if not (known and own.profile.written) and measurement.kind != getattr(own, "kind", None):
+        if not isinstance(own, Model):
+            raise FitError(f"a model is needed (udd.Disk, udd.Pendulum, udd.Model), not {own!r}")
+        if not own.profile.written and measurement.kind != own.kind:
             raise FitError(
                 f"the measurement has columns {', '.join(measurement.names)}, "
                 f"which {type(own).__name__} does not explain"
@@ -376,14 +388,18 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
 
 def as_stated(fitted: Fit) -> Fit:
     """Fit anew with the drive and the camera, but for the pivot, held as they were stated; for a search."""
-    models, profile = fitted.problem.models, fitted.model.profile
-    names = [f.name.partition("[")[0] for f in fitted.problem.free if f.role == "model"]
-    kept = [name for name in dict.fromkeys(names) if name not in profile.fit.stated]
-    pivot = [f.name.partition("[")[0] for f in fitted.problem.free if f.role == "camera"]
-    camera = [name for name in dict.fromkeys(pivot) if name in profile.sensor.pivot]
-    priors = {f.name: (f.mean, f.sd) for f in fitted.problem.free if f.name in kept}
-    record = fitted.record
-    return fit_record(fitted.measurements, record, models, kept, camera=camera, priors=priors, search=True)
+    profile = fitted.model.profile
+
+    def kept(free: Free) -> bool:
+        name = free.name.partition("[")[0]
+        if free.role == "model":
+            return name not in profile.fit.stated
+        return free.role == "camera" and name in profile.sensor.pivot
+
+    free = tuple(one for one in fitted.problem.free if kept(one))
+    problem = replace(fitted.problem, free=free, noise=stated(fitted.record))
+    start = _start(problem.models, fitted.measurements, fitted.record)
+    return _anneal(fitted.measurements, problem, start)
 
 
 def released(fitted: Fit, free: Sequence[Free]) -> Fit:
@@ -411,15 +427,14 @@ def _with_free(fitted: Fit, free: Sequence[Free]) -> Problem:
 def refit(fitted: Fit) -> Fit:
     """The same model fitted again, the noise estimated anew, and held as tightly as is likeliest.
 
-    At the loose level where it was estimated first the states follow the frames a little, and it came out too
-    small; in a search it stays as the first model showed it, so that chi2 compares.
+    In a search the noise stays as the first model showed it, so that chi2 compares.
     """
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     misfits: Misfits = "little"
     point = fitted.point
     try:
-        if fitted.problem.likeliest or not _least(fitted.measurements) > 0:
+        if not _least(fitted.measurements, search=True) > 0:
             misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
         if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
@@ -443,13 +458,46 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
         if misfits == "faults":
             break  # held more tightly, they show even more of them
         if misfits == "noise":
-            loose = provisional_fit(measurements, problem, point)
-            return reduce_model_error(
-                measurements, loose.problem, _afresh(loose), problem.schedule[number + 1 :], loose
+            loose = _likeliest_noise(
+                provisional_fit(measurements, problem, point), problem.schedule[number + 1 :]
             )
+            tighter = problem.schedule[loose.level + 1 :]
+            if not tighter:
+                return loose
+            return reduce_model_error(measurements, loose.problem, _afresh(loose), tighter, loose)
     # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
     believed = as_stated.everywhere(len(problem.record.t))
     return reduce_model_error(measurements, replace(problem, noise=believed), first, problem.schedule)
+
+
+def _likeliest_noise(fitted: Fit, tighter: Sequence[tuple[float, ...]]) -> Fit:
+    """The fit of a tighter level with the noise estimated there, as long as that makes the record likelier.
+
+    Where the states still follow the frames the noise comes out too small, and a right model would then be
+    found wanting. A right model takes several levels at once.
+    """
+    # Without this a plain disk seen to 0.1 mm and 1 mrad is said to lack something.
+    left = list(tighter)
+    while left:
+        ahead = min(LEAP, len(left))
+        found = next(filter(None, (_likelier(fitted, left[k - 1]) for k in dict.fromkeys((ahead, 1)))), None)
+        if found is None:
+            break
+        fitted, left = found, left[left.index(found.problem.diffusion) + 1 :]
+    return fitted
+
+
+def _likelier(fitted: Fit, diffusion: tuple[float, ...]) -> Fit | None:
+    """The fit held as tightly, with the noise estimated there, if that makes the record likelier."""
+    problem = fitted.problem.with_model_error(diffusion)
+    try:
+        misfits, problem, point = _estimate_noise(fitted.measurements, problem, _afresh(fitted), FEW)
+        if misfits != "noise":
+            return None
+        found = provisional_fit(fitted.measurements, problem, point, FEW)
+    except FitError:
+        return None
+    return found if found.converged and found.evidence > fitted.evidence else None
 
 
 def _afresh(fitted: Fit) -> Point:
@@ -471,29 +519,38 @@ def _is_known(measurement: Measurement) -> bool:
     return measurement.sigma is not None or profile_of(measurement.kind).written or is_encoder(measurement)
 
 
-def _least(measurements: Sequence[Measurement]) -> float:
-    """What the noise of a search is at least, in units of what is known beforehand."""
-    first = measurements[0]
-    least = profile_of(first.kind).sensor.faithful
-    if not least or is_encoder(first):
-        return 1.0 if least else 0.0
-    return least if first.sigma is None else 0.0
+def _least(measurements: Sequence[Measurement], search: bool) -> float:
+    """What the noise is at least, in units of what is known beforehand."""
+    result = 0.0
+    for own in measurements:
+        least = profile_of(own.kind).sensor.faithful
+        if least and is_encoder(own):
+            return 1.0
+        if search and own.sigma is None:
+            result = least
+    return result
 
 
 def _estimate_noise(
-    measurements: tuple[Measurement, ...], problem: Problem, point: Point
+    measurements: tuple[Measurement, ...], problem: Problem, point: Point, steps: int = MOST
 ) -> tuple[Misfits, Problem, Point]:
-    """Fit and estimate the noise in turns; what the misfits show, and what was found."""
+    """Fit and estimate the noise in turns; what the misfits show, and what was found.
+
+    A model that does not get there in so many `steps` is wrong.
+    """
+    known = all(_is_known(own) for own in measurements)
+    least = _least(measurements, search=not problem.likeliest)
     for _ in range(_NOISE_ROUNDS):
-        result = solve(measurements, problem, point, decrease=ROUGH)
+        result = solve(measurements, problem, point, steps, decrease=ROUGH)
         point, before = result.point, problem.noise
+        if steps < MOST and not result.converged:
+            return "faults", problem, point
         if result.leverage > FOLLOWS:
             return "little", problem, point
         noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
-        if _is_known(measurements[0]) and noise.beyond(problem.record, result.blurring, _BELIEVED):
+        if known and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return "faults", problem, point
-        if not problem.likeliest:
-            noise = replace(noise, factor=np.maximum(noise.factor, _least(measurements)))
+        noise = replace(noise, factor=np.maximum(noise.factor, least))
         problem = replace(problem, noise=noise)
         if before.like(noise, problem.record, result.blurring):
             break

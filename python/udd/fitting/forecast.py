@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,7 @@ Array = NDArray[np.float64]
 _STEP = 0.01  # between the times that a forecast is given at
 _KICK = 0.1  # between the kicks that stand for the model's assumed error
 _FEWEST = 6  # frames that determine a state
+_TRIES = 100  # draws of a member's parameters that no model has
 _RTOL, _ATOL = 1e-9, 1e-12
 _GROWTH_TIME = 4000.0  # over which the exponent is averaged; its error is then a percent or two
 
@@ -357,17 +358,28 @@ def _starts(
     order = list(own.parameters)
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []
-    for draw in _draws(fitted, asked[0], scale, rng):
-        camera = list(camera_of_fit)
-        values: dict[str, float] = {}
-        for free in fitted.problem.free:
-            if free.film not in (None, film):
+    draws = _draws(fitted, scale, rng)
+
+    def drawn() -> tuple[Model, list[float]]:
+        """A model and its camera; numbers that no such model has are drawn again."""
+        for draw in itertools.islice(draws, _TRIES):
+            camera = list(camera_of_fit)
+            values: dict[str, float] = {}
+            for free in fitted.problem.free:
+                if free.film not in (None, film):
+                    continue
+                if free.role == "model":
+                    values[order[free.index]] = draw[free.name]
+                elif free.role == "camera":
+                    camera[free.index] = draw[free.name]
+            try:
+                return own.with_parameters(values), camera
+            except ModelError:
                 continue
-            if free.role == "model":
-                values[order[free.index]] = draw[free.name]
-            elif free.role == "camera":
-                camera[free.index] = draw[free.name]
-        model = own.with_parameters(values)
+        raise FitError("the fit leaves its parameters so uncertain that a draw of them makes no model")
+
+    for _ in range(asked[0]):
+        model, camera = drawn()
         try:
             films = [FilmParameters(list(model.parameters.values()), camera, clock)]
             fixed = EstimatorInput(model, seen, part.states, films, (), diffusion)
@@ -380,20 +392,18 @@ def _starts(
     return models, cameras, np.array(states)
 
 
-def _draws(fitted: Fit, members: int, scale: float, rng: np.random.Generator) -> list[Mapping[str, float]]:
+def _draws(fitted: Fit, scale: float, rng: np.random.Generator) -> Iterator[Mapping[str, float]]:
     """Parameters from the fit's covariance; the clock's error is fixed."""
     names = list(fitted.parameters)
     mean = np.array([fitted.parameters[name] for name in names])
-    covariance = fitted.covariance
+    covariance = fitted.covariance / fitted.widened**2  # what the model may miss kicks it on the way
     fixed = [k for k, free in enumerate(fitted.problem.free) if free.role == "clock"]
     for k in fixed:
         column = covariance[:, k]
         covariance = covariance - np.outer(column, column) / column[k]
         covariance[k, :] = covariance[:, k] = 0.0
-    return [
-        dict(zip(names, (mean + scale * _normal(covariance, rng)).tolist(), strict=True))
-        for _ in range(members)
-    ]
+    while True:
+        yield dict(zip(names, (mean + scale * _normal(covariance, rng)).tolist(), strict=True))
 
 
 def _normal(covariance: Array, rng: np.random.Generator) -> Array:
@@ -419,7 +429,7 @@ def _runs(
     pieces = max(round((t[-1] - t[0]) / every), 1) if kicked else 1
     edges = np.linspace(t[0], t[-1], pieces + 1)
     current = states.copy()
-    for a, b in pairwise(edges.tolist()):
+    for a, b in itertools.pairwise(edges.tolist()):
         inside = np.flatnonzero((t > a) & (t <= b))
         # Half of a piece's kick before it and half after it.
         current += np.sqrt((b - a) / 2) * kicks * rng.standard_normal((n, d))

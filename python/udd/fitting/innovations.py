@@ -68,6 +68,6 @@ def innovations(fit: Fit) -> Innovations:
     vague = np.ptp(fit.states, axis=0).tolist()
     values = _core.innovations(replace(problem.at(fit.point), free=()), vague)
     told = np.isfinite(values).sum(axis=0) >= _FEWEST
-    seen = [k for k, name in enumerate(fit.channels) if name in fit.measurement.names and told[k]]
+    seen = [k for k in range(len(fit.channels)) if fit.record.observed[:, k].any() and told[k]]
     names = tuple(fit.channels[k] for k in seen)
     return Innovations(names, float(np.median(np.diff(fit.record.t))), values[:, seen])

@@ -19,7 +19,7 @@ from .solve import DONE, done, solve
 STEPS = 30
 #: Steps in which a right model gets from one level to any other.
 FEW = 12
-_LEAP = 3  # levels that it takes at once
+LEAP = 3  # levels that it takes at once
 #: Fall of chi2 below which a fit no longer changes what it says of the noise; its likelihood counts it.
 ROUGH = 10.0
 #: Nats by which the evidence may fall when the model is held more tightly.
@@ -110,7 +110,7 @@ def _give_up_above(goal: Goal, best: Fit) -> None:
 
 def _explains_little(best: Fit, goal: Goal) -> bool:
     """Whether a fit with a goal is as tight as that asks, and far from explaining the data."""
-    tight = goal is not ANY and best.level >= goal.level
+    tight = goal != ANY and best.level >= goal.level
     return tight and best.converged and far_off(best)
 
 
@@ -166,7 +166,7 @@ def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -
 
     None where it does not; what it came to on the way is then no good start.
     """
-    for diffusion in levels[(len(levels) - 1) % _LEAP :: _LEAP]:
+    for diffusion in levels[(len(levels) - 1) % LEAP :: LEAP]:
         try:
             result = provisional_fit(best.measurements, best.problem.with_model_error(diffusion), point, FEW)
         except FitError:

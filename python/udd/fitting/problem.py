@@ -19,6 +19,7 @@ from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .noise import Noise, colour
 from .parameters import Free
 from .record import Record
+from .sensor import is_encoder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -131,6 +132,8 @@ class Fit:
         equation. NaN where frames are not linked.
     noise : Noise
         The measurement's noise as the record shows it.
+    widened : float
+        By what `errors` were multiplied, and the covariance twice, for what the model may miss.
     """
 
     models: tuple[Model, ...]
@@ -152,6 +155,7 @@ class Fit:
     noise: Noise
     problem: Problem
     point: Point
+    widened: float = 1.0
 
     @property
     def model(self) -> Model:
@@ -232,13 +236,14 @@ class Fit:
         """The same for choosing between forms: the scatter counts as it shows, see :attr:`shown`."""
         return self.shown * self._colour(before)
 
-    @property
+    @cached_property
     def shown(self) -> float:
         """The scatter, at least 1 where the noise was known; how forms are told apart.
 
         A pendulum's film is not taken for better than its geometry, which many are.
         """
-        assumed = self.model.profile.sensor.faithful > 0 and self.measurement.sigma is None
+        own = self.measurement
+        assumed = self.model.profile.sensor.faithful > 0 and own.sigma is None and not is_encoder(own)
         return self.scatter if assumed else max(self.scatter, 1.0)
 
     def _colour(self, before: Fit) -> float:
@@ -254,11 +259,12 @@ class Fit:
 
     def doubted(self) -> Fit:
         """The same with standard errors that contain what the model may miss, see :class:`Diagnostics`."""
-        factor = self.doubts.factor
+        factor = self.doubts.factor / self.widened
         if factor == 1.0:
             return self
         errors = {name: factor * error for name, error in self.errors.items()}
-        result = replace(self, errors=errors, covariance=factor**2 * self.covariance)
+        widened = factor * self.widened
+        result = replace(self, errors=errors, covariance=factor**2 * self.covariance, widened=widened)
         result.__dict__["doubts"] = self.doubts
         return result
 

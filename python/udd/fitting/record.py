@@ -18,7 +18,7 @@ from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .formula_models import checked_start, driven, guessed, slope, typical_noise
-from .sensor import frame_noise, is_encoder, lattice, moving, noise_by_size, stated_noise
+from .sensor import few_readings, frame_noise, is_encoder, lattice, moving, noise_by_size, stated_noise
 
 Array = NDArray[np.float64]
 
@@ -142,9 +142,13 @@ def record_of(
             starts = state0 if isinstance(state0, Sequence) else [state0] * len(measurement)
             if len(starts) != len(measurement):
                 raise FitError(f"there are {len(measurement)} measurements but {len(starts)} starts")
+            if len(models) != len(measurement):
+                raise FitError(f"there are {len(measurement)} measurements but {len(models)} models")
             return _joined([record_of(*own) for own in zip(measurement, models, starts, strict=True)])
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     if isinstance(model, Sequence):
+        if len(model) != 1:
+            raise FitError(f"there is one measurement but {len(model)} models")
         (model,) = model
     own = model if isinstance(model, FormulaModel) else None
     start = None if state0 is None else checked_start(own, state0)
@@ -249,7 +253,8 @@ def _noise_of(measurement: Measurement, values: Array) -> Array:
         result: Array = np.maximum(typical, steps)
         return result
     if profile_of(measurement.kind).sensor.zero is not None and is_encoder(measurement):
-        return frame_noise(values[:, 0])[:, None]
+        noise = frame_noise(values[:, 0])
+        return (noise if noise.all() else few_readings(values[:, 0]))[:, None]
     return np.array(profile_of(measurement.kind).sensor.sigma)
 
 

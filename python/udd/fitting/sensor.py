@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
+from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import profile_of
 
@@ -83,25 +84,45 @@ def reads(values: Array) -> tuple[float, float]:
 def frame_noise(values: Array) -> Array:
     """The noise of each frame of one channel, (n,), of which the steps' errors repeat where readings do."""
     noise, step = reads(values)
-    return _repeated(values, np.full(len(values), noise), step)
+    return _shared(values, np.full(len(values), noise), step)
 
 
 def stated_noise(values: Array, sigma: Array) -> Array:
     """As :func:`frame_noise`, where the noise `sigma` of each frame, (n,), is stated."""
-    return _repeated(values, sigma, lattice(values))
+    return _shared(values, sigma, lattice(values))
 
 
-def _repeated(values: Array, noise: Array, step: float) -> Array:
+def few_readings(values: Array) -> Array:
+    """As :func:`frame_noise`, of an encoder that was seen in so few steps that they show no lattice.
+
+    Raises
+    ------
+    FitError
+        It never moved.
+    """
+    gaps = np.diff(np.unique(values))
+    if not len(gaps):
+        raise FitError("the encoder reads the same angle in every row: nothing can be learnt from it")
+    step = float(gaps.min())
+    return _shared(values, np.full(len(values), step / math.sqrt(12.0)), step)
+
+
+def repeats(values: Array, step: float) -> NDArray[np.int64]:
+    """How often in a row each value was read, (n,)."""
+    changes = np.flatnonzero(np.abs(np.diff(values)) > step / 2) + 1
+    lengths = np.diff(np.concatenate([[0], changes, [len(values)]]))
+    return np.repeat(lengths, lengths)
+
+
+def _shared(values: Array, noise: Array, step: float) -> Array:
     """The noise of each frame, larger where readings repeat.
 
     As long as a motion stays within a step its frames share one error: together they tell what one would.
     """
     if not step:
         return noise
-    changes = np.flatnonzero(np.abs(np.diff(values)) > step / 2) + 1
-    lengths = np.diff(np.concatenate([[0], changes, [len(values)]]))
     own = np.minimum(step**2 / 12.0, noise**2)
-    result: Array = np.sqrt(noise**2 + (np.repeat(lengths, lengths) - 1) * own)
+    result: Array = np.sqrt(noise**2 + (repeats(values, step) - 1) * own)
     return result
 
 

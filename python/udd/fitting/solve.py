@@ -21,6 +21,8 @@ from .record import Record
 
 Array = NDArray[np.float64]
 
+#: Steps of a fit by itself.
+MOST = 40
 #: A step that promises to lower chi2 by less is the last: it moves nothing by a tenth of a standard error.
 DONE = 0.01
 
@@ -41,7 +43,7 @@ def solve(
     measurements: tuple[Measurement, ...],
     problem: Problem,
     point: Point,
-    iterations: int = 40,
+    iterations: int = MOST,
     decrease: float = DONE,
 ) -> Fit:
     """Minimise once, for the problem's assumed model error, from a point.

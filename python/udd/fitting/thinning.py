@@ -14,7 +14,7 @@ from udd.models import profile_of
 
 from .input_noise import noise_by_differences
 from .record import odd_frames
-from .sensor import lattice
+from .sensor import is_encoder, lattice
 
 Array = NDArray[np.float64]
 
@@ -163,6 +163,8 @@ def _averaged(
     if rho is not None:
         rho = np.column_stack([means(own) for own in rho[measurement.seen].T])[rows]
     meta = dict(measurement.meta)
+    if is_encoder(measurement):  # means lie on no lattice, by which it would be told
+        meta["sensor"] = "encoder"
     if isinstance(meta.get("fps"), (int, float)):
         meta["fps"] = meta["fps"] / every
     times = np.concatenate([measurement.t[:1], times[rest]])

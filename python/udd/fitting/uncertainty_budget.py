@@ -142,17 +142,18 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
     ('noise', 'camera', 'g')
     """
     k = number("k", k, above=0.0)
-    fixed = dict(fit.model.profile.fit.fixed if fixed is None else fixed)
-    fixed = {name: number(name, value, above=0.0) for name, value in fixed.items()}
     free = fit.problem.free
     known = {f.name.partition("[")[0] for f in free}
+    if fixed is None:
+        fixed = {name: sd for name, sd in fit.model.profile.fit.fixed.items() if name not in known}
+    fixed = {name: number(name, value, above=0.0) for name, value in fixed.items()}
     for name in fixed:
         if name not in fit.model.parameters:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(fit.model.parameters)}")
         if name in known:
             raise FitError(f"{name} was free, and what is known of it is its prior")
     rows = [i for i, f in enumerate(free) if f.role == "model"]
-    factor = fit.doubts.factor
+    factor = fit.widened
     covariance = fit.covariance / factor**2  # without what the model may miss
     variances: dict[str, NDArray[np.float64]] = {_NOISE: np.diag(covariance)[rows].copy()}
     for j, one in enumerate(free):
