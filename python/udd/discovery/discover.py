@@ -160,7 +160,7 @@ def discover(
     if len(measurement) == 1:
         measurement, model, state0 = measurement[0], _only(model), _only(state0)
     record = record_of(measurement, model, state0)
-    one = next(iter(model)) if isinstance(model, (list, tuple)) else model
+    one: Any = next(iter(model)) if isinstance(model, (list, tuple)) else model
     given = _given(one, candidates)
     n = len(record.t)
     if n < _SHORTEST:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable
-from numbers import Real
 from typing import TypeVar
+
+import numpy as np
 
 from udd._util.parallel import parallel_map
 from udd.errors import FitError
@@ -36,7 +37,7 @@ class Clock:
     """
 
     def __init__(self, budget: float | None, tell: Callable[[str], None]) -> None:
-        if budget is not None and not (isinstance(budget, Real) and budget > 0):
+        if budget is not None and not (isinstance(budget, (int, float, np.integer)) and budget > 0):
             raise FitError(f"the budget must be a positive number of seconds, not {budget!r}")
         self.budget = math.inf if budget is None else float(budget)
         self.end, self._tell, self.doing = time.monotonic() + self.budget, tell, ""

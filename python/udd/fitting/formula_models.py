@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,7 +176,11 @@ def checked_start(model: FormulaModel | None, state0: object) -> dict[str, float
             raise FitError(
                 f"a start is given for {name!r}, but the states are {', '.join(model.state_names)}"
             )
-        if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float, np.integer))
+            or not np.isfinite(value)
+        ):
             raise FitError(f"the start of {name} must be a finite number, not {value!r}")
         result[str(name)] = float(value)
     return result
