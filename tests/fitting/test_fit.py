@@ -206,6 +206,20 @@ def test_bad_input_is_named(change, message):
         udd.fit(**arguments)
 
 
+@pytest.mark.parametrize("sd", [0.0, 1e-9, 1e-7, 1e-5])
+def test_computed_motion_is_fitted(sd):
+    """Its noise is that of its digits: none may weigh without bound."""
+    rng = np.random.default_rng(0)
+    swing = udd.simulate(udd.Pendulum(0.5, k0=0.01), np.arange(0, 12, 0.05), [0.0, 0.4])
+    theta = swing.state[:, 1] + sd * rng.standard_normal(len(swing.t))
+    found = udd.fit(udd.Measurement(swing.t, {"theta": theta}), udd.Pendulum(0.5))
+    assert found.converged and found.parameters["k0"] == pytest.approx(0.01, abs=1e-6 + 0.1 * sd)
+    run = udd.simulate(udd.Disk(0.042), np.arange(0, 20, 0.04), [2, 0.02, -0.02, 0])
+    seen = run.state[:, 1:4] + sd * rng.standard_normal((len(run.t), 3))
+    found = udd.fit(udd.Measurement(run.t, seen), udd.Disk(0.042))
+    assert found.converged and found.parameters["k0"] == pytest.approx(0.012, abs=1e-8 + 0.1 * sd)
+
+
 def test_lists_may_be_given_as_generators():
     t = np.arange(0, 20, 0.04)
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]

@@ -33,6 +33,9 @@ _FAR = 10.0  # standard deviations from what was stated: the fit is one of somet
 UNEXPLAINED = 2.5
 _OFF = 3.0  # times the drive that was stated: more than what is missing does
 _PACE = 2.0  # times a pendulum's stated ratio of length to inertia
+_FINEST = (
+    1e-3  # of what a camera's noise is taken to be: computed motion has none, and would weigh without bound
+)
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 #: What misfits show: the noise, next to nothing where the states follow every frame, or the model's faults.
@@ -434,7 +437,7 @@ def refit(fitted: Fit) -> Fit:
     misfits: Misfits = "little"
     point = fitted.point
     try:
-        if not _least(fitted.measurements, search=True) > 0:
+        if not _least(fitted.measurements, search=True) > _FINEST:
             misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
         if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
@@ -521,7 +524,7 @@ def _is_known(measurement: Measurement) -> bool:
 
 def _least(measurements: Sequence[Measurement], search: bool) -> float:
     """What the noise is at least, in units of what is known beforehand."""
-    result = 0.0
+    result = 0.0 if profile_of(measurements[0].kind).written else _FINEST
     for own in measurements:
         least = profile_of(own.kind).sensor.faithful
         if least and is_encoder(own):

@@ -174,6 +174,10 @@ def record_of(
         raise FitError(
             f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least {_FEWEST}"
         )
+    if not (np.nanmax(values[seen], axis=0) > np.nanmin(values[seen], axis=0)).any():
+        raise FitError(
+            f"{', '.join(measurement.names)}: nothing changes, and nothing can be learnt from that"
+        )
     origin = float(measurement.t[0])
     times = measurement.t[seen] - origin
     step = float(np.median(np.diff(times)))
