@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import udd
+from udd.discovery.validation.held_camera import camera_shows
+from udd.fitting import extend, fit_record, record_of
 from udd.fitting.formula_models import typical_noise
 
 
@@ -51,3 +55,13 @@ def test_a_signal_of_few_samples_a_turn_is_no_noise() -> None:
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
     found = typical_noise((np.sin(2 * np.pi * 70 * t) + noise)[:, None])
     assert 0.8e-3 < found[0] < 4e-3  # 37e-3 by third differences alone
+
+
+def test_a_formula_found_with_a_films_camera_held_is_not_identified() -> None:
+    """A formula of the speed bends until it hides a zero that is elsewhere; an encoder has no such faults."""
+    law = udd.effects.formula("torque", "a*tanh(b + Omega)", amplitudes=["a"], a=-0.01, b=0.2)
+    for meta, told in (({}, []), ({"sensor": "encoder"}, None)):
+        measured = replace(filmed(0.0, udd.effects.quadratic_drag(c=0.006)), meta=meta)
+        record, model = record_of(measured), udd.Pendulum(0.6, k0=0.004)
+        known = fit_record(measured, record, model, ["k0"], camera=False, search=True)
+        assert camera_shows(known, extend(known, [law], [-0.01])) == told

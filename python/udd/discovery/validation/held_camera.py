@@ -5,9 +5,7 @@ from __future__ import annotations
 import itertools
 
 from udd._util import chi_squared
-from udd.discovery.score_rounds import score_round
 from udd.discovery.thresholds import ALPHA
-from udd.discovery.trial_fits import of_library, price_of
 from udd.errors import FitError
 from udd.fitting import Fit, extend, ran_away, released, with_noise_of
 from udd.fitting.parameters import Free, free_parameters
@@ -16,7 +14,6 @@ from udd.fitting.sensor import is_encoder
 from .confirmation import same_level
 
 _MOST = 0.5  # of chi2 that a camera takes away, from which on a form found without it is not to be trusted
-_TRIED = 2  # effects of the library beside a free camera, where a formula was found without it
 
 
 def camera_shows(known: Fit, found: Fit) -> list[str] | None:
@@ -43,7 +40,7 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     for kept in (some for size in range(len(names)) for some in itertools.combinations(names, size)):
         if alone is not None and _explains(alone, found, kept):
             return [name for name in names if name not in kept]
-    if alone is not None and any(e.made for e in effects) and _known_explains(alone, found, len(more)):
+    if any(e.made for e in effects):  # a formula bends until it hides what a camera does
         return []
     freed = _freed(found, more)
     if freed is None:
@@ -81,15 +78,3 @@ def _explains(alone: Fit, found: Fit, kept: tuple[str, ...]) -> bool:
         return False
     one, other = same_level(some, found)
     return one.chi2 < other.chi2
-
-
-def _known_explains(alone: Fit, found: Fit, freedom: int) -> bool:
-    """Whether one of the library's effects and a free camera explain the data better than formulas."""
-    price = freedom * price_of(alone)
-    for scored in score_round(alone).usable()[:_TRIED]:
-        trial = of_library(alone, [scored.candidate], list(scored.amplitudes))
-        if trial:
-            one, other = same_level(trial.fit, found)
-            if one.chi2 + trial.price + price < other.chi2:
-                return True
-    return False
