@@ -450,9 +450,9 @@ def refit(fitted: Fit) -> Fit:
 def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Fit:
     """Solve from loose to tight.
 
-    The noise is estimated at the loosest level at which the misfits still show it: there a wrong model does
-    the least harm. At looser ones the states follow every frame, and noise and model error cannot be told
-    apart.
+    The noise is estimated at the loosest level at which the misfits still show it, where a wrong model does
+    the least harm, and at tighter ones as long as that is likelier. At looser ones the states follow every
+    frame, and noise and model error cannot be told apart.
     """
     as_stated, first = problem.noise, point
     for number, diffusion in enumerate(problem.schedule):
@@ -461,9 +461,8 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
         if misfits == "faults":
             break  # held more tightly, they show even more of them
         if misfits == "noise":
-            loose = _likeliest_noise(
-                provisional_fit(measurements, problem, point), problem.schedule[number + 1 :]
-            )
+            loose = provisional_fit(measurements, problem, point)
+            loose = _likeliest_noise(loose, problem.schedule[number + 1 :])
             tighter = problem.schedule[loose.level + 1 :]
             if not tighter:
                 return loose
@@ -530,7 +529,7 @@ def _least(measurements: Sequence[Measurement], search: bool) -> float:
         if least and is_encoder(own):
             return 1.0
         if search and own.sigma is None:
-            result = least
+            result = max(result, least)
     return result
 
 
