@@ -207,7 +207,12 @@ def test_semicolons_with_decimal_commas(tmp_path: Path) -> None:
         ("Time (ms),Angle (deg)", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("t_ms,theta_deg", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("time/min,angle [°]", (1 / 60, 180 / np.pi), "t from min to s, theta from ° to rad"),
+        ("time / ms,angle deg", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("t [s],theta [mrad]", (1.0, 1e3), "theta from mrad to rad"),
+        ("t (s),theta (Grad)", (1.0, 180 / np.pi), "theta from Grad to rad"),
+        ("t (h),theta (arcmin)", (1 / 3600, 60 * 180 / np.pi), "t from h to s, theta from arcmin to rad"),
+        ("t (\N{GREEK SMALL LETTER MU}s),theta (rad)", (1e6, 1.0), "t from .s to s"),
+        ("t (\N{MICRO SIGN}s),theta (rad)", (1e6, 1.0), "t from .s to s"),
         ("t (s),Y (mm),Z (cm),beta (deg)", (1.0, 1e3, 1e2, 180 / np.pi), "Y from mm to m, Z from cm to m"),
     ],
 )
@@ -219,6 +224,45 @@ def test_units_in_column_names_are_converted_and_told(
     with pytest.warns(UserWarning, match=f"converted {told}"):
         m = read_measurement(write(tmp_path, "\n".join([head, *rows]) + "\n"))
     assert np.allclose(np.column_stack([m.t, m.values]), truth, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("t,theta (rpm)", "theta is counted in rad, but the column is called theta (rpm)"),
+        ("t,theta (cm)", "theta is counted in rad, but the column is called theta (cm)"),
+        ("t (deg),theta", "t is counted in s, but the column is called t (deg)"),
+        ("t,theta (grd)", "the unit 'grd' of theta is not known; write deg or rad"),
+        ("t (frames),theta", "the unit 'frames' of t is not known; write s or ms"),
+    ],
+)
+def test_a_unit_that_cannot_be_or_is_not_known_is_refused(tmp_path: Path, head: str, said: str) -> None:
+    path = write(tmp_path, "\n".join([head, *(f"{i / 25},0.1" for i in range(20))]) + "\n")
+    with pytest.raises(MeasurementError) as error:
+        read_measurement(path)
+    assert str(error.value) == f"{path}: {said}"
+
+
+def test_of_an_own_model_times_and_angles_are_converted_and_lengths_stay(tmp_path: Path) -> None:
+    head = "t (ms),q (deg),w (deg/s),x (mm),u (V)"
+    path = write(tmp_path, "\n".join([head, *(f"{40 * i},180,90,5,3" for i in range(20))]) + "\n")
+    with pytest.warns(UserWarning) as told:
+        m = read_measurement(path, states=["q", "w", "x", "u"])
+    np.testing.assert_allclose(m.t, np.arange(20) / 25)
+    np.testing.assert_allclose(m.values[3], [np.pi, np.pi / 2, 5, 3])
+    kept, converted = (str(one.message) for one in told)
+    assert kept == f'{path}: x stays in mm (columns="x=x" makes it m)'
+    assert "converted t from ms to s, q from deg to rad, w from deg/s to rad/s, as" in converted
+    with pytest.warns(UserWarning, match="x from mm to m"):
+        assert read_measurement(path, "x=x", ["q", "w", "x", "u"])["x"][3] == 0.005
+
+
+def test_a_time_in_a_unit_that_is_not_known_is_told_of_an_own_model(tmp_path: Path) -> None:
+    path = write(tmp_path, "\n".join(["t (years),x", *(f"{i},{i}" for i in range(20))]) + "\n")
+    with pytest.warns(UserWarning, match="the unit 'years' of t is not known, its numbers stay"):
+        assert read_measurement(path, states=["x"]).t[3] == 3.0
+    with pytest.raises(MeasurementError, match="theta is counted in rad, but the column is called theta"):
+        read_measurement(write(tmp_path, "t,theta (rpm)\n0,1\n"), states=["theta"])
 
 
 def test_an_angle_in_degrees_is_unwrapped_in_radians(tmp_path: Path) -> None:
