@@ -117,7 +117,7 @@ def read_measurement(
         warnings.warn(f"{source}: {kept}", stacklevel=2)
     if frames.converted:
         told = ", ".join(f"{name} from {units}" for name, units in frames.converted.items())
-        warnings.warn(f"{source}: converted {told}, as the names of its columns say", stacklevel=2)
+        warnings.warn(f"{source}: converted {told}, as its columns say", stacklevel=2)
     return m
 
 
