@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,6 +90,43 @@ def test_covariance_has_the_given_sigmas_and_correlations() -> None:
 def test_a_slice_may_be_empty() -> None:
     nothing = disk().slice(1e3, 2e3)
     assert len(nothing) == 0 and nothing.rho is not None and nothing.rho.shape == (0, 3)
+
+
+THREE = {"theta": [1.0, 2.0, 3.0]}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((range(3), 0.3), "values must be a column or a table (n, m), not of shape ()"),
+        (
+            (range(3), np.zeros((3, 2, 2))),
+            "values must be a column or a table (n, m), not of shape (3, 2, 2)",
+        ),
+        ((["2024-01-01"] * 3, THREE), "t must be numbers"),
+        ((range(3), {"theta": ["a", "b", "c"]}), "theta must be numbers"),
+        ((range(3), {"a": [1, 2], "b": [1, 2, 3]}), "columns of one length, not of shapes a (2,), b (3,)"),
+        ((range(3), THREE, 0.1), "sigma must be a column or a table (n, m), not of shape ()"),
+        ((range(3), THREE, None, [1, 2]), "rho has shape (2,), expected (3, 0)"),
+        ((range(3), THREE, None, None, None, 3), "meta must be entries by their names, not 3"),
+        ((range(3), THREE, None, None, None, None, 3), "names must be a list of the columns' names, not 3"),
+        ((range(3), {3: [1, 2, 3]}), "names must be a list of the columns' names, not (3,)"),
+    ],
+)
+def test_wrong_arguments_of_a_measurement_are_named(arguments: tuple[Any, ...], says: str) -> None:
+    with pytest.raises(MeasurementError) as error:
+        Measurement(*arguments)
+    assert says in str(error.value) and "\n" not in str(error.value)
+
+
+def test_wrong_options_of_a_reader_are_named(tmp_path: Path) -> None:
+    path = write(tmp_path, table())
+    with pytest.raises(MeasurementError, match="columns must be names of columns, not 3"):
+        read_measurement(path, columns=3)  # type: ignore[arg-type]
+    with pytest.raises(MeasurementError, match="inputs must be names of columns, not 3"):
+        read_measurement(path, inputs=3)  # type: ignore[arg-type]
+    with pytest.raises(MeasurementError, match="states is a list of columns, not 3"):
+        read_measurement(path, states=3)  # type: ignore[arg-type]
 
 
 def test_slice_and_seen() -> None:

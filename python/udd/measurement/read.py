@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal
@@ -103,7 +103,7 @@ def read_measurement(
     """
     source = Path(path)
     mapping, given = _mapping(columns)
-    if isinstance(states, str):
+    if isinstance(states, str) or not (states is None or isinstance(states, Iterable)):
         raise MeasurementError(f"states is a list of columns, not {states!r}")
     drivers = _drivers(inputs)
     tables = _load(source, given)
@@ -155,7 +155,9 @@ def _mapping(columns: Columns | None) -> tuple[dict[str, str | tuple[str, str]] 
             if not isinstance(name, str) or not (isinstance(asked, str) or pair):
                 raise MeasurementError(f"columns needs the name of a column for {name}, not {asked!r}")
         return {name: a if isinstance(a, str) else (a[0], a[1]) for name, a in columns.items()}, None
-    names = columns.split(",") if isinstance(columns, str) else columns
+    if not isinstance(columns, Iterable):
+        raise MeasurementError(f"columns must be names of columns, not {columns!r}")
+    names = columns.split(",") if isinstance(columns, str) else list(columns)
     if not all(isinstance(name, str) for name in names):
         raise MeasurementError(f"columns must be names of columns, not {columns!r}")
     if isinstance(columns, str) and "=" in columns:
@@ -186,6 +188,8 @@ def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str
         return {}
     if isinstance(inputs, str):
         return pairs(inputs, "inputs")
+    if not isinstance(inputs, Iterable):
+        raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
     found = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
     if not all(isinstance(part, str) for pair in found.items() for part in pair):
         raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
