@@ -354,6 +354,19 @@ def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
     assert read_measurement(whole)["theta"][5] == 2.0
 
 
+@pytest.mark.parametrize(
+    "names", [["clock ms", "Winkel deg"], ["clock_ms", "Winkel_deg"], ["clock / ms", "Winkel in deg"]]
+)
+def test_a_unit_without_brackets_counts_of_what_is_said_to_be_an_angle(
+    tmp_path: Path, names: list[str]
+) -> None:
+    path = put(tmp_path, "a.csv", table([*names, "u_ms"], 1e3 * T, np.degrees(THETA), U))
+    with pytest.warns(UserWarning, match="t from ms to s, theta from deg to rad"):
+        m = read_measurement(path, columns={"t": names[0], "theta": names[1]})
+    np.testing.assert_allclose(m.t, T)
+    np.testing.assert_allclose(m["theta"], THETA)
+
+
 @pytest.mark.parametrize("head", ["timestamp,angle", "Time,angle", "flag,angle,when"])
 def test_dates_become_seconds_since_the_first(tmp_path: Path, head: str) -> None:
     start = datetime(2024, 12, 31, 23, 59, 59, tzinfo=UTC)

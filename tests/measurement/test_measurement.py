@@ -247,6 +247,7 @@ def test_semicolons_with_decimal_commas(tmp_path: Path) -> None:
         ("time/min,angle [°]", (1 / 60, 180 / np.pi), "t from min to s, theta from ° to rad"),
         ("time / ms,angle deg", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("t [s],theta [mrad]", (1.0, 1e3), "theta from mrad to rad"),
+        ("t (video) [s],Angle (deg) (1)", (1.0, 180 / np.pi), "theta from deg to rad"),
         ("t (s),theta (Grad)", (1.0, 180 / np.pi), "theta from Grad to rad"),
         ("t (h),theta (arcmin)", (1 / 3600, 60 * 180 / np.pi), "t from h to s, theta from arcmin to rad"),
         ("t (\N{GREEK SMALL LETTER MU}s),theta (rad)", (1e6, 1.0), "t from .s to s"),

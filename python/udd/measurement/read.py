@@ -47,7 +47,8 @@ def read_measurement(
         ``t, x, y`` [m, pivot at the origin, y up] becomes theta = atan2(x, -y). Optional:
         ``sigma_*``, ``rho_*``, ``flag``. Lines ``# key = value`` become `meta`. Other columns, and
         lines above the header, are passed over. A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or
-        ``Y [mm]``, is converted to s, m or rad, and a warning tells so. An empty cell or NaN is a frame where
+        ``Y [mm]``, is converted to s, m or rad, and dates (ISO 8601) to seconds since the first; a warning
+        tells so. An empty cell or NaN is a frame where
         it was not seen.
     columns : mapping, str or sequence of str, optional
         Which column is what: ``{"theta": "position"}``, or ``"theta=position"``; units that the columns'

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd.errors import MeasurementError
 
 from .formats import Table
-from .formats.headings import COUNTED, USUAL, Heading, in_base_units, size
+from .formats.headings import COUNTED, USUAL, Heading, ending, in_base_units, size
 from .input_signal import Hold, InputSignal, named_signal
 
 Asked = str | tuple[str, str]
@@ -310,9 +310,10 @@ def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
     """
     if heading.dates:
         return Conversion(told="dates to s since the first")
-    if not heading.unit:
+    plain = name.removeprefix("sigma_")
+    unit = heading.unit or (ending(plain, heading) if units.mapped else "")
+    if not unit:
         return Conversion()
-    plain, unit = name.removeprefix("sigma_"), heading.unit
     base, known = COUNTED.get(plain), in_base_units(unit)
     one = size(name, unit)
     if base is not None and one is None:

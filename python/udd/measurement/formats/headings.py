@@ -76,16 +76,27 @@ def headings(cells: Sequence[str]) -> list[Heading]:
     names = [_symbol(name) for name in bare]
     result = []
     for cell, plain, name in zip(cells, bare, names, strict=True):
-        stated = re.search(r"[\[(]\s*([^])]+?)\s*[])]", cell)
-        unit = stated.group(1) if stated else ""
+        stated = re.findall(r"[\[(]\s*([^])]+?)\s*[])]", cell)
+        unit = next((one for one in stated if in_base_units(one)), stated[-1] if stated else "")
         # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
-        base, *rest = _BEFORE_UNIT.split(plain, maxsplit=1)
-        ending = "".join(rest)
+        base, unit_after = _parted(plain)
         known = _symbol(base)
-        if known in _ENDING and known not in names and size(known, ending):
-            name, unit = known, ending
+        if known in _ENDING and known not in names and size(known, unit_after):
+            name, unit = known, unit_after
         result.append(Heading(cell.strip(), name, unit))
     return result
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """A heading without brackets as a name and what may be its unit."""
+    base, *rest = _BEFORE_UNIT.split(name, maxsplit=1)
+    return base, "".join(rest)
+
+
+def ending(name: str, heading: Heading) -> str:
+    """The unit without brackets, as in ``Winkel deg``, of a column that was said to be a time or an angle."""
+    unit = _parted(heading.raw)[1]
+    return unit if COUNTED.get(name) in ("s", "rad") and size(name, unit) else ""
 
 
 def _symbol(name: str) -> str:
