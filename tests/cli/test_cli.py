@@ -18,6 +18,7 @@ import pytest
 import discovered
 import udd
 from udd.cli import main
+from udd.cli.inputs import is_film
 
 UDD = [sys.executable, "-m", "udd"]
 
@@ -284,6 +285,57 @@ def test_bad_files_are_refused(
     sentence = failed(["discover", path, "--W", "0.04", "--report", tmp_path / "page.html"], capsys)
     assert said in sentence
     assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        (
+            "old.xls",
+            bytes.fromhex("d0cf11e0a1b11ae1") + bytes(600),
+            "this is an Excel workbook or another old",
+        ),
+        ("photo.jpg", b"\xff\xd8\xff\xe0\0\x10JFIF\0" + bytes(600), "this is not a text table"),
+    ],
+)
+@pytest.mark.parametrize("device", [["--W", "0.04"], ["--pendulum", "0.5"]])
+def test_what_is_no_film_is_not_taken_for_one(
+    name: str,
+    content: bytes,
+    said: str,
+    device: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    assert said in failed(["fit", tmp_path / name, *device], capsys)
+
+
+def test_a_film_is_known_by_its_first_bytes(tmp_path: Path) -> None:
+    for start in (b"\0\0\0\x18ftypmp42", b"\x1a\x45\xdf\xa3\0", b"RIFF\0\0\0\0AVI ", (b"G" + bytes(187)) * 5):
+        (tmp_path / "film").write_bytes(start)
+        assert is_film(tmp_path / "film")
+    (tmp_path / "film").write_text("col_free,x\n")
+    assert not is_film(tmp_path / "film")
+
+
+def test_headings_units_count_for_a_model_of_your_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t = np.arange(80) / 20
+    swing = 0.3 * np.cos(4 * t) + np.random.default_rng(2).normal(0, 1e-3, t.size)
+    rows = [f"{1000 * a:.0f},{np.degrees(b):.4f}" for a, b in zip(t, swing, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["Time (ms),theta (deg)", *rows]) + "\n")
+    model = {
+        "states": ["theta", "v"],
+        "equations": {"theta": "v", "v": "-a*theta"},
+        "parameters": {"a": 15.0},
+    }
+    (tmp_path / "m.json").write_text(json.dumps(model))
+    assert main(["fit", str(tmp_path / "a.csv"), "--model", str(tmp_path / "m.json"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert abs(json.loads(out)["parameters"]["a"]["value"] - 16) < 0.1
+    assert "converted t from ms to s, theta from deg to rad" in err
 
 
 def test_columns_and_inputs_by_name_of_several_kinds_of_files(

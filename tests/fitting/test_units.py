@@ -107,6 +107,28 @@ def test_numbers_that_cannot_be_a_pendulums_are_asked_about(factors, length, mes
         udd.fit(scaled(swing(amplitude), **factors), udd.Pendulum(length, k0=0.02))
 
 
+@pytest.mark.parametrize("amplitude", [0.05, 0.7])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_angle_from_the_upright_is_told(amplitude, sign):
+    # With y down the angle of a bob's position has the other sign, too.
+    upside = udd.Measurement(swing(amplitude).t, np.pi + sign * swing(amplitude).values)
+    said = (
+        "y points down, or the angle is counted from the upright: y must point up, the angle from the lowest"
+    )
+    with pytest.raises(FitError, match=said):
+        udd.fit(upside, udd.Pendulum(0.8, k0=0.02))
+
+
+def test_counts_of_an_encoder_are_asked_about():
+    counts = np.round(swing(0.7).values * 4096 / (2 * np.pi))
+    with pytest.raises(
+        FitError, match=r"degrees, or counts of an encoder \(multiply by 2 pi over the counts per"
+    ):
+        udd.fit(udd.Measurement(swing(0.7).t, counts), udd.Pendulum(0.8, k0=0.02))
+    with pytest.raises(FitError, match=r"is it in degrees\?"):
+        udd.fit(scaled(swing(0.7), theta=180 / np.pi), udd.Pendulum(0.8, k0=0.02))
+
+
 def test_a_pendulum_may_go_round():
     t = np.arange(0, 20, 0.05)
     theta = udd.simulate(udd.Pendulum(0.5, k0=0.002), t, [12.0, 0.0]).state[:, 1]

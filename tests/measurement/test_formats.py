@@ -7,6 +7,7 @@ import pickle
 import warnings
 import zipfile
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -321,6 +322,92 @@ def test_parquet_of_others(tmp_path: Path) -> None:
     close(m, "theta", THETA, 1e-15)
 
 
+def rows_of(mark: str, quote: str = "", point: str = ".") -> str:
+    """Times and angles, four digits each."""
+    cells = [
+        [f"{quote}{x:.4f}{quote}".replace(".", point) for x in row] for row in zip(T, THETA, strict=True)
+    ]
+    return "\n".join(mark.join(row) for row in cells) + "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t theta\n" + rows_of(" ", point=","),
+        "t  theta\n" + rows_of("  ", point=","),
+        '"t","theta"\n' + rows_of(",", '"', ","),
+        "t;theta\n" + rows_of(";", '"', ","),
+        "t\ttheta\n" + rows_of("\t", point=","),
+    ],
+)
+def test_decimal_commas_between_blanks_and_in_quotes(tmp_path: Path, text: str) -> None:
+    m = read_measurement(put(tmp_path, "a.csv", text))
+    assert np.array_equal(m.t, T.round(4)) and np.array_equal(m["theta"], THETA.round(4))
+
+
+def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
+    path = put(tmp_path, "a.csv", "t,theta\n" + rows_of(",", point=","))
+    says = "rows have 4 whole numbers for 2 columns, as decimal commas between commas make them: separate "
+    with pytest.raises(MeasurementError, match=f"{says}columns by semicolons"):
+        read_measurement(path)
+    whole = put(tmp_path, "b.csv", "t,theta\n" + "".join(f"{k},{k % 3}\n" for k in range(20)))
+    assert read_measurement(whole)["theta"][5] == 2.0
+
+
+@pytest.mark.parametrize(
+    "names", [["clock ms", "Winkel deg"], ["clock_ms", "Winkel_deg"], ["clock / ms", "Winkel in deg"]]
+)
+def test_a_unit_without_brackets_counts_of_what_is_said_to_be_an_angle(
+    tmp_path: Path, names: list[str]
+) -> None:
+    path = put(tmp_path, "a.csv", table([*names, "u_ms"], 1e3 * T, np.degrees(THETA), U))
+    with pytest.warns(UserWarning, match="t from ms to s, theta from deg to rad"):
+        m = read_measurement(path, columns={"t": names[0], "theta": names[1]})
+    np.testing.assert_allclose(m.t, T)
+    np.testing.assert_allclose(m["theta"], THETA)
+
+
+@pytest.mark.parametrize("head", ["timestamp,angle", "Time,angle", "flag,angle,when"])
+def test_dates_become_seconds_since_the_first(tmp_path: Path, head: str) -> None:
+    start = datetime(2024, 12, 31, 23, 59, 59, tzinfo=UTC)
+    dates = [str(start + timedelta(seconds=float(t))) for t in T.round(3)]
+    rows = zip(THETA, dates, strict=True)
+    cells = [f",{a:.4f},{date}" if head.startswith("flag") else f"{date},{a:.4f}" for a, date in rows]
+    with pytest.warns(UserWarning, match="converted t from dates to s since the first"):
+        m = read_measurement(put(tmp_path, "a.csv", "\n".join([head, *cells]) + "\n"))
+    np.testing.assert_allclose(m.t, (T - T[0]).round(3), atol=1e-3)
+    assert np.array_equal(m["theta"], THETA.round(4))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("when,angle\n03.05.2024 12:00,x\n", "'03.05.2024 12:00' is no date that is read: write the time in"),
+        (
+            "time,angle\n12:00:01,1\n",
+            "line 2: '12:00:01' stands where a number for t should be (a time is in",
+        ),
+        ("when,angle\n2024-05-03,1\nsoon,2\n", "line 3: 'soon' is no date like that of the first row"),
+        (
+            "when,angle\n2024-05-03 01:00,1\n2024-05-03T02:00Z,2\n",
+            "line 3: '2024-05-03T02:00Z' is no date like",
+        ),
+        ("when,angle\none,two\n", "no row holds numbers"),
+    ],
+)
+def test_what_is_no_time_is_named(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(MeasurementError) as error:
+        read_measurement(put(tmp_path, "a.csv", text))
+    assert says in str(error.value) and "\n" not in str(error.value)
+
+
+def test_the_header_stands_above_rows_with_words(tmp_path: Path) -> None:
+    rows = "".join(f"{t:.4f},{a:.4f},seen by eye\n" for t, a in zip(T, THETA, strict=True))
+    path = put(tmp_path, "a.csv", "my swing\nclock,pos,note\n" + rows)
+    m = read_measurement(path, columns={"t": "clock", "theta": "pos"})
+    assert np.array_equal(m["theta"], THETA.round(4))
+
+
 def plain(**columns: NDArray[np.float64]) -> str:
     return table(list(columns), *columns.values())
 
@@ -428,6 +515,17 @@ def test_wrong_requests_are_named_in_one_sentence(
             "a.xlsx",
             archive(**{"xl/workbook.xml": "<x/>"}),
             "this is an Excel workbook: save its sheet as CSV",
+        ),
+        ("a.xlsb", archive(**{"xl/workbook.bin": "x"}), "this is an Excel workbook: save its sheet as CSV"),
+        (
+            "a.ods",
+            archive(mimetype="application/vnd.oasis.opendocument.spreadsheet", **{"content.xml": "<x/>"}),
+            "this is a spreadsheet (OpenDocument): save its sheet as CSV",
+        ),
+        (
+            "a.xls",
+            bytes.fromhex("d0cf11e0a1b11ae1") + bytes(600),
+            "this is an Excel workbook or another old Office file: save its sheet as CSV",
         ),
         ("a.zip", archive(**{"photo.jpg": b"x"}), "the archive holds no table (.csv): found photo.jpg"),
         ("a.zip", archive(**{"a.csv": "t,theta\n"}), "holds no rows"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,6 +90,43 @@ def test_covariance_has_the_given_sigmas_and_correlations() -> None:
 def test_a_slice_may_be_empty() -> None:
     nothing = disk().slice(1e3, 2e3)
     assert len(nothing) == 0 and nothing.rho is not None and nothing.rho.shape == (0, 3)
+
+
+THREE = {"theta": [1.0, 2.0, 3.0]}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((range(3), 0.3), "values must be a column or a table (n, m), not of shape ()"),
+        (
+            (range(3), np.zeros((3, 2, 2))),
+            "values must be a column or a table (n, m), not of shape (3, 2, 2)",
+        ),
+        ((["2024-01-01"] * 3, THREE), "t must be numbers"),
+        ((range(3), {"theta": ["a", "b", "c"]}), "theta must be numbers"),
+        ((range(3), {"a": [1, 2], "b": [1, 2, 3]}), "columns of one length, not of shapes a (2,), b (3,)"),
+        ((range(3), THREE, 0.1), "sigma must be a column or a table (n, m), not of shape ()"),
+        ((range(3), THREE, None, [1, 2]), "rho has shape (2,), expected (3, 0)"),
+        ((range(3), THREE, None, None, None, 3), "meta must be entries by their names, not 3"),
+        ((range(3), THREE, None, None, None, None, 3), "names must be a list of the columns' names, not 3"),
+        ((range(3), {3: [1, 2, 3]}), "names must be a list of the columns' names, not (3,)"),
+    ],
+)
+def test_wrong_arguments_of_a_measurement_are_named(arguments: tuple[Any, ...], says: str) -> None:
+    with pytest.raises(MeasurementError) as error:
+        Measurement(*arguments)
+    assert says in str(error.value) and "\n" not in str(error.value)
+
+
+def test_wrong_options_of_a_reader_are_named(tmp_path: Path) -> None:
+    path = write(tmp_path, table())
+    with pytest.raises(MeasurementError, match="columns must be names of columns, not 3"):
+        read_measurement(path, columns=3)  # type: ignore[arg-type]
+    with pytest.raises(MeasurementError, match="inputs must be names of columns, not 3"):
+        read_measurement(path, inputs=3)  # type: ignore[arg-type]
+    with pytest.raises(MeasurementError, match="states is a list of columns, not 3"):
+        read_measurement(path, states=3)  # type: ignore[arg-type]
 
 
 def test_slice_and_seen() -> None:
@@ -207,7 +245,13 @@ def test_semicolons_with_decimal_commas(tmp_path: Path) -> None:
         ("Time (ms),Angle (deg)", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("t_ms,theta_deg", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("time/min,angle [°]", (1 / 60, 180 / np.pi), "t from min to s, theta from ° to rad"),
+        ("time / ms,angle deg", (1e3, 180 / np.pi), "t from ms to s, theta from deg to rad"),
         ("t [s],theta [mrad]", (1.0, 1e3), "theta from mrad to rad"),
+        ("t (video) [s],Angle (deg) (1)", (1.0, 180 / np.pi), "theta from deg to rad"),
+        ("t (s),theta (Grad)", (1.0, 180 / np.pi), "theta from Grad to rad"),
+        ("t (h),theta (arcmin)", (1 / 3600, 60 * 180 / np.pi), "t from h to s, theta from arcmin to rad"),
+        ("t (\N{GREEK SMALL LETTER MU}s),theta (rad)", (1e6, 1.0), "t from .s to s"),
+        ("t (\N{MICRO SIGN}s),theta (rad)", (1e6, 1.0), "t from .s to s"),
         ("t (s),Y (mm),Z (cm),beta (deg)", (1.0, 1e3, 1e2, 180 / np.pi), "Y from mm to m, Z from cm to m"),
     ],
 )
@@ -219,6 +263,45 @@ def test_units_in_column_names_are_converted_and_told(
     with pytest.warns(UserWarning, match=f"converted {told}"):
         m = read_measurement(write(tmp_path, "\n".join([head, *rows]) + "\n"))
     assert np.allclose(np.column_stack([m.t, m.values]), truth, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("t,theta (rpm)", "theta is counted in rad, but the column is called theta (rpm)"),
+        ("t,theta (cm)", "theta is counted in rad, but the column is called theta (cm)"),
+        ("t (deg),theta", "t is counted in s, but the column is called t (deg)"),
+        ("t,theta (grd)", "the unit 'grd' of theta is not known; write deg or rad"),
+        ("t (frames),theta", "the unit 'frames' of t is not known; write s or ms"),
+    ],
+)
+def test_a_unit_that_cannot_be_or_is_not_known_is_refused(tmp_path: Path, head: str, said: str) -> None:
+    path = write(tmp_path, "\n".join([head, *(f"{i / 25},0.1" for i in range(20))]) + "\n")
+    with pytest.raises(MeasurementError) as error:
+        read_measurement(path)
+    assert str(error.value) == f"{path}: {said}"
+
+
+def test_of_an_own_model_times_and_angles_are_converted_and_lengths_stay(tmp_path: Path) -> None:
+    head = "t (ms),q (deg),w (deg/s),x (mm),u (V)"
+    path = write(tmp_path, "\n".join([head, *(f"{40 * i},180,90,5,3" for i in range(20))]) + "\n")
+    with pytest.warns(UserWarning) as told:
+        m = read_measurement(path, states=["q", "w", "x", "u"])
+    np.testing.assert_allclose(m.t, np.arange(20) / 25)
+    np.testing.assert_allclose(m.values[3], [np.pi, np.pi / 2, 5, 3])
+    kept, converted = (str(one.message) for one in told)
+    assert kept == f'{path}: x stays in mm (columns="x=x" makes it m)'
+    assert "converted t from ms to s, q from deg to rad, w from deg/s to rad/s, as" in converted
+    with pytest.warns(UserWarning, match="x from mm to m"):
+        assert read_measurement(path, "x=x", ["q", "w", "x", "u"])["x"][3] == 0.005
+
+
+def test_a_time_in_a_unit_that_is_not_known_is_told_of_an_own_model(tmp_path: Path) -> None:
+    path = write(tmp_path, "\n".join(["t (years),x", *(f"{i},{i}" for i in range(20))]) + "\n")
+    with pytest.warns(UserWarning, match="the unit 'years' of t is not known, its numbers stay"):
+        assert read_measurement(path, states=["x"]).t[3] == 3.0
+    with pytest.raises(MeasurementError, match="theta is counted in rad, but the column is called theta"):
+        read_measurement(write(tmp_path, "t,theta (rpm)\n0,1\n"), states=["theta"])
 
 
 def test_an_angle_in_degrees_is_unwrapped_in_radians(tmp_path: Path) -> None:

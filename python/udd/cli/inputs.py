@@ -21,6 +21,16 @@ if TYPE_CHECKING:
     from udd.models.formula_model import FormulaModel
 
 _FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".3gp"}
+_FILMS |= {".m2ts", ".ts", ".ogv", ".flv", ".h264", ".dv"}
+#: Bytes at a film's beginning, and where they stand: MP4 and QuickTime, Matroska, AVI, MPEG, ASF, Ogg, Flash.
+_SIGNATURES = (
+    *((4, box) for box in (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")),
+    *(
+        (0, mark)
+        for mark in (b"\x1a\x45\xdf\xa3", b"\0\0\1", b"\0\0\0\1", b"\x30\x26\xb2\x75", b"OggS", b"FLV\1")
+    ),
+    (8, b"AVI "),
+)
 _CUT = 0.01  # share of the promised frames that may be missing
 
 
@@ -77,7 +87,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
 
 
 def is_film(path: Path) -> bool:
-    """Whether a file is a film rather than a table, by its name or else its first bytes."""
+    """Whether a file is a film, by its name or else its first bytes; all others are read as tables."""
     if path.suffix.lower() in _FILMS:
         return True
     try:
@@ -85,9 +95,9 @@ def is_film(path: Path) -> bool:
             start = file.read(4096)
     except OSError:
         return False  # the reader of tables says what is wrong
-    from udd.measurement.formats import is_table
-
-    return not is_table(start, path.suffix)
+    # MPEG's transport stream: packets that begin with G, of 188 bytes, or of 192 after a time.
+    packets = b"GGGG" in (start[::188][:4], start[4::192][:4])
+    return b"\0" in start and (packets or any(start.startswith(mark, at) for at, mark in _SIGNATURES))
 
 
 @dataclass(frozen=True)

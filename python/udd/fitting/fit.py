@@ -20,7 +20,7 @@ from .formula_models import driven, levels_of
 from .input_noise import LEVELS_APART, diffusion_by_noise
 from .model_error_schedule import ANY, FEW, LEAP, ROUGH, Goal, provisional_fit, reduce_model_error
 from .noise import estimated, stated
-from .parameters import Free, free_parameters, known_camera
+from .parameters import Free, free_parameters, known_camera, names_of
 from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .sensor import is_encoder
@@ -129,9 +129,12 @@ def options_of(
 ) -> dict[str, Any]:
     """What a user may say of a fit's parameters, to be read more than once."""
     lists = {
-        name: given if given is None or isinstance(given, (bool, str)) else list(given)
-        for name, given in (("free", free), ("camera", camera), ("each", each))
+        "free": None if free is None else names_of("free", free),
+        "camera": camera if isinstance(camera, bool) else names_of("camera", camera),
+        "each": None if each is None else names_of("each", each),
     }
+    if not (priors is None or isinstance(priors, Mapping)):
+        raise FitError(f"priors must be a mean and a standard deviation by name, not {priors!r:.80}")
     return {**lists, "priors": priors}
 
 

@@ -68,18 +68,16 @@ def free_parameters(
     FitError
         A name that the model or the camera does not have, or a prior that is none.
     """
-    if isinstance(free, str) or isinstance(camera, str) or isinstance(each, str):
-        raise FitError("free, camera and each are lists of names, not a name")
     model = models[0]
     values = model.parameters
-    names = list(_spread(model)) + _amplitudes(model) if free is None else list(free)
+    names = list(_spread(model)) + _amplitudes(model) if free is None else names_of("free", free)
     sensor = model.profile.sensor
     known = {**sensor.camera, **({} if sensor.clock is None else {"clock": sensor.clock})}
-    wanted = list(known) if camera is True else [] if camera is False else list(camera)
+    wanted = list(known) if camera is True else [] if camera is False else names_of("camera", camera)
     twice = {name for name in [*names, *wanted] if [*names, *wanted].count(name) > 1}
     if twice:
         raise FitError(f"{', '.join(sorted(twice))} is named twice")
-    own = set(model.profile.fit.each if each is None else each)
+    own = set(model.profile.fit.each if each is None else names_of("each", each))
     for name in [*names, *(own if each is not None else ())]:
         if name not in values:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(values)}")
@@ -106,6 +104,24 @@ def free_parameters(
             label = f"{name}[{film}]" if several else name
             result.append(Free(label, role, index, 0.0, known[name], film if several else None))
     return _with_priors(result, dict(priors or {}))
+
+
+def names_of(option: str, given: Iterable[str]) -> list[str]:
+    """The names that an option lists.
+
+    Raises
+    ------
+    FitError
+        It is no list, or a name alone.
+    """
+    if isinstance(given, str):
+        raise FitError(f'{option} must be a list of names, not a name: {option}=["{given:.80}"]')
+    if not isinstance(given, Iterable):
+        raise FitError(f"{option} must be a list of names, not {given!r}")
+    names = list(given)
+    if not all(isinstance(name, str) for name in names):
+        raise FitError(f"{option} must be a list of names, not {names!r:.80}")
+    return names
 
 
 def known_camera(kind: str, meta: Mapping[str, Any]) -> list[float]:

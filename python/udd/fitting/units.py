@@ -102,17 +102,21 @@ def _units(measurement: Measurement, model: Model) -> Iterator[Unit | None]:
             yield None
             continue
         changed = model.with_parameters(model.parameters | other.parameters) if other.parameters else model
-        scaled, nats = _scaled(measurement, other.factors) if other.factors else (measurement, 0.0)
+        moved = other.factors or other.shifts
+        scaled, nats = _scaled(measurement, other.factors, other.shifts) if moved else (measurement, 0.0)
         yield Unit(other.text, changed, scaled, nats)
 
 
-def _scaled(measurement: Measurement, factors: Mapping[str, float]) -> tuple[Measurement, float]:
-    """The measurement with some of its columns multiplied, and what that does to a density's logarithm."""
+def _scaled(
+    measurement: Measurement, factors: Mapping[str, float], shifts: Mapping[str, float]
+) -> tuple[Measurement, float]:
+    """The measurement with some of its columns multiplied and shifted, and what its log density gains."""
     sizes = np.array([factors.get(name, 1.0) for name in measurement.names])
+    offsets = np.array([shifts.get(name, 0.0) for name in measurement.names])
     sigma = measurement.sigma
     scaled = Measurement(
         measurement.t,
-        measurement.values * sizes,
+        measurement.values * sizes + offsets,
         None if sigma is None else sigma * sizes,
         measurement.rho,
         measurement.flag,

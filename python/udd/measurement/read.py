@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +17,7 @@ from udd.errors import MeasurementError
 
 from .formats import HEAD, Table, format_of
 from .input_signal import Hold
-from .recorded import Frames, Recorded, own_inputs
+from .recorded import Frames, Recorded, Units, own_inputs
 from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, check_length
 
 Columns = str | Sequence[str] | Mapping[str, str | tuple[str, str]]
@@ -47,17 +47,20 @@ def read_measurement(
         ``t, x, y`` [m, pivot at the origin, y up] becomes theta = atan2(x, -y). Optional:
         ``sigma_*``, ``rho_*``, ``flag``. Lines ``# key = value`` become `meta`. Other columns, and
         lines above the header, are passed over. A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or
-        ``Y [mm]``, is converted to s, m or rad, and a warning tells so. An empty cell or NaN is a frame where
+        ``Y [mm]``, is converted to s, m or rad, and dates (ISO 8601) to seconds since the first; a warning
+        tells so. An empty cell or NaN is a frame where
         it was not seen.
     columns : mapping, str or sequence of str, optional
         Which column is what: ``{"theta": "position"}``, or ``"theta=position"``; units that the columns'
-        names state are converted to s, m, rad and what these make, as rpm to rad/s. Two columns,
+        names state are converted to s, m, rad and what these make, as rpm to rad/s; a unit of another
+        quantity is refused, and so is one that is not known of a disk's or a pendulum's column. Two columns,
         ``{"theta": ("mass A x", "mass A y")}``, are a bob's position. The time needs no word where it is
         called so. Or, for a file without a (usable) header, the columns' names in order: ``"t,theta,_"``.
         An underscore is a column to pass over.
     states : sequence of str, optional
-        The columns that are wanted, where they are states of a user's own :class:`udd.Model`; they stay in
-        the unit that the model counts in.
+        The columns that are wanted, where they are states of a user's own :class:`udd.Model`. Times, angles
+        and their rates are converted to s and rad; others stay in the unit that the model counts in, which a
+        warning tells where the heading states another than m, and `columns` converts them.
     inputs : sequence of str or mapping, optional
         Columns with what drove the machine: ``["torque"]``, or ``{"u": "Motor torque (N m)"}``. They keep
         their unit, which stands in ``meta["input_units"]``. One from another table of the file, or of another
@@ -101,19 +104,21 @@ def read_measurement(
     """
     source = Path(path)
     mapping, given = _mapping(columns)
-    if isinstance(states, str):
+    if isinstance(states, str) or not (states is None or isinstance(states, Iterable)):
         raise MeasurementError(f"states is a list of columns, not {states!r}")
     drivers = _drivers(inputs)
     tables = _load(source, given)
     about = {key: value for key, value in meta.items() if value is not None}
     try:
         record = Recorded(tables, mapping, rate=rate, repeated=repeated, part=part)
-        m, converted = _measurement(record, source, about, states, drivers, hold)
+        m, frames = _measurement(record, source, about, states, drivers, hold)
     except MeasurementError as error:
         raise MeasurementError(f"{source}: {error}") from None
-    if converted:
-        told = ", ".join(f"{name} from {units}" for name, units in converted.items())
-        warnings.warn(f"{source}: converted {told}, as the names of its columns say", stacklevel=2)
+    for kept in frames.kept:
+        warnings.warn(f"{source}: {kept}", stacklevel=2)
+    if frames.converted:
+        told = ", ".join(f"{name} from {units}" for name, units in frames.converted.items())
+        warnings.warn(f"{source}: converted {told}, as its columns say", stacklevel=2)
     return m
 
 
@@ -151,7 +156,9 @@ def _mapping(columns: Columns | None) -> tuple[dict[str, str | tuple[str, str]] 
             if not isinstance(name, str) or not (isinstance(asked, str) or pair):
                 raise MeasurementError(f"columns needs the name of a column for {name}, not {asked!r}")
         return {name: a if isinstance(a, str) else (a[0], a[1]) for name, a in columns.items()}, None
-    names = columns.split(",") if isinstance(columns, str) else columns
+    if not isinstance(columns, Iterable):
+        raise MeasurementError(f"columns must be names of columns, not {columns!r}")
+    names = columns.split(",") if isinstance(columns, str) else list(columns)
     if not all(isinstance(name, str) for name in names):
         raise MeasurementError(f"columns must be names of columns, not {columns!r}")
     if isinstance(columns, str) and "=" in columns:
@@ -182,6 +189,8 @@ def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str
         return {}
     if isinstance(inputs, str):
         return pairs(inputs, "inputs")
+    if not isinstance(inputs, Iterable):
+        raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
     found = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
     if not all(isinstance(part, str) for pair in found.items() for part in pair):
         raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
@@ -210,11 +219,14 @@ def _measurement(
     states: Sequence[str] | None,
     drivers: dict[str, str],
     hold: Hold,
-) -> tuple[Measurement, dict[str, str]]:
-    """What the columns make, and which units were converted."""
+) -> tuple[Measurement, Frames]:
+    """What the columns make, and which they are."""
     names, bob = _names(record, states)
-    convert = record.mapping is not None or states is None
-    frames = record.frames(("x", "y") if bob else names, convert=convert)
+    columns = ("x", "y") if bob else names
+    mapped = record.mapping is not None
+    known = ("t", *columns) if states is None and names in (DISK, PENDULUM) else ()
+    own = states is not None and not mapped
+    frames = record.frames(columns, Units(frozenset(known), mapped, own))
     t = frames.times()
     extra: dict[str, Any] = {}
     if bob:
@@ -251,7 +263,7 @@ def _measurement(
         frames.table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality, signals)
     )
     check_length(m)
-    return m, frames.converted
+    return m, frames
 
 
 def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, ...], bool]:

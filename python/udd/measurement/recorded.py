@@ -11,10 +11,39 @@ from numpy.typing import NDArray
 from udd.errors import MeasurementError
 
 from .formats import Table
-from .formats.headings import COUNTED, Heading, in_base_units, size
+from .formats.headings import COUNTED, USUAL, Heading, ending, in_base_units, size
 from .input_signal import Hold, InputSignal, named_signal
 
 Asked = str | tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Units:
+    """How the units that headings state are taken.
+
+    Attributes
+    ----------
+    known : frozenset of str
+        The columns of a disk, of a pendulum or of a bob: a unit that is not known, or of another quantity, is
+        refused. In a user's own model the same names may mean anything.
+    mapped : bool
+        Whether the user said which column is what.
+    own : bool
+        Whether the columns are states of a user's own model, and nothing else was said of them.
+    """
+
+    known: frozenset[str] = frozenset()
+    mapped: bool = False
+    own: bool = False
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """What one of a column's unit is in the base unit, and a word on a change or on what stays."""
+
+    size: float = 1.0
+    told: str = ""
+    kept: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,7 +88,7 @@ class Recorded:
         listed = ", ".join(found[:40]) + (f" and {len(found) - 40} more" if len(found) > 40 else "")
         return MeasurementError(f"no column {asked}: found {listed or 'nothing'}")
 
-    def frames(self, names: Sequence[str], *, convert: bool) -> Frames:
+    def frames(self, names: Sequence[str], units: Units) -> Frames:
         """The table in which the coordinates lie.
 
         Raises
@@ -69,7 +98,7 @@ class Recorded:
         """
         for table in self.tables:
             if all(self.find(table, name) is not None for name in names):
-                return Frames(self, table, _run(self, table, convert), convert)
+                return Frames(self, table, _run(self, table, units), units)
         for name in names:
             if all(self.find(table, name) is None for table in self.tables):
                 if all(self.find(table, "t") is None for table in self.tables) and self.rate is None:
@@ -94,9 +123,10 @@ class Frames:
     record: Recorded
     whole: Table  # with all its rows
     run: Run
-    convert: bool
+    units: Units
     taken: dict[str, str] = field(default_factory=dict)
     converted: dict[str, str] = field(default_factory=dict)
+    kept: list[str] = field(default_factory=list)
     used: set[str] = field(default_factory=set)
 
     @property
@@ -115,7 +145,7 @@ class Frames:
 
     def times(self) -> NDArray[np.float64]:
         """The times of the rows [s]."""
-        self._note("t", self.run.heading, self.run.unit)
+        self._note("t", self.run.heading, self.run.conversion)
         return self.run.t
 
     def column(self, name: str) -> NDArray[np.float64]:
@@ -128,8 +158,9 @@ class Frames:
         k = self.table.find(asked)
         assert k is not None
         heading = self.table.headings[k]
-        one, unit = _unit(name, heading, self.convert, mapped=self.record.mapping is not None)
-        self._note(name, heading, unit)
+        conversion = _conversion(name, heading, self.units)
+        self._note(name, heading, conversion)
+        one = conversion.size
         return self.table.numbers(k) if one == 1.0 else self.table.numbers(k) * one
 
     def _bob(self, name: str, asked: tuple[str, str]) -> NDArray[np.float64]:
@@ -149,14 +180,18 @@ class Frames:
         k = self.table.find(asked) if isinstance(asked, str) else None
         if k is None:
             raise self.record.missing(name)
-        self._note(name, self.table.headings[k], "")
+        self._note(name, self.table.headings[k], Conversion())
         return self.table.words(k)
 
-    def _note(self, name: str, heading: Heading, unit: str) -> None:
+    def _note(self, name: str, heading: Heading, conversion: Conversion) -> None:
         self.used.add(heading.raw)
-        self.taken[name] = heading.raw + (f", {unit}" if unit else "")
-        if unit and not name.startswith("sigma_"):
-            self.converted[name] = unit
+        self.taken[name] = heading.raw + (f", {conversion.told}" if conversion.told else "")
+        if name.startswith("sigma_"):
+            return
+        if conversion.told:
+            self.converted[name] = conversion.told
+        if conversion.kept:
+            self.kept.append(conversion.kept)
 
     def input(self, name: str, asked: str, hold: Hold) -> tuple[InputSignal, str]:
         """A measured input, with the clock of the table where it lies, and the unit that it states."""
@@ -165,7 +200,7 @@ class Frames:
             k = table.find(asked)
             if k is None:
                 continue
-            run = self.run if table is self.whole else _run(self.record, table, self.convert)
+            run = self.run if table is self.whole else _run(self.record, table, self.units)
             values = run.table.numbers(k)
             there = ~np.isnan(values)
             heading = table.headings[k]
@@ -189,10 +224,10 @@ class Run:
     table: Table
     t: NDArray[np.float64]
     heading: Heading
-    unit: str
+    conversion: Conversion
 
 
-def _run(record: Recorded, table: Table, convert: bool) -> Run:
+def _run(record: Recorded, table: Table, units: Units) -> Run:
     """Cut a table to the part and the rows that were asked for."""
     table = _framed(table)
     asked = record.find(table, "t")
@@ -201,18 +236,21 @@ def _run(record: Recorded, table: Table, convert: bool) -> Run:
         if record.rate is None:
             error = record.missing(_text((record.mapping or {}).get("t", "t")))
             raise MeasurementError(f"{error}; of evenly spaced samples say how many a second, rate=")
-        t, unit = np.arange(len(table)) / record.rate, ""
+        t, conversion = np.arange(len(table)) / record.rate, Conversion()
         heading = Heading(f"rows at {record.rate:g} Hz", "t")
     else:
         if record.rate is not None:
             raise MeasurementError(f"rate is for files without times, but here is {table.headings[k].raw}")
         heading = table.headings[k]
-        one, unit = _unit("t", heading, convert, mapped=record.mapping is not None)
+        conversion = _conversion("t", heading, units)
+        one = conversion.size
         t = table.numbers(k) if one == 1.0 else table.numbers(k) * one
     if not len(t):
         raise MeasurementError("the file holds no rows")
     pick = _rows(record, t)
-    return Run(table, t, heading, unit) if pick is None else Run(table.rows(pick), t[pick], heading, unit)
+    if pick is None:
+        return Run(table, t, heading, conversion)
+    return Run(table.rows(pick), t[pick], heading, conversion)
 
 
 def _rows(record: Recorded, t: NDArray[np.float64]) -> NDArray[np.int64] | None:
@@ -262,24 +300,39 @@ def own_inputs(table: Table) -> dict[str, InputSignal]:
     return found
 
 
-def _unit(name: str, heading: Heading, convert: bool, *, mapped: bool) -> tuple[float, str]:
-    """What one of a column's unit is in the base unit, and a word on the change where there is one.
+def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
+    """What becomes of a column in the unit that its heading states.
 
-    Only a column that the user pointed at is taken at its word where its name does not say what it counts.
+    Raises
+    ------
+    MeasurementError
+        It is not known, or of another quantity than the column is.
     """
-    if not convert or not heading.unit:
-        return 1.0, ""
-    base = COUNTED.get(name.removeprefix("sigma_"))
-    if base is not None:
-        one = size(name, heading.unit)
-        known = in_base_units(heading.unit)
-        if one is None and mapped and known is not None:
+    if heading.dates:
+        return Conversion(told="dates to s since the first")
+    plain = name.removeprefix("sigma_")
+    unit = heading.unit or (ending(plain, heading) if units.mapped else "")
+    if not unit:
+        return Conversion()
+    base, known = COUNTED.get(plain), in_base_units(unit)
+    one = size(name, unit)
+    if base is not None and one is None:
+        if known is not None and (base != "m" or plain in units.known or units.mapped):
             raise MeasurementError(f"{name} is counted in {base}, but the column is called {heading.raw}")
-        return (1.0, "") if one in (None, 1.0) else (float(one or 1.0), f"{heading.unit} to {base}")
-    known = in_base_units(heading.unit) if mapped else None
+        if known is None and plain in units.known:
+            raise MeasurementError(f"the unit {unit[:80]!r} of {name} is not known; write {USUAL[base]}")
+        if known is None and base != "m":
+            return Conversion(kept=f"the unit {unit[:80]!r} of {name} is not known, its numbers stay")
+    elif base is not None and one is not None:
+        known = (one, base)
     if known is None or known[0] == 1.0:
-        return 1.0, ""
-    return known[0], f"{heading.unit} to {known[1]}"
+        return Conversion()
+    if units.own and known[1].startswith("m"):
+        # A model may count in mm; what it takes the sine of is in rad.
+        return Conversion(kept=f'{name} stays in {unit} (columns="{name}={name}" makes it {known[1]})')
+    if base is None and not units.mapped and not units.own:
+        return Conversion()
+    return Conversion(known[0], f"{unit} to {known[1]}")
 
 
 def _text(asked: Asked) -> str:

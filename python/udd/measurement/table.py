@@ -103,10 +103,12 @@ class Measurement:
         quality: Mapping[str, ArrayLike] | None = None,
         inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
     ) -> None:
-        times = np.array(t, dtype=np.float64)
-        if isinstance(values, Mapping):
-            names = names or tuple(values)
-        table = _columns(values, names)
+        for what, given in (("meta", meta), ("quality", quality), ("inputs", inputs)):
+            if given is not None and not isinstance(given, Mapping):
+                raise MeasurementError(f"{what} must be entries by their names, not {given!r:.80}")
+        times = _numbers("t", t)
+        names = _names(names or (tuple(values) if isinstance(values, Mapping) else ()))
+        table = _columns("values", values, names)
         if not names:
             names = {3: DISK, 1: PENDULUM}.get(table.shape[1], ())
         if not names or len(set(names)) < len(names):
@@ -115,12 +117,14 @@ class Measurement:
             )
         n, m = table.shape
         flags = np.full(n, "") if flag is None else np.array(flag, dtype=np.str_)
+        own = None if rho is None else _numbers("rho", rho)
         put = object.__setattr__
         put(self, "t", times)
         put(self, "values", table)
-        put(self, "sigma", None if sigma is None else _columns(sigma, names))
-        pairs = -1 if n else m * (m - 1) // 2  # of no rows numpy cannot tell
-        put(self, "rho", None if rho is None else np.array(rho, dtype=np.float64).reshape(n, pairs))
+        put(self, "sigma", None if sigma is None else _columns("sigma", sigma, names))
+        if own is not None and own.size != n * (m * (m - 1) // 2):
+            raise MeasurementError(f"rho has shape {own.shape}, expected {(n, m * (m - 1) // 2)}")
+        put(self, "rho", None if own is None else own.reshape(n, m * (m - 1) // 2))
         put(self, "flag", flags)
         put(self, "meta", dict(meta or {}))
         put(self, "names", names)
@@ -132,8 +136,6 @@ class Measurement:
             raise MeasurementError(f"t, values and flag have different lengths: {times.shape}, {table.shape}")
         if self.sigma is not None and self.sigma.shape != (n, m):
             raise MeasurementError(f"sigma has shape {self.sigma.shape}, values have {(n, m)}")
-        if self.rho is not None and self.rho.shape != (n, len(self.pairs)):
-            raise MeasurementError(f"rho has shape {self.rho.shape}, expected {(n, len(self.pairs))}")
         check(self, lambda i: f"row {i}")
         put(self, "inputs", input_signals(inputs, times))
         _check_inputs(self)
@@ -290,13 +292,38 @@ def usable(flag: NDArray[np.str_]) -> NDArray[np.bool_]:
     return np.asarray([not said or said.startswith(USABLE) for said in flag.tolist()], dtype=bool)
 
 
-def _columns(values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]) -> NDArray[np.float64]:
+def _names(given: Any) -> tuple[str, ...]:
+    """The names of the columns, as a tuple."""
+    if not isinstance(given, (tuple, list)) or not all(isinstance(name, str) for name in given):
+        raise MeasurementError(f"names must be a list of the columns' names, not {given!r:.80}")
+    return tuple(given)
+
+
+def _numbers(what: str, given: ArrayLike) -> NDArray[np.float64]:
+    """A copy as numbers."""
+    try:
+        return np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MeasurementError(f"{what} must be numbers (of a table in rows of one length)") from None
+
+
+def _columns(
+    what: str, values: ArrayLike | Mapping[str, ArrayLike], names: tuple[str, ...]
+) -> NDArray[np.float64]:
+    """One column per name."""
     if isinstance(values, Mapping):
         lost = [name for name in names if name not in values]
         if lost:
             raise MeasurementError(f"no column {lost[0]}: found {', '.join(values)}")
-        return np.column_stack([np.asarray(values[name], dtype=np.float64) for name in names])
-    table = np.array(values, dtype=np.float64)
+        columns = [_numbers(name, values[name]) for name in names]
+        shapes = [column.shape for column in columns]
+        if any(len(shape) != 1 for shape in shapes) or len(set(shapes)) > 1:
+            told = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
+            raise MeasurementError(f"{what} must be columns of one length, not of shapes {told}")
+        return np.column_stack(columns) if columns else np.empty((0, 0))
+    table = _numbers(what, values)
+    if table.ndim not in (1, 2):
+        raise MeasurementError(f"{what} must be a column or a table (n, m), not of shape {table.shape}")
     return table[:, None] if table.ndim == 1 else table
 
 

@@ -193,10 +193,15 @@ def _mistaken_unit(model: Pendulum, step: float, values: Floats) -> str | None:
     lag = max(round(period / 8 / step), 1)
     bend = np.abs(theta[2 * lag :] - 2 * theta[lag:-lag] + theta[: -2 * lag])
     if len(bend) and float(np.quantile(bend, 0.9)) > _BENDS * max((lag * step / pace) ** 2, 0.3):
+        counts = (
+            ", or counts of an encoder (multiply by 2 pi over the counts per turn)"
+            if (theta == np.round(theta)).all()
+            else ""
+        )
         return (
             f"the angle has a range of {np.ptp(theta):.3g}, with steps of up to "
             f"{float(np.abs(np.diff(theta)).max()):.3g} between frames, which gravity cannot do if it is in "
-            "rad: is it in degrees?"
+            f"rad: is it in degrees{counts}?"
         )
     return None
 
@@ -204,6 +209,11 @@ def _mistaken_unit(model: Pendulum, step: float, values: Floats) -> str | None:
 def _other_units(model: Pendulum) -> Iterator[OtherUnit]:
     yield OtherUnit(
         "the motion is that of a pendulum whose angle is in degrees, not in rad", factors={"theta": _DEGREE}
+    )
+    yield OtherUnit(
+        "y points down, or the angle is counted from the upright: y must point up, the angle from the lowest "
+        "point",
+        shifts={"theta": np.pi},
     )
     for k in _DECADES:
         length = model.length * 10.0**k

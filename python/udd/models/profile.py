@@ -138,11 +138,14 @@ class OtherUnit:
         The model's parameters then.
     factors : dict of str to float
         By what columns of the measurement are multiplied then.
+    shifts : dict of str to float
+        What is added to columns of the measurement then.
     """
 
     text: str
     parameters: dict[str, float] = field(default_factory=dict)
     factors: dict[str, float] = field(default_factory=dict)
+    shifts: dict[str, float] = field(default_factory=dict)
 
 
 def no_unit(_model: Any, *_rows: Any) -> None:

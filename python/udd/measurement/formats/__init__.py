@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from udd.errors import MeasurementError
+
 from . import hdf5, matlab, numpy_arrays, parquet, text, tracker_project, zipped
 from .table import Table
 
 __all__ = ["FORMATS", "Format", "Table", "format_of", "is_table"]
 
 Reader = Callable[[bytes, list[str] | None], list[Table]]
+_OFFICE = bytes.fromhex("d0cf11e0a1b11ae1")  # compound files: Excel's before 2007
 HEAD = 4096
 """Bytes at a file's beginning that tell its kind."""
 
@@ -37,11 +40,16 @@ def _npz(head: bytes, suffix: str) -> bool:
     return head.startswith(b"PK\3\4") and (suffix == ".npz" or b".npy" in head[:512])
 
 
+def _old_workbook(_raw: bytes, _given: list[str] | None) -> list[Table]:
+    raise MeasurementError("this is an Excel workbook or another old Office file: save its sheet as CSV")
+
+
 #: The first that fits reads a file; what none of them knows is a text table.
 FORMATS = (
     Format("Parquet", lambda head, _suffix: head.startswith(b"PAR1"), parquet.read),
     Format("HDF5", _hdf5, hdf5.read),
     Format("MATLAB", _matlab, matlab.read),
+    Format("old workbook", lambda head, _suffix: head.startswith(_OFFICE), _old_workbook),
     Format("NumPy archive", _npz, numpy_arrays.read),
     Format("NumPy array", lambda head, _suffix: head.startswith(b"\x93NUMPY"), numpy_arrays.read_one),
     Format("archive of tables", lambda head, _suffix: head.startswith((b"PK\3\4", b"PK\5\6")), zipped.read),

@@ -12,15 +12,30 @@ _ALIASES |= {"Beta": "beta", "X": "x"}
 _TIMES = {"time", "zeit", "temps", "tiempo", "tempo"}
 _TURN = 2 * math.pi
 _ANGLES = {
-    "rad": 1.0,
+    **dict.fromkeys(("rad", "radian", "radians"), 1.0),
     "mrad": 1e-3,
-    **dict.fromkeys(("deg", "degree", "degrees", "°"), math.pi / 180),
+    # Grad is German for degrees; grad may be gradians, and is not known.
+    **dict.fromkeys(("deg", "degree", "degrees", "°", "º", "Grad"), math.pi / 180),
+    "arcmin": math.pi / 180 / 60,
+    "arcsec": math.pi / 180 / 3600,
     **dict.fromkeys(("rev", "turn", "turns"), _TURN),
 }
-_LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
+_LENGTHS = {
+    **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1.0),
+    **{"km": 1e3, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    **dict.fromkeys(("in", "inch", "inches"), 0.0254),
+    "ft": 0.3048,
+}
+_DURATIONS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
+    **{"us": 1e-6, "µs": 1e-6, "ns": 1e-9},
+    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
+    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
+}
 #: Units that a column's heading may state, and what they are in s, m, rad and what these make.
 UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
+    "s": _DURATIONS,
     "m": _LENGTHS,
     "rad": _ANGLES,
     "m/s": {f"{unit}/s": size for unit, size in _LENGTHS.items()} | {"km/h": 1 / 3.6},
@@ -34,36 +49,54 @@ UNITS: dict[str, dict[str, float]] = {
 }
 #: In what a disk's and a pendulum's columns are counted.
 COUNTED: dict[str, str] = {"t": "s", "Y": "m", "Z": "m", "x": "m", "y": "m", "beta": "rad", "theta": "rad"}
+#: Units to write for what is counted in one, where a unit is not known.
+USUAL: dict[str, str] = {"s": "s or ms", "m": "m, cm or mm", "rad": "deg or rad"}
+#: What may stand before a unit without brackets: ``t_ms``, ``t / s``, ``angle deg``, ``angle in deg``.
+_BEFORE_UNIT = re.compile(r"(?:\s*[_/,]\s*|\s+in\s+|\s+)(?=[^_/,\s]+$)")
 #: Names that a unit may follow without brackets; others may be states of a user's own model.
 _ENDING = ("t", "Y", "Z", "beta", "theta")
 
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading: as it stands, the name without unit and TeX, and the unit that it states."""
+    """A column's heading: as it stands, the name without unit and TeX, and the unit that it states.
+
+    `dates` says that the numbers are seconds that were counted from dates.
+    """
 
     raw: str
     name: str
     unit: str = ""
+    dates: bool = False
 
 
 def headings(cells: Sequence[str]) -> list[Heading]:
-    """``t_{1}``, ``T [s]``, ``Time (ms)`` and ``t_ms`` are all t, the last two in ms."""
+    """``t_{1}``, ``T [s]``, ``Time (ms)``, ``time ms`` and ``t_ms`` are all t, the last three in ms."""
     bare = [re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells]
     names = [_symbol(name) for name in bare]
     result = []
     for cell, plain, name in zip(cells, bare, names, strict=True):
-        stated = re.search(r"[\[(]\s*([^])]+?)\s*[])]", cell)
-        unit = stated.group(1) if stated else ""
+        stated = re.findall(r"[\[(]\s*([^])]+?)\s*[])]", cell)
+        unit = next((one for one in stated if in_base_units(one)), stated[-1] if stated else "")
         # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
-        base, mark, ending = (
-            re.split(r"(_|/)(?=[^_/]*$)", plain, maxsplit=1) if re.search("[_/]", plain) else (plain, "", "")
-        )
+        base, unit_after = _parted(plain)
         known = _symbol(base)
-        if mark and known in _ENDING and known not in names and size(known, ending):
-            name, unit = known, ending
+        if known in _ENDING and known not in names and size(known, unit_after):
+            name, unit = known, unit_after
         result.append(Heading(cell.strip(), name, unit))
     return result
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """A heading without brackets as a name and what may be its unit."""
+    base, *rest = _BEFORE_UNIT.split(name, maxsplit=1)
+    return base, "".join(rest)
+
+
+def ending(name: str, heading: Heading) -> str:
+    """The unit without brackets, as in ``Winkel deg``, of a column that was said to be a time or an angle."""
+    unit = _parted(heading.raw)[1]
+    return unit if COUNTED.get(name) in ("s", "rad") and size(name, unit) else ""
 
 
 def _symbol(name: str) -> str:
@@ -82,4 +115,5 @@ def in_base_units(unit: str) -> tuple[float, str] | None:
 
 def _size(base: str, unit: str) -> float | None:
     known = UNITS.get(base, {})
+    unit = unit.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
     return known.get(unit, known.get(unit.lower()))

@@ -83,8 +83,9 @@ class Table:
             try:
                 out[i] = number(cell, self.comma)
             except ValueError:
+                help_ = " (a time is in seconds, or a date as 2024-05-03 12:00:00)" if name == "t" else ""
                 raise MeasurementError(
-                    f"{self.place(i)}: {cell[:80]!r} stands where a number for {name} should be"
+                    f"{self.place(i)}: {cell[:80]!r} stands where a number for {name} should be{help_}"
                 ) from None
         return out
 

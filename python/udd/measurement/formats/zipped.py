@@ -23,8 +23,10 @@ def read(raw: bytes, given: list[str] | None) -> list[Table]:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             inside = [info for info in archive.infolist() if not info.is_dir()]
             names = [info.filename for info in inside]
-            if "xl/workbook.xml" in names:
+            if any(name.startswith("xl/") for name in names):
                 raise MeasurementError("this is an Excel workbook: save its sheet as CSV")
+            if {"mimetype", "content.xml"} <= set(names):
+                raise MeasurementError("this is a spreadsheet (OpenDocument): save its sheet as CSV")
             wanted = [info for info in inside if _wanted(PurePosixPath(info.filename))]
             if sum(info.file_size for info in wanted) > LARGEST:
                 raise MeasurementError("the archive unfolds to more than 1 GB")
