@@ -184,6 +184,14 @@ def test_the_command_that_does_it_again() -> None:
     assert words.command(found, None) is None
 
 
+def test_noise_that_no_measurement_stated_is_not_said_to_be_stated(pages: dict[str, str]) -> None:
+    assert discovered.pendulum().measurement.sigma is None
+    assert "assumed beforehand" in Page(pages["pendulum"]).words
+    assert "the measurement said" not in Page(pages["pendulum"]).words
+    assert discovered.disk().measurement.sigma is not None
+    assert "the measurement said" in Page(pages["disk"]).words
+
+
 def test_nothing_missing_is_said(pages: dict[str, str]) -> None:
     text = Page(pages["nothing"]).words
     assert "Nothing is missing" in text
