@@ -19,6 +19,7 @@ import discovered
 import udd
 from udd.cli import main
 from udd.cli.inputs import is_film
+from udd.cli.option_names import in_options
 
 UDD = [sys.executable, "-m", "udd"]
 
@@ -387,6 +388,173 @@ def test_bad_options_are_refused(
     assert said in failed(["fit", disk, *options], capsys)
 
 
+OWN = {
+    "states": ["theta", "v"],
+    "equations": {"theta": "v", "v": "-k*theta - c*v"},
+    "parameters": {"k": 15, "c": 0.1},
+}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--pendulum", "0.6", "--W", "0.1"], "--W (--rate) does not apply to a pendulum"),
+        (["--pendulum", "0.6", "--rate", "0"], "--W (--rate) does not apply to a pendulum"),
+        (["--pendulum", "0.6", "--R", "0.05"], "--R does not apply to a pendulum"),
+        (["--pendulum", "0.6", "--k1", "0"], "--k1 does not apply to a pendulum"),
+        (["--pendulum", "0.6", "--inputs", "u=motor_V"], "--inputs does not apply to a pendulum"),
+        (["--W", "0.1"], "swing.csv is a pendulum's record: --W (--rate) does not apply to a pendulum"),
+        (["--model", "own.json", "--k0", "3"], "--k0 does not apply to a model of your own (--model)"),
+        (["--model", "own.json", "--g", "9.81"], "--g does not apply to a model of your own"),
+        (["--model", "own.json", "--R", "9"], "--R does not apply to a model of your own"),
+        (["--model", "own.json", "--inertia", "9"], "--inertia does not apply to a model of your own"),
+        (["--model", "own.json", "--pendulum", "1"], "--pendulum does not apply to a model of your own"),
+        (["--model", "own.json", "--effect", "magic"], "--effect does not apply to a model of your own"),
+        (["--pendulum", "0.6", "--free", ""], "--free names no parameter"),
+        (["--pendulum", "0.6", "--free", "k0", "--free", "k7"], "no parameter 'k7'"),
+        (["--pendulum", "0.6", "--free", "k7", "--free", "k0"], "no parameter 'k7'"),
+        (["--pendulum", "0.6", "--each", "k0"], "--each takes several files"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(
+    options: list[str], said: str, swing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "own.json").write_text(json.dumps(OWN))
+    options = [str(tmp_path / option) if option == "own.json" else option for option in options]
+    assert said in failed(["fit", swing, *options], capsys)
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["simulate", "--pendulum", "0.5", "--k2", "1"], "--k2 does not apply to a pendulum"),
+        (["simulate", "--pendulum", "0.5", "--B", "0"], "--B does not apply to a pendulum"),
+        (["simulate", "--w", "1", "--effect", "magic"], "--effect does not apply to the DLE (--w)"),
+        (["simulate", "--W", "0.03", "--inertia", "1"], "--inertia does not apply to a disk"),
+        (["poincare", "--w", "1", "--ignore-edge"], "--ignore-edge does not apply to the DLE (--w)"),
+        (["bifurcation", "w", "--from", "1", "--to", "2", "--k0", "1"], "--k0 does not apply to the DLE"),
+        (["fit", "film.mp4", "--W", "0.03", "--inertia", "1"], "--inertia does not apply to a disk"),
+        (["fit", "film.mp4", "--W", "0.03", "--columns", "t,theta"], "--columns does not apply to a film"),
+        (["fit", "film.mp4", "--W", "0.03", "--part", "0"], "--part does not apply to a film"),
+    ],
+)
+def test_options_of_other_models_are_refused(
+    argv: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert said in failed([*argv], capsys)
+
+
+def test_the_drive_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["simulate", "--rate", "1.4", "--W", "0.03"])
+    assert left.value.code == 2
+    assert "argument --W: not allowed with argument --rate" in capsys.readouterr().err
+
+
+def test_free_may_be_repeated(disk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    apart = data(["fit", disk, "--no-camera", "--free", "k0", "--free", "W"], capsys)
+    assert apart["parameters"] == data(["fit", disk, "--no-camera", "--free", "k0,W"], capsys)["parameters"]
+
+
+def test_a_pendulum_s_size_is_taken_from_the_header(
+    swing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = udd.read_measurement(swing).slice(0, 10)
+    path = tmp_path / "known.csv"
+    record.with_meta(length=0.6, inertia=0.37).to_csv(path)
+    assert main(["fit", str(path), "--free", "k0", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert "length=0.6" in json.loads(out)["model"] and "inertia=0.37," in json.loads(out)["model"]
+    assert "the pendulum's length is 0.6 m by the file" in err
+    by_hand = data(["fit", path, "--free", "k0", "--pendulum", "0.61"], capsys)
+    assert "length=0.61" in by_hand["model"] and "inertia=0.3721" in by_hand["model"]
+    record.with_meta(length="long").to_csv(path)
+    assert "known.csv: length in the header must be a number, not 'long'" in failed(["fit", path], capsys)
+
+
+@pytest.mark.parametrize("more", [[], ["--W", "0.03"], ["--pendulum", "0.5"]])
+def test_columns_of_no_known_device_need_a_model(
+    more: list[str], swing: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fit", str(swing), "--columns", "gyro=theta", *more]) == 1
+    said = capsys.readouterr().err.splitlines()[-1]
+    wanted = "swing.csv: the column gyro is no pendulum's (theta) and no disk's (Y, Z, beta): use --model"
+    assert said.endswith(wanted)
+
+
+SWING = [f"{k / 25},{0.3 * (-1) ** k}" for k in range(30)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "more", "said"),
+    [
+        (["t,angel", *SWING], [], "which of them is it, --columns theta=...?"),
+        (["theta,load", *SWING], [], "say how many a second, --sampling HZ"),
+        (["t,theta", *SWING[:5], *SWING[4:]], [], "(--repeated first keeps the first of such rows)"),
+        (["t,theta", *SWING, *SWING], [], "(--part 0, --part 1 ... reads the rows between such jumps)"),
+        (SWING, [], "for example --columns t,theta,_"),
+        (["t,theta", *SWING], ["--sampling", "25"], "--sampling is for files without times"),
+        (["t,theta", *SWING], ["--sampling", "-1"], "--sampling must be a positive number"),
+        (["t,theta", *SWING], ["--columns", "theta="], "--columns must look like theta=position"),
+    ],
+)
+def test_the_command_line_names_its_own_options(
+    rows: list[str], more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "swing.csv"
+    path.write_text("\n".join(rows) + "\n")
+    assert said in failed(["fit", path, "--pendulum", "0.5", *more], capsys)
+
+
+def test_messages_are_told_in_options() -> None:
+    asked = in_options("say where the motion starts, state0={'v': ..., 'w': ...}")
+    assert asked.endswith('"state0": {"v": ..., "w": ...} in the file of --model')
+    # What a user wrote is repeated as it was written, and parameters may be called so.
+    for text in ("--effect drag:rate=x: 'rate=x' is not", "rate must be finite", "part must not be below 0"):
+        assert in_options(text) == text
+
+
+def test_units_are_told_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "swing.csv"
+    t = np.arange(200) / 20
+    angle = np.degrees(0.3 * np.cos(4.4 * t)) + np.random.default_rng(1).normal(0, 0.1, t.size)
+    rows = [f"{1e3 * a:g},{b:.4f}" for a, b in zip(t, angle, strict=True)]
+    path.write_text("\n".join(["Time (ms),Angle (deg)", *rows]))
+    assert main(["fit", str(path), "--pendulum", "0.5", "--free", "length"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said == [f"udd: {path}: read t from Time (ms), ms to s, theta from Angle (deg), deg to rad"]
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["discover", "x.csv", "--report", "book.pdf"], "book.pdf: the name must end in .html or .htm"),
+        (["simulate", "--W", "0", "--out", "run.xlsx"], "run.xlsx: the name must end in .csv or .txt"),
+        (["simulate", "--W", "0", "--out", "run"], "run: the name must end in .csv or .txt"),
+        (["poincare", "--w", "1", "--out", "run.pdf"], "run.pdf: the name must end in .csv or .txt"),
+        (["track", "x.mp4", "--out", "bob.xlsx"], "bob.xlsx: the name must end in .csv or .txt"),
+        (["track", "x.mp4", "--page", "bob.pdf"], "bob.pdf: the name must end in .html or .htm"),
+        (["track", "x.mp4", "--bob", "pink"], "--bob must be one of red, orange"),
+    ],
+)
+def test_names_that_promise_another_kind_of_file(
+    argv: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert said in failed([*argv], capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_spellings_of_an_ending_are_taken(tmp_path: Path) -> None:
+    for name in ("run.CSV", "run.txt"):
+        assert main(["simulate", "--W", "0", "--t", "1", "--out", str(tmp_path / name)]) == 0
+        assert (tmp_path / name).exists()
+
+
 def test_what_is_not_known_is_asked_for(
     tmp_path: Path, swing: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -565,3 +733,12 @@ def test_the_drive_may_be_said_by_its_wheel(capsys: pytest.CaptureFixture[str]) 
         with pytest.raises(SystemExit):
             main([*run, f"--rate={bad}"])
         assert "rate" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_the_length_of_a_bob_in_pixels_is_asked_for(tmp_path: Path, capsys) -> None:
+    t = np.arange(0, 10, 0.05)
+    theta = 0.3 * np.cos(4.4 * t)
+    bob = np.column_stack([t, 600 * np.sin(theta), -600 * np.cos(theta)])
+    np.savetxt(tmp_path / "bob.csv", bob, delimiter=",", header="t,x,y", comments="")
+    assert main(["fit", str(tmp_path / "bob.csv")]) == 1
+    assert "say its length in m with --pendulum LENGTH" in capsys.readouterr().err

@@ -16,6 +16,10 @@ def test_results_are_one_line() -> None:
         assert len(repr(result)) < 400 and "\n" not in repr(result)
     assert repr(found).startswith("<Discovery: effect identified: ")
     assert found.effects[0].title in found._repr_html_()
+    errors = found.error_before
+    assert repr(errors).startswith(f"<Errors of {len(errors.samples)} free runs: median ")
+    assert f" {errors.unit} at {errors.horizons[0]:.3g} s" in repr(errors)
+    assert len(repr(errors)) < 400 and "\n" not in repr(errors)
 
 
 def test_results_are_labelled_arrays() -> None:

@@ -184,6 +184,16 @@ def test_the_command_that_does_it_again() -> None:
     assert words.command(found, None) is None
 
 
+def test_noise_that_no_measurement_stated_is_not_said_to_be_stated(pages: dict[str, str]) -> None:
+    assert discovered.pendulum().measurement.sigma is None
+    assert "assumed beforehand" in Page(pages["pendulum"]).words
+    assert "the measurement said" not in Page(pages["pendulum"]).words
+    m = discovered.pendulum().measurement.slice(0, 10)
+    stated = udd.Measurement(m.t, {"theta": m["theta"]}, np.full((len(m), 1), 2e-3))
+    fit = udd.fit(stated, udd.Pendulum(0.6), free=["k0"])
+    assert tables.noise_beforehand(fit) == "the measurement said"
+
+
 def test_nothing_missing_is_said(pages: dict[str, str]) -> None:
     text = Page(pages["nothing"]).words
     assert "Nothing is missing" in text

@@ -29,6 +29,11 @@ def test_the_terminal_and_the_page_have_one_report(made):
         assert any(line.split()[:1] == [own] for line in text.splitlines()), name
 
 
+def test_nothing_missing_is_said_once():
+    first = as_text(summary_of(discovered.nothing())).splitlines()[0]
+    assert first.startswith("nothing missing: the known model explains this motion")
+
+
 def test_formulas_numbers_and_tables_are_spelt_out():
     rows = ((Markup("Ω<sup>2</sup>"), "(5.0 ± 0.1) × 10⁻⁶"), ("k", "−1"))
     table = Table("numbers", (Column("name"), Column("value")), rows)

@@ -151,7 +151,7 @@ def test_layouts_that_cannot_be(said: Any, why: str) -> None:
         ({"region": [0, 0, 5]}, "region must be four numbers"),
         ({"region": [9, 0, 5, 8]}, "growing"),
         ({"scale": 0}, "scale must be a positive number of pixels per metre, not 0"),
-        ({"bob": "grey"}, "must be one of red"),
+        ({"bob": "grey"}, "bob must be one of red"),
     ],
 )
 def test_settings_that_cannot_be(said: dict[str, Any], why: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from udd._util import background_import
 from udd.errors import UddError
 
-from .export import OutputFile
+from .export import PAGES, OutputFile
 from .fit import options
 from .inputs import add_input, check_early, inputs_of
 from .options import new
@@ -42,7 +42,12 @@ def add(commands: Any) -> None:
         help="end the search after so long, with what it has by then",
     )
     parser.add_argument(
-        "--report", type=Path, action=OutputFile, metavar="HTML", help="page to write, pictures first"
+        "--report",
+        type=Path,
+        action=OutputFile,
+        endings=PAGES,
+        metavar="HTML",
+        help="page to write, pictures first",
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from udd._util.json_output import as_json
 from udd.errors import UddError
 
+from .option_names import in_options
 from .output import CommandResult
 from .parser import make_parser
 
@@ -85,9 +86,9 @@ def _print(answer: CommandResult, json: bool) -> None:
 
 
 def _fail(message: str) -> int:
-    print(f"udd: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"udd: error: {' '.join(in_options(message).split())}", file=sys.stderr)
     return 1
 
 
 def _warn(message: Warning | str, *_details: Any, **_more: Any) -> None:
-    print(f"udd: warning: {' '.join(str(message).split())}", file=sys.stderr)
+    print(f"udd: warning: {' '.join(in_options(str(message)).split())}", file=sys.stderr)

@@ -22,10 +22,20 @@ if TYPE_CHECKING:
 #: Endings of a labelled result's own files, and of pictures.
 DATA = (".nc", ".zarr")
 PICTURES = (".png", ".svg", ".pdf")
+#: Endings of pages, and of tables as text.
+PAGES = (".html", ".htm")
+TABLES = (".csv", ".txt")
 
 
 class OutputFile(argparse.Action):
-    """The name of a file to write; one that cannot be written is refused before the work."""
+    """The name of a file to write; one that cannot be written is refused before the work.
+
+    So is one whose ending promises another kind of file than `endings`, where these are given.
+    """
+
+    def __init__(self, *args: Any, endings: tuple[str, ...] = (), **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.endings = endings
 
     def __call__(
         self,
@@ -36,7 +46,15 @@ class OutputFile(argparse.Action):
     ) -> None:
         """Check it and keep it."""
         require_writable(values)
+        if self.endings:
+            check_ending(values, self.endings)
         setattr(namespace, self.dest, values)
+
+
+def check_ending(path: Path, endings: tuple[str, ...]) -> None:
+    """Refuse a name that promises another kind of file."""
+    if path.suffix.lower() not in endings:
+        raise UddError(f"{path}: the name must end in {' or '.join(endings)}")
 
 
 def add_out(parser: argparse.ArgumentParser, data: tuple[str, ...] = DATA) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from .inputs import add_input, check_early, inputs_of, start_of
-from .options import new
+from .inputs import add_input, check_early, free_of, inputs_of, start_of
+from .options import names, new
 from .output import CommandResult, status_line
 
 
@@ -40,12 +40,8 @@ def run(args: argparse.Namespace) -> CommandResult:
 def options(args: argparse.Namespace) -> dict[str, Any]:
     """Options of `udd.fit` and `udd.discover`."""
     return {
-        "free": _names(args.free),
+        "free": free_of(args),
         "camera": not args.no_camera,
-        "each": _names(getattr(args, "each", None)),
+        "each": None if getattr(args, "each", None) is None else names([args.each]),
         "state0": start_of(args),
     }
-
-
-def _names(text: str | None) -> list[str] | None:
-    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]

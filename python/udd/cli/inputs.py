@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
-from .options import add_disk, add_pendulum, disk, pendulum
+from .option_names import OPTIONS
+from .options import add_disk, add_pendulum, disk, effects, given, names, pendulum, refuse_others
 from .output import is_terminal
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
-    from udd.models import Model
+    from udd.models import Model, Pendulum
     from udd.models.formula_model import FormulaModel
 
 _FILMS = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".3gp"}
@@ -31,6 +32,7 @@ _SIGNATURES = (
     ),
     (8, b"AVI "),
 )
+_SHORTEST, _LONGEST = 1e-3, 100.0  # m, between which a length by the file is one of a pendulum
 _CUT = 0.01  # share of the promised frames that may be missing
 
 
@@ -41,8 +43,8 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         metavar="FILE",
         nargs="+" if several else 1,
         type=Path,
-        help="a film, or a measurement (a table as text, of Excel, phyphox, Tracker, MATLAB, NumPy, HDF5 or "
-        "Parquet: t,Y,Z,beta or t,theta, or t and your model's states)",
+        help="a film, or a measurement (a table as text, CSV from Excel, or a file of phyphox, Tracker, "
+        "MATLAB, NumPy, HDF5 or Parquet: t,Y,Z,beta or t,theta, or t and your model's states)",
     )
     parser.add_argument(
         "--model",
@@ -53,25 +55,38 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         "them says where a state starts that is not seen",
     )
     add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
-    add_pendulum(parser)
+    add_pendulum(parser, "pivot to centre of mass [m] (wins over the file's header)")
     parser.add_argument(
-        "--columns",
+        OPTIONS["columns"],
+        dest="columns",
         help='which column is what, such as "theta=position,t=Time (ms)", or the names of the columns of a '
         'file without a header, such as "t,theta,_" (_: passed over)',
     )
     parser.add_argument(
-        "--inputs",
+        OPTIONS["inputs"],
+        dest="inputs",
         metavar="NAMES",
         help='columns with what drove it, such as "torque" or "u=Motor torque (N m)"',
     )
     parser.add_argument(
-        "--sampling", type=float, metavar="HZ", help="samples a second, of a file without times"
+        OPTIONS["rate"],
+        dest="sampling",
+        type=float,
+        metavar="HZ",
+        help="samples a second, of a file without times",
     )
     parser.add_argument(
-        "--repeated", choices=["first"], help="of rows with the same time keep the first (else: refused)"
+        OPTIONS["repeated"],
+        dest="repeated",
+        choices=["first"],
+        help="of rows with the same time keep the first (else: refused)",
     )
     parser.add_argument(
-        "--part", type=int, metavar="N", help="where the clock jumps back: which of its runs, from 0"
+        OPTIONS["part"],
+        dest="part",
+        type=int,
+        metavar="N",
+        help="where the clock jumps back: which of its runs, from 0",
     )
     add_partial(parser)
     if several:
@@ -81,7 +96,11 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
             help="of several files, what each has a value of its own of (default: W)",
         )
     parser.add_argument(
-        "--free", help="the model's free parameters, such as k0,W (default: k0,k1,k2,W and effects)"
+        "--free",
+        action="append",
+        metavar="NAMES",
+        help="the model's free parameters, such as k0,W; repeatable (default: of a disk k0, k1, k2, W and "
+        "effects, of a pendulum k0, length, inertia and effects, of a model of your own all)",
     )
     parser.add_argument("--no-camera", action="store_true", help="take the camera as faultless")
 
@@ -158,16 +177,19 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 )
             if inputs is None:
                 inputs = [name for name in model.inputs if name in there]
-        measurement = read_measurement(
-            args.file,
-            args.columns,
-            states,
-            inputs=inputs,
-            rate=args.sampling,
-            repeated=args.repeated,
-            part=args.part,
-            **known,
-        )
+        with warnings.catch_warnings():
+            # The line below says of every column which unit became which.
+            warnings.filterwarnings("ignore", r".*: converted .*, as the names of its columns say$")
+            measurement = read_measurement(
+                args.file,
+                args.columns,
+                states,
+                inputs=inputs,
+                rate=args.sampling,
+                repeated=args.repeated,
+                part=args.part,
+                **known,
+            )
         if said := told(measurement.meta.get("columns")):
             print(f"udd: {args.file}: {said}", file=sys.stderr)
         return measurement, None
@@ -208,11 +230,17 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
     if args.model is not None:
         return own_model(args)
     if measurement.kind == "pendulum":
-        if args.pendulum is None:
-            raise UddError(f"{args.file} is a pendulum's record: say its length in m with --pendulum LENGTH")
-        return pendulum(args)
-    if args.pendulum is not None:
-        raise UddError(f"{args.file} is a disk's record, so --pendulum does not apply")
+        return _pendulum(args, measurement)
+    if measurement.kind != "disk":
+        columns = (
+            f"column {measurement.names[0]} is"
+            if len(measurement.names) == 1
+            else (f"columns {', '.join(measurement.names)} are")
+        )
+        raise UddError(
+            f"{args.file}: the {columns} no pendulum's (theta) and no disk's (Y, Z, beta): use --model"
+        )
+    refuse_others(args, "disk", f"{args.file} is a disk's record: ")
     W = _known(args, measurement, "W")
     if W is None:
         raise UddError(
@@ -223,12 +251,27 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
     return disk(args, W, 0.08 if R is None else R)
 
 
+def _pendulum(args: argparse.Namespace, measurement: Measurement) -> Pendulum:
+    """A pendulum; without --pendulum its size is the header's."""
+    refuse_others(args, "pendulum", f"{args.file} is a pendulum's record: ")
+    length, inertia = args.pendulum, args.inertia
+    if length is None:
+        length = _number(args, measurement, "length")
+        if length is not None and not _SHORTEST < length < _LONGEST:
+            length = None  # of a bob in pixels, perhaps
+        inertia = _number(args, measurement, "inertia") if inertia is None else inertia
+        if length is not None:
+            print(f"udd: {args.file}: the pendulum's length is {length:.4g} m by the file", file=sys.stderr)
+    if length is None:
+        raise UddError(f"{args.file} is a pendulum's record: say its length in m with --pendulum LENGTH")
+    return pendulum(args, length, inertia)
+
+
 def own_model(args: argparse.Namespace) -> FormulaModel:
     """The user's own model, from its file."""
     from udd.models.serialization import formula_model_from_dict
 
-    if args.pendulum is not None or args.W is not None:
-        raise UddError("--model says everything of the model: --pendulum and --W do not apply")
+    refuse_others(args, "own")
     data = _own(args)
     data.pop("state0", None)
     return formula_model_from_dict(data)
@@ -247,9 +290,13 @@ def _own(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
-    value = getattr(args, name)
-    if value is None:
-        value = measurement.meta.get(name)
+    value: float | None = getattr(args, name)
+    return _number(args, measurement, name) if value is None else value
+
+
+def _number(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
+    """A number in the file's header."""
+    value = measurement.meta.get(name)
     if value is None:
         return None
     try:
@@ -260,15 +307,30 @@ def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> flo
 
 def check_early(args: argparse.Namespace) -> None:
     """Refuse what no film could mend, before minutes of work are spent on it."""
-    from .options import effects
-
     for one in _each(args):
         _check_device(one)
+    if len(args.files) == 1 and getattr(args, "each", None) is not None:
+        raise UddError("--each takes several files: of one nothing can have a value for each")
+    if all(map(is_film, args.files)):
+        for name in ("columns", "sampling", "repeated", "part"):
+            if getattr(args, name) is not None:
+                raise UddError(f"--{name} does not apply to a film: it is of tables")
     effects(args.effect)
+    free_of(args)
+
+
+def free_of(args: argparse.Namespace) -> list[str] | None:
+    """The parameters that --free names; None where they are the model's own."""
+    if args.free is None:
+        return None
+    free = names(args.free)
+    if not free:
+        raise UddError("--free names no parameter: say one, such as --free k0, or leave it out")
+    return free
 
 
 def _check_device(args: argparse.Namespace) -> None:
-    from udd.models import Disk, Pendulum
+    from udd.models import Disk
 
     if args.model is not None:
         own_model(args)
@@ -276,11 +338,13 @@ def _check_device(args: argparse.Namespace) -> None:
             raise UddError("a film shows a disk: --model takes a table with t and states of the model")
         return
     if args.pendulum is not None:
-        Pendulum(args.pendulum, inertia=args.inertia, g=args.g)
+        refuse_others(args, "pendulum")
+        pendulum(args, args.pendulum, args.inertia)
     elif args.W is not None or is_film(args.file):
+        refuse_others(args, "disk")
         if args.W is None:
             raise UddError(
                 f"the drive speed is not known: say --W in m/s with the film {args.file} "
                 "(--W 0 where the wheels stand still)"
             )
-        Disk(args.W, R=0.08 if args.R is None else args.R, g=args.g)
+        Disk(args.W, R=0.08 if args.R is None else args.R, **given(args, "g"))

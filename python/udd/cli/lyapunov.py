@@ -53,7 +53,9 @@ def add(commands: Any) -> None:
         "equilibrium, undecided) and the period of a periodic orbit; without it the largest exponent only",
     )
     parser.add_argument(
-        "--t", type=float, help="length of the run at most (default 100000, with --spectrum 200000)"
+        "--t",
+        type=float,
+        help="dimensionless time of the run at most (default 100000, with --spectrum 200000)",
     )
     parser.add_argument(
         "--tol", type=float, default=1e-3, help="standard error to reach, of the largest (default 1e-3)"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
-from .options import add_disk, add_pendulum, disk, numbers, pendulum
+from .options import add_disk, add_pendulum, disk, numbers, pendulum, refuse_others
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 def add_models(parser: argparse.ArgumentParser) -> None:
     """Any of the models."""
-    parser.add_argument("--w", type=float, help="drive of the dimensionless equations (DLE)")
-    parser.add_argument("--B", type=float, default=0.0, help="their damping (default 0)")
+    add_dle(parser)
     add_disk(parser, "drive speed of the disk [m/s]")
     parser.add_argument(
         "--ignore-edge", action="store_true", help="follow the disk's equations beyond its edge"
@@ -28,23 +27,38 @@ def add_models(parser: argparse.ArgumentParser) -> None:
     add_pendulum(parser)
 
 
+def add_dle(parser: argparse.ArgumentParser) -> None:
+    """The dimensionless equations."""
+    parser.add_argument("--w", type=float, help="drive of the dimensionless equations (DLE)")
+    parser.add_argument("--B", type=float, help="their damping (default 0)")
+
+
 def model_of(args: argparse.Namespace, varied: Mapping[str, float]) -> Model:
     """The model; a drive that is varied says which, and has its first value."""
-    from udd.models import DLE
-
     drives = {name: getattr(args, name) for name in ("W", "w", "pendulum")}
     for name in ("W", "w"):
         if name in varied:
             drives[name] = varied[name]
-    given = [name for name, value in drives.items() if value is not None]
-    if len(given) != 1:
+    return chosen(args, drives)
+
+
+def chosen(args: argparse.Namespace, drives: Mapping[str, float | None]) -> Model:
+    """The model whose drive or length is given, with its options; those of others are refused."""
+    from udd.models import DLE
+
+    w, length, W = drives["w"], drives["pendulum"], drives["W"]
+    if sum(value is not None for value in drives.values()) != 1:
         raise UddError("say which model: --W (the disk), --w (the DLE) or --pendulum, one of them")
-    if given == ["w"]:
-        return DLE(drives["w"], args.B)
-    if given == ["pendulum"]:
-        return pendulum(args)
-    model = disk(args, drives["W"], 0.08 if args.R is None else args.R)
-    return model.replace(edge="ignore") if args.ignore_edge else model
+    if w is not None:
+        refuse_others(args, "dle")
+        return DLE(w, 0.0 if args.B is None else args.B)
+    if length is not None:
+        refuse_others(args, "pendulum")
+        return pendulum(args, length, args.inertia)
+    assert W is not None
+    refuse_others(args, "disk")
+    model = disk(args, W, 0.08 if args.R is None else args.R)
+    return model.replace(edge="ignore") if getattr(args, "ignore_edge", False) else model
 
 
 def check_component(model: Model, name: str | None) -> None:

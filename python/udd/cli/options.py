@@ -25,8 +25,9 @@ def new(commands: Any, name: str, run: Any, summary: str) -> argparse.ArgumentPa
 def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
     """The disk's parameters."""
     group = parser.add_argument_group("the disk")
-    group.add_argument("--W", type=float, metavar="M/S", help=drive)
-    group.add_argument(
+    speed = group.add_mutually_exclusive_group()
+    speed.add_argument("--W", type=float, metavar="M/S", help=drive)
+    speed.add_argument(
         "--rate",
         dest="W",
         type=_rim_speed,
@@ -34,7 +35,7 @@ def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
         help="instead: at which rate the drive wheel turns, and its radius (default 0.03)",
     )
     group.add_argument("--R", type=float, metavar="M", help="radius [m] (default 0.08)")
-    group.add_argument("--g", type=float, default=9.81, help="gravity [m/s^2] (default 9.81)")
+    group.add_argument("--g", type=float, help="gravity [m/s^2] (default 9.81)")
     for name, unit in (("k0", "m^2/s, fast"), ("k1", "m^2/s, at rest"), ("k2", "m^2, fall with the speed")):
         group.add_argument(f"--{name}", type=float, help=f"friction [{unit}] (default: the paper's)")
     add_effects(parser)
@@ -67,26 +68,60 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
     )
 
 
+#: The options of each kind of model, as they are called in the parsed arguments.
+_TAKEN = {
+    "disk": ("W", "R", "g", "k0", "k1", "k2", "effect", "ignore_edge"),
+    "pendulum": ("pendulum", "inertia", "g", "k0", "effect"),
+    "dle": ("w", "B"),
+    "own": ("model", "inputs"),
+}
+_KINDS = {
+    "disk": "a disk",
+    "pendulum": "a pendulum",
+    "dle": "the DLE (--w)",
+    "own": "a model of your own (--model)",
+}
+
+
+def refuse_others(args: argparse.Namespace, kind: str, where: str = "") -> None:
+    """Refuse options that this kind of model does not take: they would do nothing.
+
+    Raises
+    ------
+    UddError
+        Naming the option and the model; the sentence begins with `where`.
+    """
+    for name in dict.fromkeys(name for taken in _TAKEN.values() for name in taken):
+        value = getattr(args, name, None)
+        if name in _TAKEN[kind] or value is None or value is False or value == []:
+            continue
+        option = "--W (--rate)" if name == "W" else f"--{name.replace('_', '-')}"
+        raise UddError(f"{where}{option} does not apply to {_KINDS[kind]}")
+
+
 def disk(args: argparse.Namespace, W: float, R: float) -> Disk:
     """The disk that the options describe."""
     from udd.models import Disk
 
-    friction = {name: getattr(args, name) for name in ("k0", "k1", "k2") if getattr(args, name) is not None}
-    return Disk(W, R=R, g=args.g, effects=effects(args.effect), **friction)
+    return Disk(W, R=R, effects=effects(args.effect), **given(args, "g", "k0", "k1", "k2"))
 
 
-def pendulum(args: argparse.Namespace) -> Pendulum:
+def pendulum(args: argparse.Namespace, length: float, inertia: float | None) -> Pendulum:
     """The pendulum that the options describe."""
     from udd.models import Pendulum
 
-    k0 = {} if args.k0 is None else {"k0": args.k0}
-    return Pendulum(args.pendulum, inertia=args.inertia, g=args.g, effects=effects(args.effect), **k0)
+    return Pendulum(length, inertia=inertia, effects=effects(args.effect), **given(args, "g", "k0"))
 
 
-def add_pendulum(parser: argparse.ArgumentParser) -> None:
+def given(args: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """The options among these that were given."""
+    return {name: getattr(args, name) for name in names if getattr(args, name) is not None}
+
+
+def add_pendulum(parser: argparse.ArgumentParser, length: str = "pivot to centre of mass [m]") -> None:
     """A pendulum instead."""
     group = parser.add_argument_group("a pendulum instead of the disk")
-    group.add_argument("--pendulum", type=float, metavar="LENGTH", help="pivot to centre of mass [m]")
+    group.add_argument("--pendulum", type=float, metavar="LENGTH", help=length)
     group.add_argument(
         "--inertia", type=float, help="about the pivot, per unit mass [m^2] (default LENGTH^2)"
     )
@@ -119,6 +154,11 @@ def effects(texts: list[str]) -> tuple[Effect, ...]:
         momentum, treatment = choices.get("momentum"), choices.get("treatment")
         result.append(specs[name].make(momentum=momentum, treatment=treatment, **values))
     return tuple(result)
+
+
+def names(texts: list[str]) -> list[str]:
+    """Names given apart or with commas, each once."""
+    return list(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
 
 
 def numbers(texts: list[str], what: str) -> list[float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning, UddError
 
-from .export import OutputFile, checked, save_picture
+from .export import TABLES, OutputFile, checked, save_picture
 from .model_options import add_models, check_component, check_count, model_of
 from .options import new, numbers
 from .output import CommandResult
@@ -42,7 +42,12 @@ def add(commands: Any) -> None:
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
     parser.add_argument("--state", metavar="X,X,X", help="initial state omega,y,z or Omega,Y,Z,beta or ...")
     parser.add_argument(
-        "--out", type=Path, action=OutputFile, metavar="FILE.csv", help="file for the table instead of stdout"
+        "--out",
+        type=Path,
+        action=OutputFile,
+        endings=TABLES,
+        metavar="FILE.csv",
+        help="file for the table instead of stdout",
     )
     parser.add_argument(
         "--picture", type=Path, action=OutputFile, help="picture of the points: .png, .svg or .pdf"

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
-from .export import OutputFile
-from .options import add_disk, add_pendulum, disk, new, numbers, pendulum
+from .export import TABLES, OutputFile
+from .model_options import add_dle, chosen
+from .options import add_disk, add_pendulum, new, numbers
 from .output import CommandResult
 
 if TYPE_CHECKING:
@@ -24,24 +25,28 @@ _MOST = 10_000_000  # rows
 def add(commands: Any) -> None:
     """Add the command."""
     parser = new(commands, "simulate", run, "Run a model from an initial state; the table is CSV.")
-    add_run(parser)
+    add_run(parser, "s; with --w without unit")
+    add_dle(parser)
     parser.add_argument(
-        "--w", type=float, help="drive of the dimensionless equations (DLE) instead of the disk"
+        "--dt", type=float, default=0.01, help="time between rows [s; with --w without unit] (default 0.01)"
     )
-    parser.add_argument("--B", type=float, default=0.0, help="their damping (default 0)")
-    parser.add_argument("--dt", type=float, default=0.01, help="time between rows (default 0.01)")
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
     parser.add_argument(
-        "--out", type=Path, action=OutputFile, metavar="CSV", help="file to write; otherwise standard output"
+        "--out",
+        type=Path,
+        action=OutputFile,
+        endings=TABLES,
+        metavar="CSV",
+        help="file to write (.csv or .txt); otherwise standard output",
     )
     add_pendulum(parser)
 
 
-def add_run(parser: argparse.ArgumentParser) -> None:
+def add_run(parser: argparse.ArgumentParser, unit: str = "s") -> None:
     """What a run of the disk takes."""
     add_disk(parser, "drive speed [m/s]")
-    parser.add_argument("--t", type=float, default=60.0, help="length of the run (default 60)")
+    parser.add_argument("--t", type=float, default=60.0, help=f"length of the run [{unit}] (default 60)")
     parser.add_argument(
         "--state",
         nargs="+",
@@ -103,16 +108,7 @@ def run_model(
 
 
 def _model(args: argparse.Namespace) -> Model:
-    from udd.models import DLE
-
-    given = [name for name in ("W", "w", "pendulum") if getattr(args, name) is not None]
-    if len(given) != 1:
-        raise UddError("say which model to run: --W (the disk), --w (the DLE) or --pendulum, one of them")
-    if given == ["w"]:
-        return DLE(args.w, args.B)
-    if given == ["pendulum"]:
-        return pendulum(args)
-    return disk(args, args.W, 0.08 if args.R is None else args.R)
+    return chosen(args, {name: getattr(args, name) for name in ("W", "w", "pendulum")})
 
 
 def _csv(result: Trajectory) -> Iterator[str]:

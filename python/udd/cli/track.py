@@ -13,7 +13,7 @@ from udd._util.atomic_files import require_writable
 from udd.calibration_items import SWITCHES, Item
 from udd.errors import UddError
 
-from .export import OutputFile
+from .export import PAGES, TABLES, OutputFile, check_ending
 from .inputs import add_partial, is_film, whole
 from .options import new, numbers
 from .output import CommandResult, is_terminal
@@ -68,7 +68,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--bob", metavar="COLOUR", help="the film is one of a plain pendulum with a bob of this colour"
     )
-    parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob")
+    parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob [m]")
     parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
     parser.add_argument(
         "--config",
@@ -107,6 +107,7 @@ def add(commands: Any) -> None:
         "--page",
         type=Path,
         action=OutputFile,
+        endings=PAGES,
         metavar="HTML",
         help="page to write: what was found, and how well",
     )
@@ -131,6 +132,11 @@ def run(args: argparse.Namespace) -> CommandResult:
         return _folder(args)
     if args.out is not None:
         require_writable(args.out)
+        check_ending(args.out, TABLES)
+    if args.overlay is not None:
+        from udd.video.writer import checked_path
+
+        checked_path(args.overlay)
     more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
     said, before = ("", {}) if args.camera is None else _record(args)
@@ -253,8 +259,17 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         options["region"] = numbers([args.region], "--region")
     if args.calibrate is not None:
         options["calibrate"] = _calibrate(args.calibrate)
+    if args.bob is not None:
+        _check_bob(args.bob)
     options |= {"bob": args.bob, "length": args.length}
     return {**options, "refine": False if args.fast else None, "config": args.config}
+
+
+def _check_bob(colour: str) -> None:
+    from udd.markers.layout import NAMED
+
+    if colour not in NAMED:
+        raise UddError(f"--bob must be one of {', '.join(NAMED)}, not {colour}")
 
 
 def _calibrate(said: str) -> dict[str, Any]:

@@ -93,7 +93,7 @@ def read_layout(said: Any) -> Layout:
         if not isinstance(mark, Mapping) or set(mark) != {"at", "colour"}:
             raise TrackError(f"layout: mark {number} must say at = [y, z] and colour, and nothing else")
         places.append(read_place(mark["at"], number))
-        colours.append(_colour(mark["colour"], number))
+        colours.append(_colour(mark["colour"], f"layout: colour of mark {number}"))
     layout = Layout(tuple(places), tuple(colours))
     _check(layout)
     return layout
@@ -111,28 +111,25 @@ def read_place(at: Any, number: int) -> complex:
     return place
 
 
-def _colour(said: Any, number: int) -> tuple[int, int, int]:
+def _colour(said: Any, what: str) -> tuple[int, int, int]:
     if isinstance(said, str):
         if said not in NAMED:
             raise TrackError(
-                f"layout: colour of mark {number} must be one of {', '.join(NAMED)} "
-                f"or three codes [r, g, b], not {said!r}"
+                f"{what} must be one of {', '.join(NAMED)} or three codes [r, g, b], not {said!r}"
             )
         return NAMED[said]
     try:
         red, green, blue = (int(c) for c in said)
     except (TypeError, ValueError):
-        raise TrackError(
-            f"layout: colour of mark {number} must be a name or [r, g, b], not {said!r}"
-        ) from None
+        raise TrackError(f"{what} must be a name or [r, g, b], not {said!r}") from None
     if not all(0 <= c <= 255 for c in (red, green, blue)):
-        raise TrackError(f"layout: the codes of mark {number}'s colour must be from 0 to 255, not {said!r}")
+        raise TrackError(f"{what} must have codes from 0 to 255, not {said!r}")
     return red, green, blue
 
 
 def read_bob(colour: Any) -> Layout:
     """The one mark of a plain pendulum, by its colour's name or sRGB codes."""
-    layout = Layout((1 + 0j,), (_colour(colour, 1),))
+    layout = Layout((1 + 0j,), (_colour(colour, "bob"),))
     if float(np.hypot(*layout.chroma[0])) < PALEST:
         raise TrackError("bob must have a colour: grey, black and white cannot be told from the rest")
     return layout

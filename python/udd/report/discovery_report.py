@@ -387,7 +387,7 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
         "name": Column("", names=True),
         "found": Column("standard deviation at rest", number=True),
         "growth": Column("grows with the speed by", number=True),
-        "stated": Column("the measurement said", number=True),
+        "stated": Column(tables.noise_beforehand(discovery.fit), number=True),
     }
     fitted = "the added effect" if discovery.effects else "the known model"
     braking = "The friction coefficient k(Ω) that was found, with everything that brakes the rotation in it."

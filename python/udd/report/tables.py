@@ -132,8 +132,14 @@ def whiteness(innovations: Sequence[Innovations]) -> list[dict[str, str]]:
     return rows
 
 
+def noise_beforehand(fit: Fit) -> str:
+    """What the noise that a fit begins with is called: a record without standard errors states none."""
+    stated = any(m.sigma is not None for m in fit.measurements)
+    return "the measurement said" if stated else "assumed beforehand"
+
+
 def noise(fit: Fit) -> list[dict[str, str]]:
-    """The noise that was found: channel, at rest, growth with the speed, what the measurement states."""
+    """The noise that was found: channel, at rest, growth with the speed, what it began with."""
     rows = []
     for k, name in enumerate(fit.measurement.names):
         sigma = fit.record.sigma[:, k]

@@ -47,7 +47,8 @@ def as_text(report: Report) -> str:
 
 
 def _head(head: Head) -> Iterator[str]:
-    yield f"{head.verdict}: {_line(head.title)}"
+    # The verdict stands before the title already.
+    yield f"{head.verdict}: {_line(head.title).removeprefix('Nothing is missing: ')}"
     yield from (f"  {_line(one.text)}" for one in head.said)
     yield from (f"  {_number(one)}" for one in head.numbers)
     yield from (f"  {_line(one.text)}" for one in head.notes)

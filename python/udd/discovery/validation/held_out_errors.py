@@ -71,6 +71,14 @@ class Errors:
     run: Array
     run_blocks: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        """In a line: the median errors at the horizons."""
+        unit = "spreads" if self.unit == "spread" else self.unit
+        each = ", ".join(
+            f"{e:.3g} {unit} at {h:.3g} s" for h, e in zip(self.horizons, self.median, strict=True)
+        )
+        return f"<Errors of {len(self.samples)} free runs: median {each or 'none'}>"
+
     @property
     def whole(self) -> float:
         """Root mean square error of the free run over all held-out frames."""

@@ -1,0 +1,46 @@
+"""What the package's functions call an argument, and which option of the command line says it."""
+
+from __future__ import annotations
+
+import re
+
+#: Options of a table that is read, by the argument of `udd.read_measurement` that each one sets.
+OPTIONS = {
+    "columns": "--columns",
+    "inputs": "--inputs",
+    "rate": "--sampling",
+    "repeated": "--repeated",
+    "part": "--part",
+}
+
+# A word of a sentence: what a user wrote of a parameter with such a name, "--effect x:rate=1", is left alone.
+_NAME = f"(?<![^\\s(])({'|'.join(OPTIONS)})"
+_ONE_COLUMN = re.compile(rf"{_NAME}=\{{'(\w+)': \.\.\.\}}")
+_TEXT = re.compile(rf'{_NAME}="([^"]*)"')
+_WORD = re.compile(rf"{_NAME}=(\w+)")
+_BARE = re.compile(r"(?<![^\s(])rate=(?!\S)")
+_REFUSED = "is for files|must be a positive number of samples|must be a whole number from|must look like"
+_SUBJECT = re.compile(rf"{_NAME}(?= (?:{_REFUSED}) )")
+_START = re.compile(r"state0=\{([^}]*)\}")
+
+
+def in_options(message: str) -> str:
+    """A message about a table or a fit with options in the place of Python's arguments.
+
+    Examples
+    --------
+    >>> in_options('repeats the time (repeated="first" keeps the first of such rows)')
+    'repeats the time (--repeated first keeps the first of such rows)'
+    >>> in_options("say how many a second, rate=")
+    'say how many a second, --sampling HZ'
+    >>> in_options("which of them is it, columns={'theta': ...}?")
+    'which of them is it, --columns theta=...?'
+    >>> in_options("say where the motion starts, state0={'v': ...}")
+    'say where the motion starts, "state0": {"v": ...} in the file of --model'
+    """
+    message = _ONE_COLUMN.sub(lambda m: f"{OPTIONS[m[1]]} {m[2]}=...", message)
+    for spelling in (_TEXT, _WORD):
+        message = spelling.sub(lambda m: f"{OPTIONS[m[1]]} {m[2]}", message)
+    message = _BARE.sub(f"{OPTIONS['rate']} HZ", message)
+    message = _SUBJECT.sub(lambda m: OPTIONS[m[1]], message)
+    return _START.sub(lambda m: '"state0": {' + m[1].replace("'", '"') + "} in the file of --model", message)
