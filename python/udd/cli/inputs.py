@@ -179,7 +179,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 inputs = [name for name in model.inputs if name in there]
         with warnings.catch_warnings():
             # The line below says of every column which unit became which.
-            warnings.filterwarnings("ignore", r".*: converted .*, as the names of its columns say$")
+            warnings.filterwarnings("ignore", r".*: converted .*, as its columns say$")
             measurement = read_measurement(
                 args.file,
                 args.columns,
