@@ -55,7 +55,7 @@ def folders(client: TestClient) -> list[Path]:
     ("content", "words"),
     [
         (b"\0\1\2" * 1000, "not a film that can be decoded"),
-        (b"this is no table", "No column t: found this"),
+        (b"this is no table", "No row holds numbers"),
         (b"t,Y,Z,beta\n" + b"".join(b"%f,0.01,0.01,1\n" % (k / 25) for k in range(99)), "drive speed W"),
     ],
 )

@@ -336,7 +336,7 @@ def test_headings_units_count_for_a_model_of_your_own(
     assert main(["fit", str(tmp_path / "a.csv"), "--model", str(tmp_path / "m.json"), "--json"]) == 0
     out, err = capsys.readouterr()
     assert abs(json.loads(out)["parameters"]["a"]["value"] - 16) < 0.1
-    assert "converted t from ms to s, theta from deg to rad" in err
+    assert "read t from Time (ms), ms to s, theta from theta (deg), deg to rad" in err
 
 
 def test_columns_and_inputs_by_name_of_several_kinds_of_files(

@@ -476,7 +476,7 @@ impl Family<1> for Compares {
 #[test]
 fn a_law_with_comparisons_is_refused() {
     let error = Tape::record(&Compares, &[]).unwrap_err();
-    assert!(error.to_string().contains("comparisons"));
+    assert!(error.to_string().contains("comparison"));
 }
 
 /// Expressions of the state, the time and two parameters, without poles near the start: products, quotients and

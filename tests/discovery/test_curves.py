@@ -451,6 +451,7 @@ def test_a_located_curve_is_fitted_in_full():
     assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < found.fit.chi2 / 2 + found.price
 
 
+@pytest.mark.nightly  # so far from the known model it depends on the last bits whether a fit is found
 def test_moves_that_lead_astray_are_halved():
     """Four times as strong a law, of which full Gauss-Newton moves of the curve find no end."""
     case = unmodelled.CASES[0]

@@ -465,7 +465,9 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
             break  # held more tightly, they show even more of them
         if misfits == "noise":
             loose = provisional_fit(measurements, problem, point)
-            loose = _likeliest_noise(loose, problem.schedule[number + 1 :])
+            # Of a pendulum's film a search does not believe what the noise is to better than its geometry.
+            if problem.likeliest or not profile_of(measurements[0].kind).sensor.faithful:
+                loose = _likeliest_noise(loose, problem.schedule[number + 1 :])
             tighter = problem.schedule[loose.level + 1 :]
             if not tighter:
                 return loose
@@ -476,20 +478,22 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
 
 
 def _likeliest_noise(fitted: Fit, tighter: Sequence[tuple[float, ...]]) -> Fit:
-    """The fit of a tighter level with the noise estimated there, as long as that makes the record likelier.
+    """The fit of the last level with the noise estimated there, if that is likelier all the way.
 
     Where the states still follow the frames the noise comes out too small, and a right model would then be
-    found wanting. A right model takes several levels at once.
+    found wanting. A right model takes several levels at once; of one that does not get to the last the noise
+    stays as it was found.
     """
     # Without this a plain disk seen to 0.1 mm and 1 mrad is said to lack something.
-    left = list(tighter)
+    found, left = fitted, list(tighter)
     while left:
         ahead = min(LEAP, len(left))
-        found = next(filter(None, (_likelier(fitted, left[k - 1]) for k in dict.fromkeys((ahead, 1)))), None)
-        if found is None:
-            break
-        fitted, left = found, left[left.index(found.problem.diffusion) + 1 :]
-    return fitted
+        further = (_likelier(found, left[k - 1]) for k in dict.fromkeys((ahead, 1)))
+        one = next(filter(None, further), None)
+        if one is None:
+            return fitted
+        found, left = one, left[left.index(one.problem.diffusion) + 1 :]
+    return found
 
 
 def _likelier(fitted: Fit, diffusion: tuple[float, ...]) -> Fit | None:
