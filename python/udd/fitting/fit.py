@@ -454,7 +454,7 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
     """Solve from loose to tight.
 
     The noise is estimated at the loosest level at which the misfits still show it, where a wrong model does
-    the least harm, and at tighter ones as long as that is likelier. At looser ones the states follow every
+    the least harm, and again at the last one if the model gets there. At looser ones the states follow every
     frame, and noise and model error cannot be told apart.
     """
     as_stated, first = problem.noise, point
