@@ -160,7 +160,7 @@ def discover(
     if len(measurement) == 1:
         measurement, model, state0 = measurement[0], _only(model), _only(state0)
     record = record_of(measurement, model, state0)
-    one: Any = next(iter(model)) if isinstance(model, (list, tuple)) else model
+    one = _first(model)
     given = _given(one, candidates)
     n = len(record.t)
     if n < _SHORTEST:
@@ -303,6 +303,11 @@ def _only(one: Any) -> Any:
     return one[0] if isinstance(one, (list, tuple)) and len(one) == 1 else one
 
 
+def _first(models: Any) -> Any:
+    """The first of a list of models, None of an empty one; a model alone as it is."""
+    return next(iter(models), None) if isinstance(models, (list, tuple)) else models
+
+
 def _thinned(
     measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
 ) -> list[Thinned]:
@@ -312,7 +317,7 @@ def _thinned(
         some = list(measurement)
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
-    one = next(iter(model), None) if isinstance(model, (list, tuple)) else model
+    one = _first(model)
     angles = one.turning if isinstance(one, FormulaModel) else one.angles if isinstance(one, Model) else ()
     return [thinned(own, angles) for own in some]
 

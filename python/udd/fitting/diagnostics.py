@@ -12,7 +12,7 @@ from udd._util.small_units import small_unit
 
 from .input_noise import LEVELS_APART, NoisyInput, diffusion_by_noise, noisy_inputs
 from .parameters import Free
-from .sensor import is_encoder, is_film, lattice, moving, repeats
+from .sensor import geometry_limits, is_film, lattice, moving, repeats
 
 if TYPE_CHECKING:
     from .problem import Fit
@@ -278,8 +278,7 @@ def readings(fit: Fit) -> list[Reading]:
     """The noise of each channel that was seen, and the steps that it was read in."""
     known = fit.model.profile.sensor.units
     sd = fit.noise.sd(fit.record, fit.blurring)
-    film = fit.measurement.sigma is None and fit.model.profile.sensor.faithful > 0
-    film = film and not is_encoder(fit.measurement)
+    limited = geometry_limits(fit.model.profile.sensor, fit.measurement)
     result = []
     for k, name in enumerate(fit.channels):
         own = fit.record.observed[:, k]
@@ -293,7 +292,7 @@ def readings(fit: Fit) -> list[Reading]:
             # A misfit is smaller than an error by what the states follow it.
             errors = (np.square(fit.misfit[own, k]) + fit.misfit_variance[own, k]) / np.square(sd[own, k])
             shown = noise * float(np.sqrt(np.average(errors, weights=fit.noise.weight[own])))
-            trusted = not film or shown > _BETTER * noise
+            trusted = not limited or shown > _BETTER * noise
             result.append(Reading(name, known[k] if known else "", noise, shown, step, memory, trusted))
     return result
 

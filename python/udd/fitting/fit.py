@@ -33,9 +33,8 @@ _FAR = 10.0  # standard deviations from what was stated: the fit is one of somet
 UNEXPLAINED = 2.5
 _OFF = 3.0  # times the drive that was stated: more than what is missing does
 _PACE = 2.0  # times a pendulum's stated ratio of length to inertia
-_FINEST = (
-    1e-3  # of what a camera's noise is taken to be: computed motion has none, and would weigh without bound
-)
+#: Of what a camera's noise is taken to be: computed motion has none, and would weigh without bound.
+_FINEST = 1e-3
 _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
 
 #: What misfits show: the noise, next to nothing where the states follow every frame, or the model's faults.

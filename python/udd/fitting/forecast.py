@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
@@ -33,6 +33,7 @@ from . import Fit, Record, predicted, record_of
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .fit import fit
 from .formula_models import driven
+from .parameters import Free
 from .time_scale import motion_time_scale
 
 __all__ = ["Forecast", "forecast"]
@@ -355,31 +356,16 @@ def _starts(
     """Every member's model, camera and state at the window's end."""
     seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
     (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
-    order = list(own.parameters)
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []
+    free = [f for f in fitted.problem.free if f.film in (None, film)]
     draws = _draws(fitted, scale, rng)
-
-    def drawn() -> tuple[Model, list[float]]:
-        """A model and its camera; numbers that no such model has are drawn again."""
-        for draw in itertools.islice(draws, _TRIES):
-            camera = list(camera_of_fit)
-            values: dict[str, float] = {}
-            for free in fitted.problem.free:
-                if free.film not in (None, film):
-                    continue
-                if free.role == "model":
-                    values[order[free.index]] = draw[free.name]
-                elif free.role == "camera":
-                    camera[free.index] = draw[free.name]
-            try:
-                return own.with_parameters(values), camera
-            except ModelError:
-                continue
-        raise FitError("the fit leaves its parameters so uncertain that a draw of them makes no model")
-
     for _ in range(asked[0]):
-        model, camera = drawn()
+        model, draw = _drawn(own, [f for f in free if f.role == "model"], draws)
+        camera = list(camera_of_fit)
+        for one in free:
+            if one.role == "camera":
+                camera[one.index] = draw[one.name]
         try:
             films = [FilmParameters(list(model.parameters.values()), camera, clock)]
             fixed = EstimatorInput(model, seen, part.states, films, (), diffusion)
@@ -390,6 +376,19 @@ def _starts(
         cameras.append(camera)
         states.append(last[0] + scale * _normal(spread[0], rng))
     return models, cameras, np.array(states)
+
+
+def _drawn(
+    own: Model, free: Sequence[Free], draws: Iterator[Mapping[str, float]]
+) -> tuple[Model, Mapping[str, float]]:
+    """A model from the next draw; numbers that no such model has are drawn again."""
+    order = list(own.parameters)
+    for draw in itertools.islice(draws, _TRIES):
+        try:
+            return own.with_parameters({order[one.index]: draw[one.name] for one in free}), draw
+        except ModelError:
+            continue
+    raise FitError("the fit leaves its parameters so uncertain that a draw of them makes no model")
 
 
 def _draws(fitted: Fit, scale: float, rng: np.random.Generator) -> Iterator[Mapping[str, float]]:

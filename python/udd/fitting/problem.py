@@ -19,7 +19,7 @@ from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .noise import Noise, colour
 from .parameters import Free
 from .record import Record
-from .sensor import is_encoder
+from .sensor import geometry_limits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -242,8 +242,7 @@ class Fit:
 
         A pendulum's film is not taken for better than its geometry, which many are.
         """
-        own = self.measurement
-        assumed = self.model.profile.sensor.faithful > 0 and own.sigma is None and not is_encoder(own)
+        assumed = geometry_limits(self.model.profile.sensor, self.measurement)
         return self.scatter if assumed else max(self.scatter, 1.0)
 
     def _colour(self, before: Fit) -> float:

@@ -11,6 +11,7 @@ from scipy.optimize import nnls
 
 from udd.measurement import Measurement
 from udd.models import profile_of
+from udd.models.profile import SensorProfile
 
 Array = NDArray[np.float64]
 
@@ -191,6 +192,11 @@ def is_encoder(measurement: Measurement) -> bool:
         return False
     noise, step = reads(measurement.values[measurement.seen, 0])
     return step > 0 and noise <= step and not (_is_round(step) or _is_round(math.degrees(step)))
+
+
+def geometry_limits(sensor: SensorProfile, measurement: Measurement) -> bool:
+    """Whether frames are counted on for no more than a film's geometry, as nothing else is known of them."""
+    return sensor.faithful > 0 and measurement.sigma is None and not is_encoder(measurement)
 
 
 def _is_round(value: float) -> bool:

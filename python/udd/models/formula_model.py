@@ -124,7 +124,7 @@ class FormulaModel(Model):
         if not isinstance(parameters, Mapping | None):
             raise ModelError(f"parameters must be a table of names and values, not {parameters!r}")
         given = {} if parameters is None else {str(name): value for name, value in parameters.items()}
-        values = tuple((name, number(f"the parameter {name!s:.80}", value)) for name, value in given.items())
+        values = tuple((name, number(f"the parameter {name:.80}", value)) for name, value in given.items())
         for name in given:
             if not name.isidentifier():
                 raise ModelError(f"a parameter's name must be a single word, not {name!r}")

@@ -28,7 +28,8 @@ def camera_shows(known: Fit, found: Fit) -> list[str] | None:
     -------
     list of str or None
         Names of the effects that are not needed once the camera's parameters are free: without them a
-        camera explains the data better than they did.
+        camera explains the data better than they did. None of them where it only may, as where a formula was
+        found.
     """
     more = _fixed(known)
     there = {e.name for e in known.model.effects}
