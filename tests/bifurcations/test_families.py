@@ -7,6 +7,7 @@ import pytest
 from scipy import integrate, optimize, special
 
 import udd
+from udd.bifurcations.branch_switching import doubled
 from udd.errors import ModelError
 
 ENERGY = "(u^2 + v^2 + x^2 + y^2)/2 + x^2*y - y^3/3"
@@ -112,6 +113,12 @@ def test_what_is_not_kept_is_refused() -> None:
     assert born.values[0] == pytest.approx(2.0 * point.value, abs=0.1)
     # One of a family: how long it lasts is nothing that has a bound.
     assert np.isnan(orbit.period_error)
+    swing = udd.periodic_orbit(udd.Model(["x", "v"], ["v", "-sin(x)"]), [1.0, 0.0])
+    assert np.isnan(swing.period_error)
+    # Of two rounds the map keeps two things to first order: energy, and what bifurcates.
+    curve, base, _ = doubled(point._curve, point._place)
+    slope = curve.flow.size * np.array([0.0, curve.nodes(base)[0][1], 0.0, curve.nodes(base)[0][3]])
+    assert abs(curve.free @ slope) == pytest.approx(np.linalg.norm(slope), rel=1e-9)
 
 
 def test_pairs_of_multipliers_leave_the_unit_circle_where_another_integrator_has_it() -> None:

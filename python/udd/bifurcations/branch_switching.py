@@ -121,6 +121,9 @@ def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbit
     new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
     base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
     new.fix_phase(base)
+    if isinstance(new, FamilyCurve) and isinstance(curve, FamilyCurve):
+        # Two rounds have the multiplier 1 twice here: one round tells what is kept from what bifurcates.
+        new.free = curve.slope(u)
     row = new.pack(away, 0.0, 0.0)
     return new, base, row / np.linalg.norm(row)
 

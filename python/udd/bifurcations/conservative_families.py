@@ -15,7 +15,7 @@ from .condensation import CyclicEquations
 from .flow_map import Floats, FlowMap
 from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["PERIOD", "Conserved", "FamilyCurve"]
+__all__ = ["PERIOD", "Conserved", "FamilyCurve", "in_a_family"]
 
 PERIOD = "period"
 """What a family is followed over where no conserved quantity is given."""
@@ -23,6 +23,7 @@ PERIOD = "period"
 _KEPT = 1e-9  # of the sizes of its terms: a rate of change below is zero
 _PROBES = 16
 _FREE = 1e-5  # a singular value below this part of the largest is that of the family
+_EXACT = 1e-11  # below this part it is zero but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,27 @@ class Conserved:
         found = _core.expansion(self.law, 0.0, flow.full(x).tolist(), False)
         slope: Floats = found["by_state"][0, flow.kept]
         return float(found["rate"][0]), slope
+
+
+def kept_by_the_map(curve: PeriodicOrbitCurve, u: Floats) -> tuple[Floats, Floats]:
+    """Left singular vectors (r, r) of the closing map less one beside the flow, and singular values (r,).
+
+    A value of zero is of something kept, along whose gradient its vector points: the left eigenvector of the
+    multiplier 1 across the flow.
+    """
+    size, start = curve.flow.size, curve.nodes(u)[0]
+    closing = curve.flow.scaled(curve.monodromy(u))
+    flow = curve.rate_at(curve.values_at(u), start) * curve.clock / size
+    left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(curve.flow.dim), flow]))
+    return left, sizes
+
+
+def in_a_family(curve: PeriodicOrbitCurve, u: Floats) -> bool:
+    """Whether cycles near by solve the equations as well, at the same parameters, to rounding."""
+    if curve.flow.forcing is not None or isinstance(curve, FamilyCurve):
+        return False
+    _, sizes = kept_by_the_map(curve, u)
+    return bool(sizes[-1] < _EXACT * sizes[0])
 
 
 def _plain(model: Model) -> dict[str, float]:
@@ -130,8 +152,13 @@ class FamilyCurve(PeriodicOrbitCurve):
         if self.conserved is not None:
             found: Floats = self.conserved.at(self.flow, start)[1] * size
             return found / (float(np.linalg.norm(found)) or 1.0)
-        free, _ = self._kept(u)
-        return -free if self.free is not None and free @ self.free < 0.0 else free
+        kept, sizes = kept_by_the_map(self, u)
+        if self.free is None:
+            return kept[:, -1]
+        # Near a bifurcation the multiplier 1 comes twice as often: what is nearest to what was kept before.
+        left = kept[:, np.append(sizes[:-1] < _FREE * sizes[0], True)]
+        found = left @ (left.T @ self.free)
+        return found / np.linalg.norm(found)
 
     def require_one(self, u: Floats) -> None:
         """Refuse cycles that do not come in a family of one dimension.
@@ -140,20 +167,12 @@ class FamilyCurve(PeriodicOrbitCurve):
         ------
         ModelError
         """
-        _, sizes = self._kept(u)
+        _, sizes = kept_by_the_map(self, u)
         kept = int((sizes < _FREE * sizes[0]).sum())
         if kept == 0:
             raise ModelError("no quantity is kept: cycles of this model do not come in families")
         if kept > 1:
             raise ModelError(f"{kept} quantities are kept, or the cycles near by all have the same period")
-
-    def _kept(self, u: Floats) -> tuple[Floats, Floats]:
-        """What the map keeps, a left eigenvector of the multiplier 1 across the flow; how singular it is."""
-        size, start = self.flow.size, self.nodes(u)[0]
-        closing = self.flow.scaled(self.monodromy(u))
-        flow = self.rate_at(self.values_at(u), start) * self.clock / size
-        left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(self.flow.dim), flow]))
-        return left[:, -1], sizes
 
     def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
         """Scaled gaps between the pieces and the phase, and their derivatives."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from udd.errors import IntegrationError
 
+from .conservative_families import in_a_family
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, natural_constraint, nearest_of_family, newton_corrector
+from .pseudo_arclength import CorrectorFailed, natural_constraint, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
 
 COARSE = 100.0  # by this factor runs are less accurate where the error is told
@@ -22,13 +23,15 @@ def rounding_of(value: Any) -> Any:
 
 
 def period_error_of(curve: PeriodicOrbitCurve, u: Floats) -> float:
-    """A bound of the error of a cycle's period: how far it moves when runs are less accurate."""
+    """A bound of the error of a cycle's period: how far it moves when runs are less accurate.
+
+    One of a family has none, unless its period or energy is held: less accurate runs find another.
+    """
+    if in_a_family(curve, u):
+        return float("nan")
     known, coarse, row = curve.period(u), replace(curve, loose=COARSE), natural_constraint(u)
     try:
-        try:
-            moved = coarse.period(newton_corrector(coarse, u, row))
-        except CorrectorFailed:
-            moved = coarse.period(nearest_of_family(coarse, u, row))
+        moved = coarse.period(newton_corrector(coarse, u, row))
     except (CorrectorFailed, IntegrationError):
         return float("nan")
     return float(abs(moved - known) + rounding_of(known))

@@ -25,7 +25,6 @@ Complex = NDArray[np.complex128]
 Found = TypeVar("Found")
 
 _ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square root of rounding
-_FAMILY = 1e-6  # of its period: by more no inaccuracy moves a neutral cycle
 
 
 class FoundList(list[Found]):
@@ -141,14 +140,15 @@ class PeriodicOrbit:
 
     @cached_property
     def period_error(self) -> float:
-        """A bound of the period's error: how far it moves when runs are a hundred times less accurate."""
+        """A bound of the period's error: how far it moves when runs are a hundred times less accurate.
+
+        NaN of a cycle that is one of a family, unless its period or energy is held.
+        """
         from .error_bounds import period_error_of
 
         if self._curve is None or self._unknowns is None:
             return float("nan")
-        error = period_error_of(self._curve, self._unknowns)
-        # In a family less accurate runs find another cycle, unless its period or energy is held.
-        return error if error < _FAMILY * self.period or not self.neutral else float("nan")
+        return period_error_of(self._curve, self._unknowns)
 
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
