@@ -74,6 +74,11 @@ class Step:
     alternatives: list[Alternative]
     price: float
 
+    @property
+    def is_curve(self) -> bool:
+        """Whether it is a curve without a formula."""
+        return self.curve is not None and self.candidates[0].title == self.curve.title
+
 
 @dataclass(frozen=True)
 class SearchState:

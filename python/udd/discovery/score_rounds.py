@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_curves
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
@@ -17,7 +16,8 @@ from udd.models.profile import Coordinate
 from .thresholds import ALPHA
 from .trial_fits import price_of
 
-_LEADS = 2.0  # times the gain of the library's best
+_LEADS = 2.0  # times the gain of the library's best; no two of its effects gain more together
+_LEADS_OFF_TRACK = 1.5  # where wrong effects of the library take minutes to fit
 _SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
 
 
@@ -32,8 +32,8 @@ class ScoreRound:
     curves : list of Curve
         The likeliest first.
     comparisons : int
-        How many scores could have been the best, around all fits that were tried: the number of tests, by
-        which Bonferroni's correction multiplies each probability.
+        How many scores could have been the best: the number of tests, by which Bonferroni's correction
+        multiplies each probability.
     """
 
     fit: Fit
@@ -56,18 +56,19 @@ class ScoreRound:
         faults = self.fit.faults
         return [s for s in self.usable() if s.p * self.comparisons < ALPHA and s.chi2 > faults]
 
+    def passing_curves(self) -> list[Curve]:
+        """The curves that neither chance nor a film's faults explain."""
+        return [c for c in self.curves if c.p * self.comparisons < ALPHA and c.chi2 > self.fit.faults]
+
     def nats(self, scored: Scored) -> float:
         """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
         return (scored.chi2 - scored.candidate.parameters * price_of(self.fit)) / 2
 
-    def strongest(self) -> float:
-        """The gain of the best explanation."""
-        return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
-
     def curve_leads(self) -> bool:
         """Whether a curve over one coordinate gains far more than every effect of the library."""
         best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
-        return best > _LEADS * max(self._known(), 0.0) + 3 * EVIDENCE_MARGIN
+        leads = _LEADS_OFF_TRACK if self.off_track else _LEADS
+        return best > leads * max(self._known(), 0.0) + EVIDENCE_MARGIN
 
     def _known(self) -> float:
         """The gain of the library's best."""
@@ -79,13 +80,12 @@ def score_round(
     given: Sequence[Candidate] = (),
     watched: Callable[[Callable[[Fit], ScoreRound]], Callable[[Fit], ScoreRound]] = lambda work: work,
 ) -> ScoreRound:
-    """Score every candidate and curve around the fit and, where it explains little, around a looser one.
+    """Score every candidate and curve around the fit or, where that explains little, around a looser one.
 
-    A chaotic model that is wrong shows what it lacks only where it is held loosely; weak effects show
-    where it is held tightly. The scores with the stronger explanation count. Where the model needs more model
-    error than the schedule has, what scores high around a tighter fit need not be what is missing: those
-    around the looser one alone count then. `given` are the user's own candidates; `watched` makes work that
-    does not begin once a search's time is up.
+    A chaotic model that is wrong shows what it lacks only where it is held loosely: what scores high around a
+    tighter fit need not be what is missing. That one counts where the looser one shows nothing, as of few
+    data, unless it is off track. `given` are the user's own candidates; `watched` makes work that does not
+    begin once a search's time is up.
     """
 
     def score(current: Fit) -> ScoreRound:
@@ -97,9 +97,11 @@ def score_round(
         return ScoreRound(current, scanned, curves.curves, comparisons)
 
     looser = with_larger_model_error(fitted, _SCATTER)
-    fits = [looser] if beyond_schedule(looser) else dict.fromkeys((fitted, looser))
-    found = parallel_map(watched(score), fits)
-    return replace(max(found, key=ScoreRound.strongest), comparisons=sum(one.comparisons for one in found))
+    found = watched(score)(looser)
+    if looser is fitted or found.off_track or found.passing() or found.passing_curves():
+        return found
+    tight = watched(score)(fitted)
+    return replace(tight, comparisons=found.comparisons + tight.comparisons)
 
 
 def with_surfaces(scores: ScoreRound) -> ScoreRound:

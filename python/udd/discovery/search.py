@@ -38,6 +38,7 @@ from .trial_fits import fitted_ones, needed_in, of_library
 _NEAREST = 4  # of them where none passes, to tell what they would do
 _MOST = 3  # effects added
 _CURVES = 2  # of the likeliest, located
+_LIKELY = 0.5  # of the evidence for the likeliest, which they have at least
 
 
 def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
@@ -105,10 +106,8 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
             rounds.append(scores)
-            # What the library has been asked for already, or what is strong, and what a curve still says far
-            # more of than anything in it, is no bent view of something known.
-            leads = scores.curve_leads() and (accepted or scores.off_track)
-            tried = scores.curves if leads else []
+            # What a curve says far more of than anything in the library is no bent view of something known.
+            tried = scores.passing_curves() if scores.curve_leads() else []
             found = self._located(states[-1], scores) if tried else None
             found = found or self._known(states[-1], scores)
             if found is None:
@@ -120,7 +119,10 @@ class Search:
             accepted.append(found[0])
             states.append(found[1])
             self._backward_elimination(accepted, states, rounds)
-            states[-1] = self._released(states[-1])
+            bent, states[-1] = states[-1], self._released(states[-1])
+            if states[-1] is not bent and accepted[-1].is_curve:
+                # What was held had bent it, which hides its formula.
+                self._relocated(len(accepted) - 1, accepted, states, rounds)
             # What takes another's place may give way to it again: then the search goes in circles.
             titles = tuple(c.title for step in accepted for c in step.candidates)
             if titles in known:
@@ -161,14 +163,15 @@ class Search:
             for c in step.candidates
         ]
 
-    def _released(self, state: SearchState) -> SearchState:
+    def _released(self, state: SearchState, anew: bool = False) -> SearchState:
         """With everything free that the user leaves free, unless that goes astray.
 
-        A camera may well be farther off than is usual: held-out data that are foretold better beyond doubt
-        with what it came to say that it is.
+        Where all is free already it stays as it is, unless the noise is to be estimated `anew`. A camera may
+        well be farther off than is usual: held-out data that are foretold better beyond doubt with what it
+        came to say that it is.
         """
         # Without this a strong cubic drag is followed by an eccentric mass and a curve that are not there.
-        if self.tests.all_are_free(state.part):
+        if self.tests.all_are_free(state.part) and not anew:
             return state
         try:
             part, whole = both(partial(released_anew, free=self.tests.free), state.part, state.whole)
@@ -237,14 +240,13 @@ class Search:
         self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
     ) -> tuple[Step, SearchState] | None:
         """The best curve or surface that passes; of some those that would have been chosen were tried."""
-        faults = scores.fit.faults
 
         def best(curves: Sequence[Curve]) -> list[Curve]:
-            shown = [c for c in curves if c.p * scores.comparisons < ALPHA and c.chi2 > faults]
-            return states_first(shown)[:_CURVES]
+            most = max((c.evidence for c in curves), default=0.0)
+            return states_first([c for c in curves if c.evidence > _LIKELY * most])[:_CURVES]
 
         known = [c.name for c in best(tried)]
-        likely = [c for c in best(scores.curves) if c.name not in known]
+        likely = [c for c in best(scores.passing_curves()) if c.name not in known]
         trials = Proposals(current.part, scores, self.clock).curves(likely)
         return self.tests.best(current, trials, scores)
 
@@ -263,16 +265,26 @@ class Search:
                 return
             title = accepted[k].candidates[0].title
             self.tell(f"trying {last.curve.title} instead of {title}")
-            before = states[k]
-            from_there = started_at(before.part, states[-1].part)
-            trials = Proposals(from_there, rounds[k], self.clock).curves([last.curve])
-            found = self.tests.best(before, trials, rounds[k])
-            if found is None:
-                continue
-            found = found[0], self._released(found[1])
-            if _cheaper(found, accepted[k:], states[k], states[-1]):
-                accepted[k:], states[k + 1 :], rounds[k + 1 :] = [found[0]], [found[1]], []
+            if self._relocated(k, accepted, states, rounds):
                 return
+
+    def _relocated(
+        self, k: int, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
+    ) -> bool:
+        """Locate the last curve again in the place of all steps from a number on; whether that is better."""
+        before, curve = states[k], accepted[-1].curve
+        if curve is None:
+            return False
+        from_there = started_at(before.part, states[-1].part)
+        trials = Proposals(from_there, rounds[k], self.clock).curves([curve])
+        found = self.tests.best(before, trials, rounds[k])
+        if found is None:
+            return False
+        found = found[0], self._released(found[1], anew=True)
+        if not _cheaper(found, accepted[k:], before, states[-1]):
+            return False
+        accepted[k:], states[k + 1 :], rounds[k + 1 :] = [found[0]], [found[1]], []
+        return True
 
     def _leave_out(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
         """Leave out effects of the library that chance explains beside those found after them.

@@ -333,16 +333,17 @@ def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) ->
 
 
 def started_at(fitted: Fit, last: Fit, seen: NDArray[np.bool_] | None = None) -> Fit:
-    """A fit to be gone on from where another one ended, of more effects perhaps.
+    """A fit to be gone on from where another one ended, of more effects perhaps, with as much free as there.
 
     `seen` is the part of the data that it was of, if not of all. The states of the rest start as they were
     read.
     """
     known = len(fitted.model.parameters)
+    free = tuple(f for f in last.problem.free if f.role != "model" or f.index < known)
     sets = tuple(FilmParameters(values[:known], camera, clock) for values, camera, clock in last.point.sets)
     states = fitted.record.states.copy()
     states[slice(None) if seen is None else seen] = last.states
-    return replace(fitted, point=Point(states, sets))
+    return replace(fitted, problem=_with_free(fitted, free), point=Point(states, sets))
 
 
 def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], goal: Goal = ANY) -> Fit:
