@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import udd
+import unmodelled
 from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.look_alikes import look_alikes
@@ -116,6 +117,49 @@ def test_scores_around_a_looser_fit_name_what_a_model_far_astray_lacks() -> None
     best = [s for s in scores.usable() if s.candidate.effect.name == "radial_slip"]
     others = [s for s in scores.usable() if s.candidate.effect.name != "radial_slip"]
     assert best[0].chi2 > 2 * others[0].chi2
+
+
+def stronger(law: unmodelled.Law) -> unmodelled.Law:
+    return lambda *at: tuple(3 * v for v in law(*at))  # type: ignore[return-value]
+
+
+LEADING = [case for case in unmodelled.CASES if case.name in ("five waves", "one-sided bump")]
+
+
+@pytest.mark.parametrize(
+    ("law", "leads"),
+    [
+        *((stronger(case.law), True) for case in LEADING),
+        (lambda t, o, y, z, b: (-0.01 * abs(o) * o, 0.0, 0.0), False),
+        (lambda t, o, y, z, b: (0.0, 0.0, -0.5 * z), False),
+    ],
+    ids=[*(case.name for case in LEADING), "quadratic drag", "slip"],
+)
+def test_a_curve_leads_where_the_library_has_no_law_like_it(law: unmodelled.Law, leads: bool) -> None:
+    fitted = udd.fit(unmodelled.record(law, 1, 40.0), udd.Disk(0.045))
+    assert score_round(fitted).curve_leads() == leads
+
+
+def test_what_leads_is_located_before_the_library_is_fitted() -> None:
+    (waves,) = (case for case in unmodelled.CASES if case.name == "five waves")
+    told: list[str] = []
+    found = udd.discover(
+        unmodelled.record(stronger(waves.law), 1, 40.0), udd.Disk(0.045), progress=told.append
+    )
+    assert next(line for line in told if line.startswith("trying")) == "trying torque as a function of beta"
+    (effect,) = found.effects
+    assert effect.title == "torque = a * sin(5 * beta)"
+    assert effect.effect.parameters["a"] == pytest.approx(0.06, rel=0.02)
+
+
+def test_a_fit_goes_on_from_another_with_as_much_free() -> None:
+    measured = filmed(udd.Disk(0.07), 20.0)
+    held = fit_record(measured, record_of(measured), udd.Disk(0.07), ["k0"], camera=False, search=True)
+    all_free = udd.fit(measured, udd.Disk(0.07)).problem.free
+    more = extend(released(held, all_free), [udd.effects.constant_torque()], [0.0])
+    back = started_at(held, more)
+    assert {f.name for f in back.problem.free} == set(more.parameters) - {"constant_torque.c"}
+    assert reduce_model_error(back.measurements, back.problem, back.point, back.problem.schedule).converged
 
 
 @pytest.fixture(scope="module")
