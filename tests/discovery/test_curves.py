@@ -524,3 +524,13 @@ def test_a_surface_is_added_and_refitted():
     inertia = with_it.R**2 / 2 + state[1] ** 2 + state[2] ** 2
     change = with_it.rates(0.0, state)[0] - udd.Disk(W).rates(0.0, state)[0]
     assert change * inertia == pytest.approx(located.curve.values(state[1], state[2]), rel=1e-9)
+
+
+def test_a_velocity_is_scored_with_its_momentum_and_without():
+    def law(t, o, y, z, b):
+        return 0.0, 0.0, 2.0 * float(unmodelled.grip(z))
+
+    found = scan_curves(udd.fit(unmodelled.record(law, 1, 40.0), udd.Disk(W)))
+    first = found.curves[0]
+    other = next(c for c in found.curves[1:] if c.kin == first.kin)
+    assert {first.slot.momentum, other.slot.momentum} == {"constraint", "consistent"}

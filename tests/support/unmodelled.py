@@ -19,7 +19,7 @@ K0, K1, K2, R, G = 0.012, 0.103, 0.055, 0.08, 9.81
 
 @dataclass(frozen=True)
 class Case:
-    """A law and where it ought to be found."""
+    """A law and where it ought to be found: first where it is, then where a weak one may as well be."""
 
     name: str
     law: Law
@@ -68,7 +68,12 @@ def squeeze(excess: np.ndarray) -> np.ndarray:
 
 
 CASES = (
-    Case("grip loss", _vertical(lambda o, y, z, b: float(grip(z))), (("vertical (constraint)", "Z"),), grip),
+    Case(
+        "grip loss",
+        _vertical(lambda o, y, z, b: float(grip(z))),
+        (("vertical (constraint)", "Z"), ("vertical (consistent)", "Z")),
+        grip,
+    ),
     Case(
         "friction to 1.5",
         _torque(lambda o, y, z, b: float(rough_air(o))),
@@ -79,7 +84,7 @@ CASES = (
     Case(
         "one-sided bump",
         lambda t, o, y, z, b: (0.0, float(bump(z)), 0.0),
-        (("lateral (constraint)", "Z"),),
+        (("lateral (constraint)", "Z"), ("lateral (consistent)", "Z")),
         bump,
     ),
 )

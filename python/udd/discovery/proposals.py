@@ -105,13 +105,19 @@ class Proposals:
         return self._together(likely), number
 
     def curves(self, likely: list[Curve]) -> list[TrialFit]:
-        """Curves, as splines and by short formulas."""
-        trials: list[TrialFit] = []
+        """Curves, as splines and by short formulas.
+
+        A velocity with its momentum and without is tried by each other's formulas too: as splines they look
+        nearly the same, and a formula may be found for one of them only.
+        """
         self._trying([curve.title for curve in likely])
-        for located in fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely)):
-            trials.append(located)
-            if located.curve is not None:
-                trials += self._written(located.curve, self._formulas(located.curve), self._beside([located]))
+        located = fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely))
+        written = [(one, one.curve, self._formulas(one.curve)) for one in located if one.curve is not None]
+        trials: list[TrialFit] = []
+        for one, curve, own in written:
+            kin = [f for _o, c, formulas in written if c.kin == curve.kin for f in formulas]
+            forms = {f.text: f for f in (*own, *kin)}
+            trials += [one, *self._written(curve, list(forms.values())[:_FORMULAS], self._beside([one]))]
         return trials
 
     def tried(self, some: list[Scored]) -> list[TrialFit]:

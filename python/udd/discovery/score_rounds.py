@@ -11,7 +11,6 @@ from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
 from udd.fitting import Fit, beyond_schedule, with_larger_model_error
-from udd.models.profile import Coordinate
 
 from .thresholds import ALPHA
 from .trial_fits import price_of
@@ -115,17 +114,13 @@ def states_first(curves: list[Curve]) -> list[Curve]:
     """The likeliest first, but after those as likely what stands for states in a roundabout way.
 
     Curves over time take up anything slow, and curves over the direction can do much of what those over Y
-    and Z do.
+    and Z do. A velocity without its momentum comes before the same with it.
     """
 
     # Without this an uneven grip is written as a function of atan2(Y, Z), not of Y.
-    def prior_penalty(own: Coordinate) -> float:
-        return (
-            2 * EVIDENCE_MARGIN
-            if own.name == "t"
-            else EVIDENCE_MARGIN
-            if own.angle and own.text != own.name
-            else 0.0
-        )
+    def prior_penalty(curve: Curve) -> float:
+        own = curve.coordinates[0]
+        roundabout = 2 if own.name == "t" else 1 if own.angle and own.text != own.name else 0
+        return EVIDENCE_MARGIN * (roundabout + 0.5 * (curve.slot.momentum == "consistent"))
 
-    return sorted(curves, key=lambda c: -c.evidence + prior_penalty(c.coordinates[0]))
+    return sorted(curves, key=lambda c: -c.evidence + prior_penalty(c))

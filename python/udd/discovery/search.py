@@ -243,7 +243,12 @@ class Search:
 
         def best(curves: Sequence[Curve]) -> list[Curve]:
             most = max((c.evidence for c in curves), default=0.0)
-            return states_first([c for c in curves if c.evidence > _LIKELY * most])[:_CURVES]
+            one_each: dict[tuple[str, ...], list[Curve]] = {}
+            for curve in states_first([c for c in curves if c.evidence > _LIKELY * most]):
+                one_each.setdefault(curve.kin, []).append(curve)
+            # A velocity with its momentum and without: which of them it is a full fit says.
+            groups = list(one_each.values())[:_CURVES]
+            return [*groups[0], *(curve for curve, *_kin in groups[1:])] if groups else []
 
         known = [c.name for c in best(tried)]
         likely = [c for c in best(scores.passing_curves()) if c.name not in known]

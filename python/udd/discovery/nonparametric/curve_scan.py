@@ -87,6 +87,11 @@ class Curve:
         """Slot, momentum and coordinates, to compare by."""
         return (self.slot.title, *(c.name for c in self.coordinates))
 
+    @property
+    def kin(self) -> tuple[str, ...]:
+        """Slot and coordinates: what is the same with its momentum and without."""
+        return _kin(self.slot, self.coordinates)
+
     def design(self, *x: Array) -> Array:
         """The basis functions at places, (..., k)."""
         designs = [s.design(np.asarray(v, dtype=np.float64)) for s, v in zip(self.splines, x, strict=True)]
@@ -187,10 +192,18 @@ def scan_curves(
     # near the best, the second need not be tried.
     first = [(slot, own) for slot, own in groups if slot.momentum != "consistent"]
     curves = sorted(_score(found, first), key=lambda c: -c.evidence)
-    near = {(c.slot.name, c.coordinates) for c in curves[:_FEW]}
-    second = [g for g in groups if g not in first and (not first or (g[0].name, g[1]) in near)]
+    near = {c.kin for c in curves[:_FEW]}
+    second = [
+        (slot, own)
+        for slot, own in groups
+        if slot.momentum == "consistent" and (not first or _kin(slot, own) in near)
+    ]
     curves = sorted(curves + _score(found, second), key=lambda c: -c.evidence)
     return CurveScan(curves, len(groups))
+
+
+def _kin(slot: Slot, own: tuple[Coordinate, ...]) -> tuple[str, ...]:
+    return (slot.name, *(c.name for c in own))
 
 
 def _score(found: Responses, groups: Sequence[tuple[Slot, tuple[Coordinate, ...]]]) -> list[Curve]:
