@@ -152,6 +152,15 @@ def test_what_leads_is_located_before_the_library_is_fitted() -> None:
     assert effect.effect.parameters["a"] == pytest.approx(0.06, rel=0.02)
 
 
+@pytest.mark.parametrize("momentum", ["consistent", "constraint"])
+def test_a_narrow_bump_is_told_with_its_momentum_or_without(momentum: str) -> None:
+    law = udd.effects.formula("lateral", "a*exp(-((Y - 0.014)/0.0054)^2)", a=0.02, momentum=momentum)
+    found = udd.discover(filmed(udd.Disk(0.03, effects=[law]), 30.0), udd.Disk(0.03))
+    (effect,) = found.effects
+    assert effect.title == f"lateral ({momentum}) = a * exp((-1) * (b * (c + Y))^2)"
+    assert found.verdict == "effect identified"
+
+
 def test_a_fit_goes_on_from_another_with_as_much_free() -> None:
     measured = filmed(udd.Disk(0.07), 20.0)
     held = fit_record(measured, record_of(measured), udd.Disk(0.07), ["k0"], camera=False, search=True)
