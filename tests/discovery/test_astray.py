@@ -152,6 +152,21 @@ def test_what_leads_is_located_before_the_library_is_fitted() -> None:
     assert effect.effect.parameters["a"] == pytest.approx(0.06, rel=0.02)
 
 
+def test_what_dies_down_slowly_is_scored_where_it_is_held_tightly() -> None:
+    """A cubic drag on a pendulum, which shows over minutes: a model held loosely hardly tells it."""
+    truth = udd.Pendulum(0.65, k0=0.002, effects=[udd.effects.cubic_drag(c=0.003)])
+    t = np.arange(0.0, 120.0, 0.05)
+    theta = udd.simulate(truth, t, [0.0, 0.8]).state[:, 1]
+    read = theta + 2.5e-3 * np.random.default_rng(1).standard_normal(len(t))
+    known = udd.Pendulum(0.65, k0=0.004)
+    measured = udd.Measurement(t, {"theta": read})
+    fitted = fit_record(measured, record_of(measured), known, search=True)
+    assert fitted.scatter > 3.0
+    scores = score_round(fitted)
+    assert scores.fit is fitted
+    assert scores.usable()[0].candidate.effect.name in ("quadratic_drag", "cubic_drag")
+
+
 @pytest.mark.parametrize("momentum", ["consistent", "constraint"])
 def test_a_narrow_bump_is_told_with_its_momentum_or_without(momentum: str) -> None:
     law = udd.effects.formula("lateral", "a*exp(-((Y - 0.014)/0.0054)^2)", a=0.02, momentum=momentum)

@@ -63,6 +63,10 @@ class ScoreRound:
         """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
         return (scored.chi2 - scored.candidate.parameters * price_of(self.fit)) / 2
 
+    def strongest(self) -> float:
+        """The gain of the best explanation."""
+        return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
+
     def curve_leads(self) -> bool:
         """Whether a curve over one coordinate gains far more than every effect of the library."""
         best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
@@ -83,8 +87,10 @@ def score_round(
 
     A chaotic model that is wrong shows what it lacks only where it is held loosely: what scores high around a
     tighter fit need not be what is missing. That one counts where the looser one shows nothing, as of few
-    data, unless it is off track. `given` are the user's own candidates; `watched` makes work that does not
-    begin once a search's time is up.
+    data. Of other models both are scored, and the scores with the stronger explanation count: what dies down
+    slowly shows only where they are held tightly. Where the model needs more model error than the schedule
+    has, the looser one alone counts. `given` are the user's own candidates; `watched` makes work that does
+    not begin once a search's time is up.
     """
 
     def score(current: Fit) -> ScoreRound:
@@ -97,10 +103,12 @@ def score_round(
 
     looser = with_larger_model_error(fitted, _SCATTER)
     found = watched(score)(looser)
-    if looser is fitted or found.off_track or found.passing() or found.passing_curves():
+    shows = found.passing() or found.passing_curves()
+    if looser is fitted or found.off_track or (shows and fitted.model.profile.discovery.chaotic):
         return found
     tight = watched(score)(fitted)
-    return replace(tight, comparisons=found.comparisons + tight.comparisons)
+    both = found.comparisons + tight.comparisons
+    return replace(max(tight, found, key=ScoreRound.strongest), comparisons=both)
 
 
 def with_surfaces(scores: ScoreRound) -> ScoreRound:

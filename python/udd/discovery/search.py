@@ -106,8 +106,12 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
             rounds.append(scores)
-            # What a curve says far more of than anything in the library is no bent view of something known.
-            tried = scores.passing_curves() if scores.curve_leads() else []
+            # What the library has been asked for already, or what is strong, and what a curve still says far
+            # more of than anything in it, is no bent view of something known. Of a machine it may be: its
+            # library holds most of what machines have.
+            chaotic = states[-1].part.model.profile.discovery.chaotic
+            first = scores.curve_leads() and (accepted or scores.off_track or chaotic)
+            tried = scores.passing_curves() if first else []
             found = self._located(states[-1], scores) if tried else None
             found = found or self._known(states[-1], scores)
             if found is None:

@@ -365,6 +365,7 @@ Disk.profile = ModelProfile(
         filter_window=1.0,
         filter_level=1,
         pairs=False,
+        chaotic=True,
         coordinates=_coordinates,
         # The contact's velocities with and without the momentum that goes with them.
         slots=(

@@ -285,6 +285,9 @@ class DiscoveryProfile:
         How tightly the model is held there, as the place in the levels of its error.
     pairs : bool
         Whether two effects at once are tried wherever one passes; otherwise only beside formulas.
+    chaotic : bool
+        Whether a wrong model that is held tightly goes astray within seconds, so that scores around it name
+        the wrong effect. What dies down over minutes shows around a tight fit alone.
     brakes : tuple of str
         Parameters that a pair of effects must not turn negative.
     coordinates : callable
@@ -300,6 +303,7 @@ class DiscoveryProfile:
     filter_window: float = 1.0
     filter_level: int = 2
     pairs: bool = True
+    chaotic: bool = False
     brakes: tuple[str, ...] = ()
     coordinates: Callable[[Any], tuple[Coordinate, ...]] = no_coordinates
     slots: tuple[CurveSlot, ...] | None = None
