@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_curves
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
@@ -102,13 +103,12 @@ def score_round(
         return ScoreRound(current, scanned, curves.curves, comparisons)
 
     looser = with_larger_model_error(fitted, _SCATTER)
-    found = watched(score)(looser)
-    shows = found.passing() or found.passing_curves()
-    if looser is fitted or found.off_track or (shows and fitted.model.profile.discovery.chaotic):
-        return found
-    tight = watched(score)(fitted)
-    both = found.comparisons + tight.comparisons
-    return replace(max(tight, found, key=ScoreRound.strongest), comparisons=both)
+    alone = looser is fitted or beyond_schedule(looser)
+    chaotic = fitted.model.profile.discovery.chaotic
+    found = parallel_map(watched(score), [looser] if alone or chaotic else [fitted, looser])
+    if not alone and chaotic and not (found[0].passing() or found[0].passing_curves()):
+        found.append(watched(score)(fitted))
+    return replace(max(found, key=ScoreRound.strongest), comparisons=sum(one.comparisons for one in found))
 
 
 def with_surfaces(scores: ScoreRound) -> ScoreRound:
