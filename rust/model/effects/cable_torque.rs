@@ -1,6 +1,4 @@
-//! A cable or thread that winds up with the disk's orientation.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// A cable or thread that winds up with the disk's orientation.
 pub struct CableTorque;

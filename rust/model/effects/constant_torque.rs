@@ -1,6 +1,4 @@
-//! A torque that never changes.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// A torque that never changes.
 pub struct ConstantTorque;

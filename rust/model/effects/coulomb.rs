@@ -1,6 +1,4 @@
-//! Dry friction of constant size. The width `eps` smooths it, so that it can be fitted.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Dry friction of constant size. The width `eps` smooths it, so that it can be fitted.
 pub struct Coulomb;

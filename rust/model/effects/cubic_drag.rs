@@ -1,6 +1,4 @@
-//! Drag that grows with the cube of the speed.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Drag that grows with the cube of the speed.
 pub struct CubicDrag;

@@ -1,6 +1,4 @@
-//! A drive speed that drifts steadily, as on an emptying battery.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
 /// A drive speed that drifts steadily, as on an emptying battery.
 pub struct DriveDrift;

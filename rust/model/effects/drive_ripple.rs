@@ -1,6 +1,4 @@
-//! A drive speed that varies periodically at a frequency of its own.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
 /// A drive speed that varies periodically at a frequency of its own.
 pub struct DriveRipple;

@@ -1,6 +1,4 @@
-//! A disk whose mass is not centred: gravity's torque follows its orientation.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// A disk whose mass is not centred: gravity's torque follows its orientation.
 pub struct EccentricMass;
@@ -14,10 +12,7 @@ impl EffectLaw for EccentricMass {
         bodies: &[Body::Disk],
         slots: &[Slot::Torque],
         momenta: &[],
-        parameters: &[
-            EffectParameter::amplitude("a", "m^2/s^2"),
-            EffectParameter::amplitude("b", "m^2/s^2"),
-        ],
+        parameters: &[EffectParameter::amplitude("a", "m^2/s^2"), EffectParameter::amplitude("b", "m^2/s^2")],
     };
 
     #[inline(always)]

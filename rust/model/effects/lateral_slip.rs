@@ -1,6 +1,4 @@
-//! Sideways slip of the disk in proportion to the lateral offset of its centre.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
 /// Sideways slip of the disk in proportion to the lateral offset of its centre.
 pub struct LateralSlip;

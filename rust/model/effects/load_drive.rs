@@ -1,8 +1,6 @@
-//! A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
-
-/// A motor that slows under load: the load is the vertical force on the contact, `F = g + d^2Z/dT^2`, taken from the plain model.
+/// A motor that slows under load: the load is the plain model's vertical force on the contact.
 pub struct LoadDrive;
 
 impl EffectLaw for LoadDrive {

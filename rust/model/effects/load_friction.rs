@@ -1,6 +1,4 @@
-//! Friction that grows with the load on the wheels: the load is the contact's force along the drive, `F = g + d^2Z/dT^2`.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Friction that grows with the load on the wheels, the hypothesis with which the paper ends.
 ///

@@ -1,13 +1,32 @@
 //! Physical effects that the plain models lack.
 //!
 //! **To add one**: write a file like [`quadratic_drag`](QuadraticDrag) that states the formula, its
-//! parameters with units and ranges, and the slots it enters; then name it in the list at the end of
-//! this file. The constructor, the fit, the list of candidates, its documentation and the generic
-//! tests follow from that. One that is known only when the program runs is a [`Formula`].
+//! parameters with units and ranges, and the slots it enters. Then add its `mod` line below and its
+//! name to the list at the end of this file. The constructor, the fit, the list of candidates, its
+//! documentation and the generic tests follow. A [`Formula`] is an effect written as text at run time.
 
+mod cable_torque;
+mod constant_torque;
+mod coulomb;
+mod cubic_drag;
+mod drive_drift;
+mod drive_ripple;
 mod dry_friction;
+mod eccentric_mass;
 mod formula;
+mod lateral_slip;
+mod load_drive;
+mod load_friction;
+mod quadratic_drag;
+mod radial_friction;
+mod radial_slip;
+mod relaxation;
+mod slip;
+mod stribeck;
 mod term;
+mod tilt;
+mod uneven_disk;
+mod wheel_ripple;
 
 pub use dry_friction::{Contact, Dry, FrictionModel};
 pub use formula::Formula;
@@ -232,7 +251,7 @@ const MAX_PARAMETERS: usize = 4;
 
 macro_rules! library {
     ($($module:ident :: $Name:ident),+ $(,)?) => {
-        $(mod $module; pub use $module::$Name;)+
+        $(pub use $module::$Name;)+
 
         // Else a model with the effect could not be built.
         const _: () = { $(assert!($Name::SPEC.parameters.len() <= MAX_PARAMETERS);)+ };

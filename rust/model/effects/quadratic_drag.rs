@@ -1,6 +1,4 @@
-//! Air drag that grows with the square of the speed.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Air drag that grows with the square of the speed.
 pub struct QuadraticDrag;

@@ -1,6 +1,4 @@
-//! Friction that grows with the distance of the disk's centre from the contact.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Friction that grows with the distance of the disk's centre from the contact.
 pub struct RadialFriction;

@@ -1,8 +1,8 @@
-//! Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
-
-/// Slip along OC in proportion to gravity's component along it (the paper's section IV B), `(u, W_c - W) = -c cos(theta) (sin(theta), cos(theta))`; the direction is softened within 1 mm of the centre.
+/// Slip along OC in proportion to gravity's component along it (the paper's section IV B).
+///
+/// The direction is softened within 1 mm of the centre.
 pub struct RadialSlip;
 
 impl EffectLaw for RadialSlip {

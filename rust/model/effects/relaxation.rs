@@ -1,8 +1,6 @@
-//! Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
-
-/// Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `-B w z`, `b = B/L`).
+/// Relaxation of the rolling constraint: the wheels lift less the higher the centre (the paper's `B = b L`).
 pub struct Relaxation;
 
 impl EffectLaw for Relaxation {

@@ -1,6 +1,4 @@
-//! Slip of the disk between the wheels in proportion to the height of its centre.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
 /// Slip of the disk between the wheels in proportion to the height of its centre.
 pub struct Slip;

@@ -1,6 +1,4 @@
-//! Dry friction that fades with the speed over the width `fade`. The width `eps` smooths it.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Dry friction that fades with the speed over the width `fade`. The width `eps` smooths it.
 pub struct Stribeck;

@@ -87,7 +87,7 @@ impl Effect {
 
 /// A law with its numbers.
 #[derive(Clone, Debug)]
-enum EffectLaw<S> {
+enum ValuedLaw<S> {
     Library(Kind, [S; MAX_PARAMETERS]),
     Formula(Arc<Formula>, Vec<S>),
 }
@@ -95,7 +95,7 @@ enum EffectLaw<S> {
 /// An effect with its numbers.
 #[derive(Clone, Debug)]
 pub struct Term<S> {
-    law: EffectLaw<S>,
+    law: ValuedLaw<S>,
     pub momentum: Option<Momentum>,
     pub treatment: FrictionModel,
 }
@@ -110,11 +110,11 @@ impl<S: Scalar> Term<S> {
                     let count = kind.spec().parameters.len();
                     let mut padded = [S::zero(); MAX_PARAMETERS];
                     padded[..count].copy_from_slice(&values[..count]);
-                    (count, EffectLaw::Library(*kind, padded))
+                    (count, ValuedLaw::Library(*kind, padded))
                 }
                 Source::Formula(formula) => {
                     let count = formula.parameters().len();
-                    (count, EffectLaw::Formula(formula.clone(), values[..count].to_vec()))
+                    (count, ValuedLaw::Formula(formula.clone(), values[..count].to_vec()))
                 }
             };
             terms.push(Term { law, momentum, treatment });
@@ -133,10 +133,10 @@ impl<S: Scalar> Term<S> {
     ) {
         slots.treatment = self.treatment;
         match &self.law {
-            EffectLaw::Library(kind, values) => {
+            ValuedLaw::Library(kind, values) => {
                 kind.enter(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
             }
-            EffectLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
+            ValuedLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
         }
     }
 
@@ -149,10 +149,10 @@ impl<S: Scalar> Term<S> {
         slots: &mut Contributions<A>,
     ) {
         match &self.law {
-            EffectLaw::Library(kind, values) => {
+            ValuedLaw::Library(kind, values) => {
                 kind.slip(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
             }
-            EffectLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
+            ValuedLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
         }
     }
 

@@ -1,11 +1,9 @@
-//! Gravity and drive that are not parallel: an angle `a` between them.
-//!
-//! A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
-//! are one and the same: the world turned by `a`.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// Gravity and drive that are not parallel: an angle `a` between them.
+///
+/// A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
+/// are one and the same: the world turned by `a`.
 pub struct Tilt;
 
 impl EffectLaw for Tilt {

@@ -1,11 +1,9 @@
-//! A disk that is not the same all round: a torque that repeats `n` times per turn.
-//!
-//! A warped disk, for example, is squeezed twice per turn by the wheels that hold it. The first
-//! harmonic is an [eccentric mass](super::EccentricMass).
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scalar, Slot, Spec};
 
 /// A disk that is not the same all round: a torque that repeats `n` times per turn.
+///
+/// A warped disk, for example, is squeezed twice per turn by the wheels that hold it. The first
+/// harmonic is an [eccentric mass](super::EccentricMass).
 pub struct UnevenDisk;
 
 impl EffectLaw for UnevenDisk {

@@ -1,6 +1,4 @@
-//! A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
-
-use super::{EffectInputs, Body, EffectParameter, EffectLaw, Momentum, Scalar, Slot, Contributions, Spec};
+use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Momentum, Scalar, Slot, Spec};
 
 /// A drive wheel out of round: its speed varies once per turn, at the rate `W/r`.
 pub struct WheelRipple;

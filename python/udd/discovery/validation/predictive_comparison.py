@@ -32,7 +32,7 @@ class Foretelling:
     Parameters
     ----------
     record : Record
-    wholes : mapping of int to Trial
+    wholes : mapping of int to TrialFit
         The forms fitted to all data, by the identity of the trial that they belong to.
     unit : float
         See :func:`udd.fitting.time_scale.motion_time_scale`.
