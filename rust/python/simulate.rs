@@ -63,18 +63,18 @@ pub fn stepper(method: &str) -> PyResult<MethodChoice> {
     }
 }
 
-/// How a single run may be taken beside.
+/// The method of a single run.
 #[derive(Clone, Copy)]
-enum By {
-    MethodChoice(MethodChoice),
-    /// For stiff laws.
+enum RunMethod {
+    Explicit(MethodChoice),
+    /// The implicit method, for stiff laws.
     Rodas,
 }
 
 fn run<F: Family<D>, const D: usize>(
     family: &F,
     values: &[f64],
-    by: By,
+    by: RunMethod,
     (output, x0): (Output<'_>, [f64; D]),
     (tolerance, keep): (&Tolerance, bool),
     (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
@@ -97,7 +97,9 @@ fn run<F: Family<D>, const D: usize>(
         }
     };
     let tape = match by {
-        By::MethodChoice(MethodChoice::Taylor | MethodChoice::Auto) => rows::tape(family, &[values.to_vec()]),
+        RunMethod::Explicit(MethodChoice::Taylor | MethodChoice::Auto) => {
+            rows::tape(family, &[values.to_vec()])
+        }
         _ => None,
     };
     let series = || {
@@ -106,17 +108,17 @@ fn run<F: Family<D>, const D: usize>(
         Some(trajectory(system(), method, output, x0, tolerance, keep, stop))
     };
     let run = match by {
-        By::Rodas => rodas(),
-        By::MethodChoice(MethodChoice::Dopri5) => {
+        RunMethod::Rodas => rodas(),
+        RunMethod::Explicit(MethodChoice::Dopri5) => {
             trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop)
         }
-        By::MethodChoice(MethodChoice::Dop853) => stages(),
-        By::MethodChoice(MethodChoice::Taylor) => {
+        RunMethod::Explicit(MethodChoice::Dop853) => stages(),
+        RunMethod::Explicit(MethodChoice::Taylor) => {
             let message = "the model's law has a comparison or an arc tangent, which no power series follows here; use \
                            method=\"dop853\"";
             series().ok_or_else(|| ModelError::new_err(message))?
         }
-        By::MethodChoice(MethodChoice::Auto) => match series() {
+        RunMethod::Explicit(MethodChoice::Auto) => match series() {
             None => stages(),
             Some(Err(failure)) if tape.as_ref().is_some_and(|tape| tape.hands_over(&failure)) => stages(),
             Some(run) => run,
@@ -192,7 +194,7 @@ fn simulate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
     let tolerance = Tolerance { rtol, atol };
-    let by = if method == "rodas" { By::Rodas } else { By::MethodChoice(stepper(method)?) };
+    let by = if method == "rodas" { RunMethod::Rodas } else { RunMethod::Explicit(stepper(method)?) };
     // The models that are built in are not stiff; where they come to rest steps are held down, too.
     let watched = model.is_own();
     let stiffness = Stiffness::new(method == "auto");

@@ -50,8 +50,8 @@ impl<const D: usize> Tape<D> {
         let system = family.build_at(&parameters, inputs);
         let x = from_fn(|n| symbol::make(Made::State(n)));
         let sides: Sides<Symbol> = from_fn(|j| match j < System::<Symbol, D>::surfaces(&system) {
-            true => SurfaceSideRef::Surface(j),
-            false => SurfaceSideRef::Specialised(true),
+            true => SurfaceSideRef::Positive(j),
+            false => SurfaceSideRef::Fixed(true),
         });
         let rates = system.rates(symbol::make(Made::Time), &x, &sides);
         let recording = symbol::end();

@@ -10,13 +10,15 @@ use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, elemen
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Symbol(pub(super) u32);
 
-/// On which side of a switching surface the law is taken, while the model is recorded.
+/// The condition of a branch while the model is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceSideRef {
-    Specialised(bool),
-    Surface(usize),
-    /// The other side.
-    ExtraColumns(usize),
+    /// The condition has this value wherever the law is evaluated.
+    Fixed(bool),
+    /// The condition holds on the positive side of this switching surface.
+    Positive(usize),
+    /// The condition holds on the negative side of this switching surface.
+    Negative(usize),
 }
 
 /// How a symbol was made. Constants are kept as bits, so that equal symbols can be found.
@@ -364,24 +366,24 @@ impl Scalar for Symbol {
     }
     fn less(self, other: Symbol) -> SurfaceSideRef {
         match RECORDING.with_borrow(|r| r.value(self).zip(r.value(other))) {
-            Some((a, b)) => SurfaceSideRef::Specialised(a < b),
+            Some((a, b)) => SurfaceSideRef::Fixed(a < b),
             None => {
                 looked();
-                SurfaceSideRef::Specialised(false)
+                SurfaceSideRef::Fixed(false)
             }
         }
     }
     fn select(mask: SurfaceSideRef, yes: Symbol, no: Symbol) -> Symbol {
         match mask {
             _ if yes == no => yes,
-            SurfaceSideRef::Specialised(true) => yes,
-            SurfaceSideRef::Specialised(false) => no,
-            SurfaceSideRef::Surface(j) => make(Made::Select(j, yes, no)),
-            SurfaceSideRef::ExtraColumns(j) => make(Made::Select(j, no, yes)),
+            SurfaceSideRef::Fixed(true) => yes,
+            SurfaceSideRef::Fixed(false) => no,
+            SurfaceSideRef::Positive(j) => make(Made::Select(j, yes, no)),
+            SurfaceSideRef::Negative(j) => make(Made::Select(j, no, yes)),
         }
     }
     fn mask(value: bool) -> SurfaceSideRef {
-        SurfaceSideRef::Specialised(value)
+        SurfaceSideRef::Fixed(value)
     }
     fn sqrt(self) -> Symbol {
         apply(Function::Sqrt, self)
@@ -437,11 +439,11 @@ impl Real for Symbol {
 
 impl Mask for SurfaceSideRef {
     fn from_lanes(mut lane: impl FnMut(usize) -> bool) -> SurfaceSideRef {
-        SurfaceSideRef::Specialised(lane(0))
+        SurfaceSideRef::Fixed(lane(0))
     }
     fn lane(self, _i: usize) -> bool {
         match self {
-            SurfaceSideRef::Specialised(value) => value,
+            SurfaceSideRef::Fixed(value) => value,
             _ => {
                 looked();
                 false
@@ -450,11 +452,11 @@ impl Mask for SurfaceSideRef {
     }
     fn and(self, other: SurfaceSideRef) -> SurfaceSideRef {
         match (self, other) {
-            (SurfaceSideRef::Specialised(true), side) | (side, SurfaceSideRef::Specialised(true)) => side,
+            (SurfaceSideRef::Fixed(true), side) | (side, SurfaceSideRef::Fixed(true)) => side,
             _ if self == other => self,
-            _ if self == other.not() => SurfaceSideRef::Specialised(false),
-            (SurfaceSideRef::Specialised(false), _) | (_, SurfaceSideRef::Specialised(false)) => {
-                SurfaceSideRef::Specialised(false)
+            _ if self == other.not() => SurfaceSideRef::Fixed(false),
+            (SurfaceSideRef::Fixed(false), _) | (_, SurfaceSideRef::Fixed(false)) => {
+                SurfaceSideRef::Fixed(false)
             }
             _ => {
                 looked();
@@ -467,9 +469,9 @@ impl Mask for SurfaceSideRef {
     }
     fn not(self) -> SurfaceSideRef {
         match self {
-            SurfaceSideRef::Specialised(value) => SurfaceSideRef::Specialised(!value),
-            SurfaceSideRef::Surface(j) => SurfaceSideRef::ExtraColumns(j),
-            SurfaceSideRef::ExtraColumns(j) => SurfaceSideRef::Surface(j),
+            SurfaceSideRef::Fixed(value) => SurfaceSideRef::Fixed(!value),
+            SurfaceSideRef::Positive(j) => SurfaceSideRef::Negative(j),
+            SurfaceSideRef::Negative(j) => SurfaceSideRef::Positive(j),
         }
     }
     fn bits(self) -> u64 {
