@@ -57,7 +57,7 @@ docs: .venv/.ready-docs ## build the documentation into docs/_build/html; every 
 test: .venv/.ready-test test-rust test-python ## build everything and run all tests (cargo and pytest)
 
 test-rust: ## only the tests of the Rust core; needs no Python
-	$(STEP) "cargo test" cargo test --release --locked --no-fail-fast
+	$(STEP) "cargo test" cargo test --locked --no-fail-fast
 
 test-python: .venv/.ready-test ## only the tests of the Python package (ARGS="-k section" for some of them)
 	$(STEP) "pytest" $(PY) -m pytest -n auto --dist loadfile --durations=25 $(ARGS)
@@ -74,8 +74,8 @@ bench-page: .venv/.browser ## the page's frames per second and its delay from sl
 lint: lint-rust lint-python ## rustfmt, clippy, ruff, zizmor, mypy --strict, and the stub of udd._core against the module
 
 lint-rust: .venv/.made
-	cargo fmt --check
-	$(STEP) "clippy" cargo clippy --locked --all-targets --features python -- -D warnings
+	cargo fmt --all --check
+	$(STEP) "clippy" cargo clippy --workspace --locked --all-targets --features udd/python -- -D warnings
 
 lint-python: .venv/.ready-user .venv/.ready-lint
 	$(BIN)/ruff check
@@ -86,7 +86,7 @@ lint-python: .venv/.ready-user .venv/.ready-lint
 	$(STEP) "stubtest" $(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
 
 format: .venv/.has-lint ## format the Rust and the Python code
-	cargo fmt
+	cargo fmt --all
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
@@ -94,7 +94,7 @@ dist: .venv/.has-build ## build the wheel and the source distribution into dist/
 	$(BIN)/maturin build --release --locked --strip --sdist --out dist
 
 bench: ## time the core's hot paths (ARGS="section --quick" for some of them, in short; ARGS=--limit: how far from the machine's limit they are)
-	cargo bench --locked --bench paths -- $(ARGS)
+	cargo bench --locked --package udd-benches -- $(ARGS)
 
 bench-count: .venv/.made ## count their instructions; fails where one takes over 3 % more than committed (ARGS=--update to refresh)
 	$(STEP) "bench-count" $(PY) benches/count.py $(ARGS)

@@ -41,8 +41,8 @@ def toolchain() -> str:
 
 def build() -> str:
     """Compile the benches and return the path of the program."""
-    command = ("cargo", "bench", "--locked", "--bench", "paths", "--no-run", "--message-format", "json")
-    messages = map(json.loads, output(*command, "--quiet").splitlines())
+    command = ("cargo", "bench", "--locked", "--package", "udd-benches", "--no-run")
+    messages = map(json.loads, output(*command, "--message-format", "json", "--quiet").splitlines())
     found = [m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "paths"]
     return str(found[-1])
 
