@@ -14,9 +14,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 @pytest.fixture(scope="session", autouse=True)
 def _kept(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """What a test process has discovered is there for the others: pytest-xdist gives each a folder in one."""
-    own = tmp_path_factory.getbasetemp()
-    os.environ["UDD_DISCOVERED"] = str(own.parent if "PYTEST_XDIST_WORKER" in os.environ else own)
+    """The folder of `kept`: one for all processes of the run, each of which has a folder inside it."""
+    base = tmp_path_factory.getbasetemp()
+    os.environ["UDD_KEPT"] = str(base.parent if "PYTEST_XDIST_WORKER" in os.environ else base)
 
 
 @pytest.fixture(scope="session")

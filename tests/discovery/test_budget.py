@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import udd
-from test_confirmed import in_air
+from discovered import in_air
 from udd.discovery import time_budget
 from udd.errors import FitError
 from udd.fitting.thinning import thinned
@@ -44,7 +44,8 @@ def test_what_passed_before_the_time_was_up_stands(monkeypatch):
         plain(self, text)
 
     monkeypatch.setattr(time_budget.Clock, "tell", tell)
-    found = udd.discover(*in_air(), budget=100.0)
+    measured, known = in_air()
+    found = udd.discover(measured.slice(0, 20), known, budget=100.0)
     assert [f.title for f in found.effects] == ["quadratic drag"]
     assert found.stopped == "scoring candidates for a further effect"
     assert "what else may be missing was not tried" in as_text(summary_of(found)).splitlines()[0]
@@ -91,7 +92,7 @@ def test_what_needs_its_frames_keeps_them():
 
 
 def test_a_discovery_says_what_was_averaged():
-    t = np.arange(0, 40, 0.002)
+    t = np.arange(0, 20, 0.001)
     truth = udd.Pendulum(0.6, k0=0.004, effects=[udd.effects.quadratic_drag(c=0.02)])
     theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
     noise = 5e-3 * np.random.default_rng(3).standard_normal(len(t))

@@ -12,25 +12,21 @@ import pytest
 
 import discovered
 import udd
-from udd.discovery.acceptance import Acceptance
+from discovered import in_air
+from udd.discovery.acceptance import Acceptance, SearchState
+from udd.discovery.discover import TRAIN
+from udd.discovery.score_rounds import score_round
+from udd.discovery.search import Search
+from udd.discovery.time_budget import Clock
+from udd.discovery.trial_fits import fitted_ones, of_library
 from udd.discovery.validation import held_out_errors
 from udd.discovery.validation.held_out_errors import confirmed, misses_the_motion
-from udd.fitting import record_of
+from udd.fitting import fit_record, record_of
 from udd.report import as_text, summary_of, wording
 
 
-def in_air() -> tuple[udd.Measurement, udd.Pendulum]:
-    """A pendulum in air, and the model that knows viscous friction only."""
-    t = np.arange(0, 40, 0.05)
-    truth = udd.Pendulum(0.6, k0=0.004, effects=[udd.effects.quadratic_drag(c=0.02)])
-    theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
-    noise = 2e-3 * np.random.default_rng(3).standard_normal(len(t))
-    return udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(0.6, k0=0.01)
-
-
-@pytest.mark.parametrize("ratio", [(0.9, 0.8, 1.02), (1.2, 1.1, 1.3), (0.5, math.nan, math.nan)])
-def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path, ratio):
-    monkeypatch.setattr(Acceptance, "improvement", lambda *_: ratio)
+def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path):
+    monkeypatch.setattr(Acceptance, "improvement", lambda *_: (0.9, 0.8, 1.02))
     found = udd.discover(*in_air())
     assert found.verdict == "fits the first part, not confirmed"
     assert found.effects == [] and found.model.effects == ()
@@ -46,6 +42,45 @@ def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path
     assert json.loads(json.dumps(found.to_dict(), default=str))["refused"][0]["why"] == "unconfirmed"
 
 
+@pytest.mark.parametrize(
+    ("ratio", "steps"),
+    [
+        (None, 1),
+        ((0.9, 0.8, 1.02), 0),
+        ((1.2, 1.1, 1.3), 0),
+        ((0.5, math.nan, math.nan), 0),
+    ],
+)
+def test_only_steps_that_free_runs_confirm_are_kept(monkeypatch, ratio, steps):
+    """A search's fits before and after its one step, with its own ratio of errors and with others."""
+    found = discovered.pendulum()
+    record = found.fit.record
+    tests = Acceptance(record, ~record.first(TRAIN), Clock(None, lambda _text: None))
+    states = [
+        SearchState(found.baseline, found.baseline, found.error_before),
+        SearchState(found.trained, found.fit, found.error_after),
+    ]
+    if ratio is not None:
+        monkeypatch.setattr(Acceptance, "improvement", lambda *_: ratio)
+    assert Search(tests)._confirmed_by_free_runs(states[0], states) == steps
+
+
+@pytest.mark.parametrize("witness", [None, "held"])
+def test_a_trial_that_held_out_frames_do_not_confirm_is_not_accepted(monkeypatch, witness):
+    measured, known = in_air()
+    record = record_of(measured)
+    train = record.first(TRAIN)
+    part, whole = (fit_record(measured, some, known, search=True) for some in (record.part(train), record))
+    scores = score_round(part)
+    (drag,) = (s for s in scores.library.scored if s.candidate.title == "quadratic drag")
+    trials = fitted_ones([of_library(part, [drag.candidate], list(drag.amplitudes))])
+    tests = Acceptance(record, ~train, Clock(None, lambda _text: None))
+    monkeypatch.setattr("udd.discovery.acceptance.confirmed_by", lambda *_: ((0.9, 0.8, 1.02), witness))
+    found = tests.best(SearchState(part, whole, tests.errors(part)), trials, scores)
+    assert (found is not None) == (witness is not None)
+    assert found is None or found[0].witness == witness
+
+
 def test_an_interval_that_reaches_one_confirms_only_where_noise_hides_the_gain():
     errors = discovered.disk().error_before  # far above the floor
     at_floor = replace(errors, median=errors.floor, low=errors.floor, high=errors.floor)
@@ -59,9 +94,8 @@ def test_an_interval_that_reaches_one_confirms_only_where_noise_hides_the_gain()
 
 
 def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
-    measured, known = in_air()
-    found = udd.discover(measured, known)
-    record = record_of(measured)
+    found = discovered.pendulum()
+    record = record_of(found.measurement)
     held = ~record.first(0.6)
     assert not misses_the_motion(found.error_before, record, held)
     lost = replace(found.error_before, run=np.full(held.sum(), 1.5))
@@ -76,6 +110,7 @@ def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
     monkeypatch.setattr("udd.discovery.acceptance.ALPHA", 0.0)
     monkeypatch.setattr("udd.discovery.score_rounds.ALPHA", 0.0)
     monkeypatch.setattr(held_out_errors, "_LOST", 0.0)
-    said = udd.discover(measured, known)
+    measured, known = in_air()
+    said = udd.discover(measured.slice(0, 20), known)
     assert not said.effects and said.verdict == "effect present, form not identified"
     assert wording.verdict(said).startswith("The model lacks something")

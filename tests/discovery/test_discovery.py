@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 import discovered
 import simulated
 import udd
+from udd.discovery.discover import TRAIN
 from udd.discovery.scoring.candidates import ripples
 from udd.discovery.scoring.score_scan import scan, scan_ripples, strongest_ripple
 from udd.discovery.validation import confirmation
@@ -22,11 +23,11 @@ from udd.report import wording
 E = udd.effects
 
 
-def search(effect: udd.effects.Effect | None, seed: int, duration: float = 40.0) -> udd.Discovery:
-    """What is found in a record whose device has an effect that the search is not told."""
+def search(effect: udd.effects.Effect | None, seed: int, duration: float = 30.0) -> udd.Discovery:
+    """Search a simulated record for an effect that the known model lacks."""
     truth = udd.Disk(0.045, effects=[] if effect is None else [effect])
     measured, _states = simulated.film(truth, np.random.default_rng(seed), duration)
-    return udd.discover(measured, udd.Disk(0.045))
+    return discovered.search(measured, udd.Disk(0.045))
 
 
 @pytest.mark.parametrize(
@@ -92,19 +93,30 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
 
 
 @pytest.mark.parametrize(
-    ("ratio", "expected", "found"),
+    ("ratio", "expected", "witness"),
     [
+        ((0.97, 0.95, 0.99), 100.0, "held"),
         # With all parameters held, their errors may hide what the frames gain; fitted too, they show it.
-        ((0.99, 0.97, 1.01), 100.0, True),
-        ((1.01, 0.99, 1.03), 100.0, False),
+        ((0.99, 0.97, 1.01), 100.0, "fitted"),
+        ((1.01, 0.99, 1.03), 100.0, None),
         # Frames that could not show the effect are no witnesses against it.
-        ((1.01, 0.99, 1.03), 5.0, True),
+        ((1.01, 0.99, 1.03), 5.0, "halves"),
     ],
 )
-def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, found):
+def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch, ratio, expected, witness):
+    """Fits with a drag and without it, of the first part and of all data, as a search has them."""
     monkeypatch.setattr(confirmation, "held_out_ratio", lambda *_: ratio)
     monkeypatch.setattr(confirmation, "_expected", lambda *_: expected)
-    assert bool(search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0).effects) == found
+    truth = udd.Disk(0.045, effects=[E.quadratic_drag(c=5e-4)])
+    measured, _states = simulated.film(truth, np.random.default_rng(12), 40.0)
+    record = record_of(measured)
+    train = record.first(TRAIN)
+    pairs = []
+    for some in (record.part(train), record):
+        before = fit_record(measured, some, udd.Disk(0.045), search=True)
+        pairs.append(confirmation.same_level(before, extend(before, [E.quadratic_drag()], [0.0])))
+    found = confirmation.confirmed_by(*pairs, record.part(~train), ["quadratic_drag.c"], 1.0)
+    assert found == (ratio, witness)
 
 
 @pytest.mark.parametrize("c", [5e-4, 0.0])
@@ -117,7 +129,7 @@ def test_both_halves_of_a_record_must_want_an_effect(c):
 
 
 def test_a_shape_between_those_tried_is_found():
-    found = search(E.stribeck(c=0.01, fade=1.7), seed=1, duration=60.0)
+    found = search(E.stribeck(c=0.01, fade=1.7), seed=1, duration=40.0)
     (effect,) = found.effects
     assert effect.title == "Stribeck friction"
     for name, value in (("c", 0.01), ("fade", 1.7)):
@@ -151,7 +163,7 @@ def test_an_effect_outside_the_library_is_located_and_written_down():
 
 def test_the_clock_may_start_anywhere():
     truth = udd.Disk(0.045, effects=[E.drive_ripple(a=0.05, f=1.3)])
-    measured, _states = simulated.film(truth, np.random.default_rng(5), 30.0)
+    measured, _states = simulated.film(truth, np.random.default_rng(5), 20.0)
     at = [udd.discover(udd.Measurement(measured.t + t0, measured.values), udd.Disk(0.045)) for t0 in (0, 500)]
     assert [f.effect.name for f in at[0].effects] == ["drive_ripple"]
     # The same but for the rounding of the times.
@@ -167,7 +179,7 @@ def test_a_disk_without_drive_comes_to_rest():
 
 def test_two_effects_are_found():
     truth = udd.Disk(0.045, effects=[E.relaxation(b=5.0), E.quadratic_drag(c=4e-4)])
-    measured, _states = simulated.film(truth, np.random.default_rng(8), 60.0)
+    measured, _states = simulated.film(truth, np.random.default_rng(8), 40.0)
     found = udd.discover(measured, udd.Disk(0.045))
     names = {f.effect.name for f in found.effects}
     assert "quadratic_drag" in names
@@ -206,10 +218,10 @@ def test_the_strongest_ripple_is_found_between_lines_too(shift):
 
 
 def test_a_result_is_data():
-    found = search(E.quadratic_drag(c=5e-4), seed=12, duration=40.0)
+    found = discovered.disk()
     text = json.dumps(found.to_dict(), allow_nan=True)
     assert json.dumps(pickle.loads(pickle.dumps(found)).to_dict(), allow_nan=True) == text
-    assert json.loads(text)["effects"][0]["parameters"]["c"]["value"] == found.effects[0].parameters["c"]
+    assert json.loads(text)["effects"][0]["parameters"]["b"]["value"] == found.effects[0].parameters["b"]
     assert found.model is found.fit.model
 
 

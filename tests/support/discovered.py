@@ -3,67 +3,62 @@
 from __future__ import annotations
 
 import functools
-import os
-import pickle
-from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import udd
+from kept import kept
 from simulated import film
 
 DRIVE = 0.042
 
 
-def once(find: Callable[[], udd.Discovery]) -> Callable[[], udd.Discovery]:
-    """The same, found once for all processes (or twice, where two begin at the same time).
-
-    The folder where they keep it is in the environment: `conftest` sees to that.
-    """
-
-    def found() -> udd.Discovery:
-        path = Path(os.environ["UDD_DISCOVERED"]) / f"{find.__name__}.pickle"
-        if path.is_file():
-            kept: udd.Discovery = pickle.loads(path.read_bytes())
-            return kept
-        result = find()
-        part = path.with_suffix(f".{os.getpid()}")
-        part.write_bytes(pickle.dumps(result))
-        part.replace(path)  # whole or not at all
-        return result
-
-    return functools.cache(functools.wraps(find)(found))
+@kept
+def told(measurement: Any, model: Any, **options: Any) -> tuple[udd.Discovery, list[str]]:
+    """`udd.discover`, with the lines of its progress, once per run for each record, model and options."""
+    lines: list[str] = []
+    return udd.discover(measurement, model, progress=lines.append, **options), lines
 
 
-@once
+def search(measurement: Any, model: Any, **options: Any) -> udd.Discovery:
+    """`udd.discover`, once per run for each record, model and options."""
+    return told(measurement, model, **options)[0]
+
+
+@functools.cache
 def disk() -> udd.Discovery:
     """A disk whose rolling constraint is relaxed."""
     model = udd.Disk(DRIVE, effects=[udd.effects.relaxation(b=6.0)])
     measured, _ = film(model, np.random.default_rng(3), 40.0)
-    return udd.discover(measured, udd.Disk(DRIVE))
+    return search(measured, udd.Disk(DRIVE))
 
 
-@once
+@functools.cache
 def nothing() -> udd.Discovery:
     """A disk that lacks nothing."""
     measured, _ = film(udd.Disk(DRIVE), np.random.default_rng(3), 30.0)
-    return udd.discover(measured, udd.Disk(DRIVE))
+    return search(measured, udd.Disk(DRIVE))
 
 
-@once
-def pendulum() -> udd.Discovery:
-    """A pendulum in air."""
+def in_air() -> tuple[udd.Measurement, udd.Pendulum]:
+    """A pendulum's record in air, and the model that knows viscous friction only."""
     rng = np.random.default_rng(3)
     t = np.arange(0, 40, 0.05)
     truth = udd.Pendulum(0.6, k0=0.004, effects=[udd.effects.quadratic_drag(c=0.02)])
     theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1] + 2e-3 * rng.standard_normal(len(t))
-    return udd.discover(udd.Measurement(t, {"theta": theta}), udd.Pendulum(0.6, k0=0.01))
+    return udd.Measurement(t, {"theta": theta}), udd.Pendulum(0.6, k0=0.01)
 
 
-@once
+@functools.cache
+def pendulum() -> udd.Discovery:
+    """A pendulum in air."""
+    return search(*in_air())
+
+
+@functools.cache
 def outside() -> udd.Discovery:
     """A disk with seven waves of torque per turn: no effect of the library does that."""
     truth = udd.Disk(0.045, effects=[udd.effects.uneven_disk(a=0.03, b=0.0, n=7)])
     measured, _ = film(truth, np.random.default_rng(4), 40.0)
-    return udd.discover(measured, udd.Disk(0.045))
+    return search(measured, udd.Disk(0.045))
