@@ -9,6 +9,7 @@ import pytest
 
 import udd
 import unmodelled
+from udd.discovery.curve_effects import fit_curve
 from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.look_alikes import look_alikes
@@ -167,10 +168,28 @@ def test_what_dies_down_slowly_is_scored_where_it_is_held_tightly() -> None:
     assert scores.usable()[0].candidate.effect.name in ("quadratic_drag", "cubic_drag")
 
 
+def bump(momentum: str) -> udd.effects.Effect:
+    """A narrow push to the side at one place."""
+    return udd.effects.formula("lateral", "a*exp(-((Y - 0.014)/0.0054)^2)", a=0.02, momentum=momentum)
+
+
+@pytest.mark.parametrize("momentum", ["consistent", "constraint"])
+def test_fits_of_a_narrow_bump_show_its_momentum(momentum: str) -> None:
+    measured = filmed(udd.Disk(0.03, effects=[bump(momentum)]), 30.0)
+    base = fit_record(measured, record_of(measured), udd.Disk(0.03), search=True)
+    curves = score_round(base).curves
+    both = [curve for curve in curves if curve.kin == curves[0].kin]
+    right, wrong = sorted(both, key=lambda curve: curve.slot.momentum != momentum)
+    fits = [fit_curve(base, curve).fit for curve in (right, wrong)]
+    assert right.name == (f"lateral ({momentum})", "Y") and fits[0].level == fits[1].level
+    # Ten nats part two forms.
+    assert fits[1].chi2 - fits[0].chi2 > 20.0
+
+
+@pytest.mark.nightly  # test_fits_of_a_narrow_bump_show_its_momentum asks the same of the fits
 @pytest.mark.parametrize("momentum", ["consistent", "constraint"])
 def test_a_narrow_bump_is_told_with_its_momentum_or_without(momentum: str) -> None:
-    law = udd.effects.formula("lateral", "a*exp(-((Y - 0.014)/0.0054)^2)", a=0.02, momentum=momentum)
-    found = udd.discover(filmed(udd.Disk(0.03, effects=[law]), 30.0), udd.Disk(0.03))
+    found = udd.discover(filmed(udd.Disk(0.03, effects=[bump(momentum)]), 30.0), udd.Disk(0.03))
     (effect,) = found.effects
     assert effect.title == f"lateral ({momentum}) = a * exp((-1) * (b * (c + Y))^2)"
     assert found.verdict == "effect identified"

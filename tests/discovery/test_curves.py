@@ -127,17 +127,26 @@ def test_nothing_is_located_where_nothing_is_missing(seed):
     assert found.curves[0].evidence < 0  # no curve is more likely than any
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", unmodelled.CASES, ids=lambda case: case.name)
-def test_bands_hold_the_law(case):
-    """Over 12 records at 0.4 of the law's size.
+@pytest.mark.parametrize(
+    ("case", "records"),
+    [
+        # Two records ask the same as twelve, but for the bump, whose share scatters too much.
+        *(pytest.param(case, 2, id=case.name) for case in unmodelled.CASES if "bump" not in case.name),
+        *(
+            pytest.param(case, 12, id=f"{case.name} in 12", marks=pytest.mark.nightly)
+            for case in unmodelled.CASES
+        ),
+    ],
+)
+def test_bands_hold_the_law(case, records):
+    """Records at 0.4 of the law's size.
 
     A band of a smoothness prior holds its share of the curves that are as smooth everywhere; a bump is not,
     and is rounded off: hence 80 %. The three others measured 98 % and more. The share scatters by 12 % from
-    record to record of the bump, by 2 % of the others: these records give its mean to 3 % and 1 %.
+    record to record of the bump, by 2 % of the others: twelve records give its mean to 3 % and 1 %.
     """
     inside = []
-    for seed in range(12):
+    for seed in range(records):
         fit = udd.fit(unmodelled.record(weak(case, 0.4), seed), udd.Disk(W))
         only = scan_curves(fit, only=lambda slot, own: (slot.title, own[0].name) == case.found[0])
         curve = identifiable_part(refined(only.curves[0], fit), fit)
@@ -486,7 +495,7 @@ def test_one_law_takes_the_place_of_several_that_come_near_it():
 
     law = lambda t, o, y, z, b: (float(push(np.arctan2(y, z))), 0.0, 0.0)  # noqa: E731
     told: list[str] = []
-    measured = unmodelled.record(law, 5, noise=(5e-4, 7e-3))
+    measured = unmodelled.record(law, 5, 40.0, noise=(5e-4, 7e-3))
     found = udd.discover(measured, udd.Disk(W), progress=told.append)
     # The first of the library is replaced as soon as the curve leads, before others come beside it.
     assert any("torque as a function of theta instead of" in line for line in told)

@@ -10,7 +10,7 @@ from udd.discovery.scoring.term_library import terms
 
 
 def test_a_cubic_spring_of_one_oscillator_of_four_is_named() -> None:
-    t = 0.05 * np.arange(300)
+    t = 0.1 * np.arange(120)
     true = chain(4, v3="-0.5*x3^3")
     state = udd.simulate(true, t, 1.2 * np.cos(np.arange(8.0)), rtol=1e-10).state
     noisy = state + 0.01 * np.random.default_rng(0).standard_normal(state.shape)

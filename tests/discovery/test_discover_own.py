@@ -81,7 +81,7 @@ def test_the_damping_of_the_diffusionless_lorenz_system_is_found_in_noise() -> N
     equations = {"omega": "y - omega", "y": "omega*z", "z": "-omega*y + w"}
     known = udd.Model(list(equations), equations, {"w": 1.0})
     truth = known.with_term("z", "z", damping=-0.2)
-    record = seen(truth, np.arange(0, 60, 0.05), [1.0, 1.0, 0.5], 0.05, list(equations))
+    record = seen(truth, np.arange(0, 40, 0.05), [1.0, 1.0, 0.5], 0.05, list(equations))
     found = udd.discover(record, known)
     assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["z in z'"]
     within(found, "z_in_z.c", -0.2)
@@ -105,7 +105,7 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
 ) -> None:
     truth = udd.Model(["theta", "v"], DRIVEN | {"v": DRIVEN["v"] + lacking}, DRIVEN_VALUES)
     known = udd.Model(["theta", "v"], DRIVEN, {"w2": 3.8, "g": 0.1, "F": 1.8}, angles=["theta"])
-    record = seen(truth, np.arange(0, 90, 0.04), [0.5, 0.0], 0.002, ["theta"])
+    record = seen(truth, np.arange(0, 60, 0.06), [0.5, 0.0], 0.002, ["theta"])
     found = udd.discover(record, known)
     if title is None:
         assert found.verdict == "nothing missing" and not found.effects
@@ -133,7 +133,7 @@ def test_a_model_that_cannot_follow_the_record_lacks_something() -> None:
     # Without its growth the oscillator comes to rest; no candidate fits while y is not seen.
     values = {"a": 3.37, "b": -3.37 / 3, "c": -1 / 3.37}
     known = udd.Model(["x", "y"], ["a*y + b*x^3", "c*x"], {"a": 3.05, "b": -0.91, "c": -0.32})
-    t = np.linspace(0, 10, 512)
+    t = np.linspace(0, 10, 256)
     states = udd.simulate(known.replace(**values).with_term("x", "x", g=3.37), t, [0.7, 0.0]).state
     found = udd.discover(udd.Measurement(t, {"x": states[:, 0]}), known, state0={"y": 0.0})
     assert found.fit.doubts.missing or found.effects
@@ -223,7 +223,7 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
 def test_damping_at_the_joint_of_a_double_pendulum_is_found_from_its_angles() -> None:
     known = udd.Model(list("abpq"), DOUBLE, {"g": 9.7}, angles=["a", "b"])
     truth = known.with_parameters({"g": 9.81}).with_term("q", DB, c=-0.05)
-    found = udd.discover(seen(truth, np.arange(0, 20, 0.02), [1.5, 0.8, 0.0, 0.0], 0.01, "ab"), known)
+    found = udd.discover(seen(truth, np.arange(0, 12, 0.03), [1.5, 0.8, 0.0, 0.0], 0.01, "ab"), known)
     assert [e.title for e in found.effects] == ["b' in q'"]
     within(found, "rate_of_b_in_q.c", -0.05)
     within(found, "g", 9.81)

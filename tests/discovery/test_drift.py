@@ -22,7 +22,7 @@ KNOWN = udd.Pendulum(0.8, k0=0.013)
 def drifting(size: float) -> udd.Measurement:
     """A pendulum whose sensor's zero wanders by so much."""
     rng = np.random.default_rng(5)
-    t = np.arange(0, 100, 0.04)
+    t = np.arange(0, 50, 0.04)
     theta = udd.simulate(udd.Pendulum(0.82, k0=0.012), t, [0.0, 0.8]).state[:, 1]
     walk = np.cumsum(rng.standard_normal(len(t))) / np.sqrt(len(t))
     return udd.Measurement(t, {"theta": theta + size * walk + 2e-3 * rng.standard_normal(len(t))})

@@ -7,7 +7,7 @@ import pytest
 
 import udd
 
-T = np.arange(0.0, 20.0, 0.01)
+T = np.arange(0.0, 12.0, 0.01)
 ARM = udd.Model(
     ["q", "v"],
     ["v", "(torque - weight*sin(q) - viscous*v)/J"],

@@ -23,13 +23,13 @@ RELAXED = udd.Disk(DRIVE, effects=[udd.effects.relaxation(b=1.5)])
 @functools.cache
 def relaxed():
     """A film of a disk whose constraint is relaxed a little, and the verdict: it may be a slip."""
-    measured, _ = film(RELAXED, np.random.default_rng(5), 40.0)
-    return measured, udd.discover(measured, udd.Disk(DRIVE))
+    measured, _ = film(RELAXED, np.random.default_rng(5), 30.0)
+    return measured, discovered.search(measured, udd.Disk(DRIVE))
 
 
 def second(times, seed=6):
     """A film of the same disk at another drive."""
-    return film(RELAXED.with_parameters({"W": times * DRIVE}), np.random.default_rng(seed), 40.0)[0]
+    return film(RELAXED.with_parameters({"W": times * DRIVE}), np.random.default_rng(seed), 30.0)[0]
 
 
 def test_a_second_drive_is_proposed_for_slip_or_relaxation():

@@ -83,7 +83,7 @@ def test_no_drive_is_told_at_a_systems_own_frequencies_or_the_mains():
 
 
 def test_two_frictions_are_found_together_where_one_would_do_for_the_first_part():
-    t = np.arange(0, 60, 1 / 50)
+    t = np.arange(0, 60, 1 / 25)
     step = 2 * np.pi / 14400
     drags = [udd.effects.quadratic_drag(c=0.02), udd.effects.coulomb(c=0.01)]
     truth = udd.Pendulum(0.8, k0=0.004, effects=drags)

@@ -33,7 +33,8 @@ def tanks(leak: float, seed: int) -> udd.Measurement:
     return udd.Measurement(t, {"b": lower}, inputs={"u": udd.InputSignal(t, pump, hold="zero")})
 
 
-@pytest.mark.parametrize("seed", [0, 2])
+# Another pump, another noise: seed 0 asks the same.
+@pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.nightly)])
 def test_a_leak_of_the_lower_tank_is_found_with_the_hidden_start(seed: int) -> None:
     """A slow drift of the gauge would explain the misfit as well, were it as fast as the level itself."""
     found = udd.discover(tanks(0.008, seed), LAW)
