@@ -19,7 +19,7 @@ def window() -> udd.Branch:
 
 @pytest.fixture(scope="module")
 def boundary() -> udd.Crisis:
-    (one,) = udd.crises(window())
+    (one,) = udd.crises(window(), n=41)  # the example of `udd.crises` follows a hundred orbits
     return one
 
 
@@ -54,12 +54,18 @@ def test_the_start_of_the_search_does_not_matter(boundary: udd.Crisis) -> None:
     assert abs(other.value - boundary.value) <= other.error + boundary.error
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # test_mirror_images_merge and the fixture ask for one of each kind
 def test_mirror_images_merge_before_the_boundary_crisis() -> None:
     orbit = udd.periodic_orbit(udd.DLE(7.7), [1.35958, -10.21032, 0.0])
     low, high = udd.crises(udd.continuation(orbit, "w", (7.44, 7.85)))
     assert [low.kind, high.kind] == ["boundary crisis", "attractor merging crisis"]
     assert low.cycle.symmetric and high.cycle.symmetric
+
+
+def test_mirror_images_merge() -> None:
+    orbit = udd.periodic_orbit(udd.DLE(7.7), [1.35958, -10.21032, 0.0])
+    (high,) = udd.crises(udd.continuation(orbit, "w", (7.5, 7.85)), n=41)
+    assert high.kind == "attractor merging crisis" and high.cycle.symmetric
 
     def sides(w: float) -> float:
         """The share of section points of one attractor on the rarer side of its mirror plane."""
