@@ -658,13 +658,18 @@ def test_ctrl_c_keeps_what_is_finished(more: list[str], columns: int) -> None:
 
 # --- films
 
+SMALL = ["--size", "276x350"]  # half of the paper's
+
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("av", reason="needs the extra 'track'")
     pytest.importorskip("cv2", reason="needs the extra 'track'")
     path = tmp_path_factory.mktemp("film") / "film.mp4"
-    assert main(["film", str(path), "--W", "0.03", "--t", "4.01", "--state", "1", ".02", "-.01", "0"]) == 0
+    assert (
+        main(["film", str(path), "--W", "0.03", "--t", "4.01", "--state", "1", ".02", "-.01", "0", *SMALL])
+        == 0
+    )
     return path
 
 
@@ -703,8 +708,32 @@ def test_a_film_without_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "no disk with marks" in failed(["discover", path, "--W", "0.04"], capsys)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("null", [False, True])
+def test_the_demonstration_of_a_disk_that_lacks_nothing_takes_the_other_film(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From tracking on, all is replaced: `test_the_demonstration` and the tests of a null ask that."""
+    films: list[str] = []
+    told: list[dict[str, object]] = []
+    nothing = discovered.nothing()
+
+    def track(film: Path, **_more: object) -> udd.Measurement:
+        films.append(Path(film).name)
+        return nothing.measurement
+
+    monkeypatch.setattr("udd.demo.pipeline.track", track)
+    monkeypatch.setattr("udd.demo.pipeline.discover", lambda *_, **_more: nothing)
+    monkeypatch.setattr(
+        udd.Discovery, "report", lambda _self, path, **more: told.append({"path": path} | more)
+    )
+    found = data(["demo", "--null", "--out", tmp_path / "new"], capsys)
+    assert films == ["sample_null.mp4"] and found["verdict"] == "nothing missing"
+    assert Path(str(found["measurement"])) == tmp_path / "new" / "measurement_null.csv"
+    assert udd.read_measurement(str(found["measurement"])).meta["W"] == 0.042
+    (page,) = told
+    assert page["path"] == tmp_path / "new" / "report_null.html" and page["command"] == "udd demo --null"
+
+
+@pytest.mark.parametrize("null", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_the_demonstration(null: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = data(["demo", "--out", tmp_path / "new" / "demo", *(["--null"] if null else [])], capsys)
     assert Path(str(found["report"])).read_text(encoding="utf-8").count("<img") >= 8

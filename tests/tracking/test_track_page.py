@@ -11,12 +11,13 @@ import pytest
 pytest.importorskip("av", reason="the tracker's extra is not installed")
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
+import tracked
 import udd
 from udd.cli import main
 from udd.errors import UddError
 from udd.film import Defects
 from udd.report.tracking import calibration, chosen
-from udd.tracking import page, track_disk
+from udd.tracking import page
 from udd.tracking.metric.rolling_check import health
 from udd.tracking.pipeline import Tracking
 
@@ -31,7 +32,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(film: Path) -> Tracking:
-    return track_disk(film)
+    return tracked.track_disk(film)
 
 
 def test_the_page_holds_all_and_stands_alone(film: Path, found: Tracking, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("av", reason="the tracker's extra is not installed")
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
+import tracked
 import udd
 from film_for_tests import FPS, PIVOT, RADIUS, REACH, SCALE, frame, rolling, write
 from udd.measurement import Measurement, MeasurementError, read_measurement
@@ -31,7 +32,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Measurement:
             a = beta + quarter * np.pi / 2
             u, v = PIVOT[0] + SCALE * (y + REACH * np.sin(a)), PIVOT[1] - SCALE * (z + REACH * np.cos(a))
             shots[k][int(v) - 20 : int(v) + 20, int(u) - 20 : int(u) + 20] = (228, 228, 220)
-    return udd.track(write(tmp_path_factory.mktemp("film") / "q.mp4", shots), disk_radius=RADIUS)
+    return tracked.track(write(tmp_path_factory.mktemp("film") / "q.mp4", shots), disk_radius=RADIUS)
 
 
 def test_every_frame_says_how_it_came_about(measured: Measurement) -> None:

@@ -62,7 +62,7 @@ def test_too_few_marks_or_frames_say_nothing() -> None:
 
 
 def filmed(path: Path, degrees: float) -> udd.Measurement:
-    run = udd.simulate(udd.Disk(0.039), np.arange(0, 5, 0.005), [1, 0.02, -0.02, 0.3], dense=True)
+    run = udd.simulate(udd.Disk(0.039), np.arange(0, 4, 0.005), [1, 0.02, -0.02, 0.3], dense=True)
     film = udd.render(run, path, size=(276, 350), defects=Defects(wobble=math.radians(degrees)))
     return track_disk(film.path, refine=True).measurement
 
