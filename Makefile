@@ -60,7 +60,7 @@ test-rust: ## only the tests of the Rust core; needs no Python
 	$(STEP) "cargo test" cargo test --locked --no-fail-fast
 
 test-python: .venv/.ready-test ## only the tests of the Python package (ARGS="-k section" for some of them)
-	$(STEP) "pytest" $(PY) -m pytest -n auto --dist loadfile --durations=25 $(ARGS)
+	$(STEP) "pytest" $(PY) -m pytest -n auto --dist worksteal --durations=25 $(ARGS)
 
 test-slow: .venv/.ready-test ## the tests that `make test` leaves out: what faster ones ask, more precisely
 	$(STEP) "pytest, the slow tests" $(PY) -m pytest -m nightly -n auto --durations=0 $(ARGS)

@@ -568,11 +568,15 @@ BROKEN: dict[str, Callable[[], bytes]] = {
 }
 
 
+# At night twice as many of each.
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("name", BROKEN)
-def test_cut_and_mutated_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
+def test_cut_and_mutated_files_are_read_or_refused_in_one_sentence(
+    tmp_path: Path, name: str, times: int
+) -> None:
     whole = BROKEN[name]()
     rng = np.random.default_rng(11)
-    few = 8 if "HDF" in str(format_of(whole[:4096], "")) else 25  # each is read by a process of its own
+    few = times * (4 if "HDF" in str(format_of(whole[:4096], "")) else 25)  # HDF5 starts a process for each
     broken = [whole[: int(cut)] for cut in np.linspace(1, len(whole) - 1, few)]
     for _ in range(3 * few):
         mutated = bytearray(whole)

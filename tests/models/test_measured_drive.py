@@ -80,7 +80,7 @@ def test_a_pendulum_with_a_gyroscope() -> None:
 
 
 def test_what_a_gyroscope_shows_is_enough_to_find_drag() -> None:
-    t = np.arange(0, 25, 0.02)
+    t = np.arange(0, 25, 0.04)
     drag = udd.effects.quadratic_drag(c=0.02)
     rate = udd.simulate(udd.Pendulum(0.5, k0=0.002, effects=drag), t, [0.0, 1.2]).Omega
     seen = rate + 0.05 + 0.01 * np.random.default_rng(3).normal(size=len(t))
