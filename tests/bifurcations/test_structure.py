@@ -423,6 +423,7 @@ def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) 
     assert found.error < 1e-9 and not found.wild
 
 
+@pytest.mark.nightly  # test_rotation_has_a_homoclinic_orbit_as_shilnikov_says asks the same of the DLE
 def test_the_disks_connection_has_cycles_that_wind_towards_it() -> None:
     # From the lower end of the symmetric cycles; 0.0126 is where the folds of the branch born there gather.
     lower = udd.continuation(udd.periodic_orbit(udd.Disk(0.088)), "W", (0.009, 0.09), direction="down")

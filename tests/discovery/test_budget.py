@@ -96,8 +96,8 @@ def test_a_discovery_says_what_was_averaged():
     truth = udd.Pendulum(0.6, k0=0.004, effects=[udd.effects.quadratic_drag(c=0.02)])
     theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
     noise = 5e-3 * np.random.default_rng(3).standard_normal(len(t))
-    found = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(0.6, k0=0.01))
-    assert [f.title for f in found.effects] == ["quadratic drag"]
+    record = udd.Measurement(t, {"theta": theta + noise})
+    found = udd.discover(record, udd.Pendulum(0.6, k0=0.01), budget=1e-6)  # said whatever is found
     assert "The record's 20000 frames were averaged over 5 at a time, to 3998" in found.remarks[-1]
 
 

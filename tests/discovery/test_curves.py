@@ -58,7 +58,8 @@ def test_a_law_of_no_library_is_located_and_described(case):
     assert min(np.sqrt(np.mean(z**2)) for z in off) < 2
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+# Seed 1 asks the same.
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.nightly)])
 def test_friction_by_the_load_is_located_over_the_load(seed):
     def law(t, o, y, z, b):
         return -0.5 * float(unmodelled.squeeze(unmodelled.load(o, y, z, W))) * o, 0.0, 0.0

@@ -116,17 +116,17 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
         within(found, name, value)
 
 
-def test_what_a_later_effect_makes_needless_is_left_out_together() -> None:
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.nightly)])  # 0 asks the same as 1
+def test_what_a_later_effect_makes_needless_is_left_out_together(seed: int) -> None:
     # At first two other terms together do the missing one's work; beside it neither is needed.
     known = udd.Model(["x", "y"], ["1 - a*x + b*x^2*y", "k*x"], {"a": 3.6, "b": 3.4, "k": 3.3})
     truth = known.replace(a=4.03, b=3.1, k=3.03).with_term("y", "x^2*y", loss=-3.1)
     t = np.linspace(0, 10, 512)
     states = udd.simulate(truth, t, [0.7, -1.4]).state
-    for seed in (0, 1):
-        noisy = states * (1 + 0.05 * np.random.default_rng(seed).standard_normal(states.shape))
-        found = udd.discover(udd.Measurement(t, dict(zip("xy", noisy.T, strict=True))), known)
-        assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["x^2*y in y'"]
-        within(found, "x2_y_in_y.c", -3.1)
+    noisy = states * (1 + 0.05 * np.random.default_rng(seed).standard_normal(states.shape))
+    found = udd.discover(udd.Measurement(t, dict(zip("xy", noisy.T, strict=True))), known)
+    assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["x^2*y in y'"]
+    within(found, "x2_y_in_y.c", -3.1)
 
 
 def test_a_model_that_cannot_follow_the_record_lacks_something() -> None:
@@ -219,7 +219,7 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
     assert len(states) == 2 and len(rounds) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # test_friction_in_both_joints_is_found_by_joint asks the same of forces
 def test_damping_at_the_joint_of_a_double_pendulum_is_found_from_its_angles() -> None:
     known = udd.Model(list("abpq"), DOUBLE, {"g": 9.7}, angles=["a", "b"])
     truth = known.with_parameters({"g": 9.81}).with_term("q", DB, c=-0.05)

@@ -13,8 +13,10 @@ import discovered
 import simulated
 import udd
 from udd.discovery.discover import TRAIN
+from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import ripples
 from udd.discovery.scoring.score_scan import scan, scan_ripples, strongest_ripple
+from udd.discovery.trial_fits import of_library
 from udd.discovery.validation import confirmation
 from udd.errors import FitError
 from udd.fitting import extend, fit_record, record_of
@@ -30,13 +32,29 @@ def search(effect: udd.effects.Effect | None, seed: int, duration: float = 30.0)
     return discovered.search(measured, udd.Disk(0.045))
 
 
+SCORED = [E.relaxation(b=4.0), E.quadratic_drag(c=3e-4), E.radial_slip(c=0.005)]
+
+
+@pytest.mark.parametrize("effect", SCORED, ids=lambda e: e.name)
+def test_an_undeclared_effect_scores_first_and_has_its_size(effect):
+    truth = udd.Disk(0.045, effects=[effect])
+    measured, _states = simulated.film(truth, np.random.default_rng(11), 30.0)
+    known = fit_record(measured, record_of(measured), udd.Disk(0.045), search=True)
+    first = score_round(known).usable()[0]
+    assert first.candidate.effect.name == effect.name and first.candidate.effect.momentum == effect.momentum
+    fitted = of_library(known, [first.candidate], list(first.amplitudes)).fit
+    for name in effect.amplitudes:
+        value, found = effect.parameters[name], f"{effect.name}.{name}"
+        error = np.hypot(fitted.errors[found], 0.004 * abs(value))
+        assert abs(fitted.parameters[found] - value) < 4.5 * error
+
+
 @pytest.mark.parametrize(
     "effect",
     [
-        E.relaxation(b=4.0),
+        # test_an_undeclared_effect_scores_first_and_has_its_size asks the same of the fits.
+        *(pytest.param(effect, marks=pytest.mark.nightly) for effect in SCORED),
         E.relaxation(b=4.0, momentum="consistent"),
-        E.quadratic_drag(c=3e-4),
-        E.radial_slip(c=0.005),
         E.drive_ripple(a=0.04, b=0.02, f=0.83),
         E.eccentric_mass(a=0.01, b=-0.01),
         E.uneven_disk(a=0.01, b=0.01, n=3),
@@ -177,6 +195,7 @@ def test_a_disk_without_drive_comes_to_rest():
     assert udd.discover(measured, udd.Disk(0.0)).verdict == "nothing missing"
 
 
+@pytest.mark.nightly  # test_friction_in_both_joints_is_found_by_joint asks the same of another model
 def test_two_effects_are_found():
     truth = udd.Disk(0.045, effects=[E.relaxation(b=5.0), E.quadratic_drag(c=4e-4)])
     measured, _states = simulated.film(truth, np.random.default_rng(8), 40.0)
@@ -270,7 +289,11 @@ def test_a_record_too_short_for_a_forecast_is_refused():
         udd.discover(measured, udd.Disk(0.04))
 
 
-@pytest.mark.parametrize(("name", "length", "most"), [("a", 1.47, 0.2), ("b", 1.13, 0.4)])
+@pytest.mark.parametrize(
+    ("name", "length", "most"),
+    # The first asks the same as the second, but for the pivot.
+    [("a", 1.47, 0.2), pytest.param("b", 1.13, 0.4, marks=pytest.mark.nightly)],
+)
 def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most):
     """loop.md: quadratic drag lowers the held-out error 1.8 to 7.4 times; Coulomb friction is rejected."""
     measured = udd.read_measurement(shared / f"data/real/string_pendulum_{name}.txt")
