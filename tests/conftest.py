@@ -13,10 +13,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _kept(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """The folder of `kept`: one for all processes of the run, each of which has a folder inside it."""
+def _cache_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Set the folder of `cached_on_disk`: one for all processes of the run."""
     base = tmp_path_factory.getbasetemp()
-    os.environ["UDD_KEPT"] = str(base.parent if "PYTEST_XDIST_WORKER" in os.environ else base)
+    os.environ["UDD_TEST_CACHE"] = str(base.parent if "PYTEST_XDIST_WORKER" in os.environ else base)
 
 
 @pytest.fixture(scope="session")

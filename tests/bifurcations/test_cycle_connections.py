@@ -20,7 +20,7 @@ def saddle_of(model: udd.Model) -> udd.Equilibrium:
     return min(udd.equilibria(model), key=lambda one: abs(one.state[0]))
 
 
-@pytest.mark.nightly  # test_the_damped_dle_has_one_and_another_integrator_agrees asks the same of another model
+@pytest.mark.nightly  # test_the_damped_dle_has_one_and_another_integrator_agrees asks the same
 def test_lorenz_has_the_one_where_his_chaos_becomes_an_attractor() -> None:
     lorenz = udd.Model(["x", "y", "z"], ["10*(y-x)", "r*x-y-x*z", "x*y-8/3*z"], {"r": 20.0})
     (one,) = udd.cycle_connections(branch_of(lorenz, "r", (18.0, 30.0), 3.0), saddle_of(lorenz))

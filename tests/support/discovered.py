@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 import udd
-from kept import kept
+from disk_cache import cached_on_disk
 from simulated import film
 
 DRIVE = 0.042
 
 
-@kept
-def told(measurement: Any, model: Any, **options: Any) -> tuple[udd.Discovery, list[str]]:
+@cached_on_disk
+def search_with_progress(measurement: Any, model: Any, **options: Any) -> tuple[udd.Discovery, list[str]]:
     """`udd.discover`, with the lines of its progress, once per run for each record, model and options."""
     lines: list[str] = []
     return udd.discover(measurement, model, progress=lines.append, **options), lines
@@ -23,7 +23,7 @@ def told(measurement: Any, model: Any, **options: Any) -> tuple[udd.Discovery, l
 
 def search(measurement: Any, model: Any, **options: Any) -> udd.Discovery:
     """`udd.discover`, once per run for each record, model and options."""
-    return told(measurement, model, **options)[0]
+    return search_with_progress(measurement, model, **options)[0]
 
 
 @functools.cache

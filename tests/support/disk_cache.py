@@ -29,7 +29,7 @@ def version() -> str:
 
 def folder() -> Path:
     """The run's folder, the same for all its processes; `conftest` puts it into the environment."""
-    return Path(os.environ["UDD_KEPT"])
+    return Path(os.environ["UDD_TEST_CACHE"])
 
 
 @contextmanager
@@ -63,8 +63,8 @@ def key(*values: Any) -> str:
     return state.hexdigest()[:32]
 
 
-def kept(compute: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with its results kept for the run, by a hash of its arguments and of udd.
+def cached_on_disk(compute: Callable[P, R]) -> Callable[P, R]:
+    """Return the function with its results cached for the run, by a hash of its arguments and of udd.
 
     Results and arguments must be such that pickle takes them; an argument that names a file is a `Path`. If
     two processes need the same result, the second one waits for the first one. Every caller gets a copy.

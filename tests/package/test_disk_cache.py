@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import udd
-from kept import kept
+from disk_cache import cached_on_disk
 
 calls: list[tuple[float, float]] = []
 
@@ -27,9 +27,9 @@ def record(shift: float = 0.0) -> udd.Measurement:
 
 
 def test_equal_arguments_are_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("UDD_KEPT", str(tmp_path))
+    monkeypatch.setenv("UDD_TEST_CACHE", str(tmp_path))
     calls.clear()
-    once = kept(summed)
+    once = cached_on_disk(summed)
     first = once(record(), udd.Pendulum(0.5), by=2.0)
     assert once(record(), udd.Pendulum(0.5), by=2.0) == first == pytest.approx(record().values.sum())
     assert len(calls) == 1
@@ -38,20 +38,20 @@ def test_equal_arguments_are_computed_once(tmp_path: Path, monkeypatch: pytest.M
     once(record(), udd.Pendulum(0.5))
     assert len(calls) == 4
     # Of another udd nothing is taken.
-    monkeypatch.setattr("kept.version", lambda: "another")
+    monkeypatch.setattr("disk_cache.version", lambda: "another")
     once(record(), udd.Pendulum(0.5), by=2.0)
     assert len(calls) == 5
 
 
 def test_a_file_counts_by_its_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("UDD_KEPT", str(tmp_path))
+    monkeypatch.setenv("UDD_TEST_CACHE", str(tmp_path))
     read: list[str] = []
 
     def length(path: Path) -> int:
         read.append(path.read_text())
         return len(read[-1])
 
-    once = kept(length)
+    once = cached_on_disk(length)
     places = [tmp_path / name / "film" for name in ("a", "b")]
     for place, text in zip(places, ("short", "short"), strict=True):
         place.parent.mkdir()
@@ -64,7 +64,7 @@ def test_a_file_counts_by_its_content(tmp_path: Path, monkeypatch: pytest.Monkey
 SLOW = """
 import sys, time
 from pathlib import Path
-from kept import kept
+from disk_cache import cached_on_disk
 
 def slow(log):
     with open(log, "a") as file:
@@ -72,7 +72,7 @@ def slow(log):
     time.sleep(0.5)
     return 4
 
-assert kept(slow)(sys.argv[1]) == 4
+assert cached_on_disk(slow)(sys.argv[1]) == 4
 """
 
 
@@ -81,7 +81,7 @@ def test_the_second_of_two_processes_waits_for_the_first(tmp_path: Path) -> None
     script.write_text(SLOW)
     support, package = Path(__file__).parents[1] / "support", Path(udd.__file__).parents[1]
     environment = os.environ | {
-        "UDD_KEPT": str(tmp_path),
+        "UDD_TEST_CACHE": str(tmp_path),
         "PYTHONPATH": os.pathsep.join([str(support), str(package)]),
     }
     log = tmp_path / "log"
