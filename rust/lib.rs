@@ -14,6 +14,7 @@ pub mod estimate;
 pub mod formula;
 pub mod image;
 pub mod integrate;
+mod inverse;
 pub mod memory;
 pub mod model;
 pub mod observe;

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bordered::root;
 use super::{EstimateError, Estimator, Sensor, Unknowns};
+use crate::inverse::invert;
 use crate::model::Family;
 
 /// A filter foretells nothing before it has seen so many frames.
@@ -105,8 +106,8 @@ impl Filter {
         }
         // What is seen of state and noise: h x + root^-1 e.
         let rows = there.len();
-        let within = DMatrix::from_fn(rows, rows, |r, c| root(there[r], there[c]));
-        let noise = within.try_inverse().expect("the diagonal of a triangle has no zero");
+        let mut noise = DMatrix::from_fn(rows, rows, |r, c| root(there[r], there[c]));
+        assert!(invert(noise.as_mut_slice(), rows), "the diagonal of a triangle has no zero");
         let mut seen = DMatrix::zeros(rows, states + channels);
         for r in 0..rows {
             (0..states).for_each(|k| seen[(r, k)] = h[k * channels + there[r]]);

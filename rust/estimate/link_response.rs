@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use super::bordered::zeros;
 use super::link_propagation::{Law, Span, TransitionIntegrator, TransitionRun, variable};
 use super::parameter_jacobian::{WIDTH, Wide, rates_of};
 use super::{EstimateError, Estimator, Sensor, Unknowns};
+use crate::inverse::invert;
 use crate::model::Family;
 use crate::unroll::vector;
 
@@ -132,21 +133,15 @@ where
             for q in 0..PLACES_PER_LINK {
                 let since = PLACES[q] * (end - start);
                 // From here to the end: all the way, less the way up to here.
-                invert(here[q].as_mut_slice(), D);
+                if !invert(here[q].as_mut_slice(), D) {
+                    here[q].fill(0.0);
+                }
                 let response = a * here[q] * (WEIGHTS[q] * (end - start));
                 found.places[q] = QuadraturePoint { since, t: start + since, state: states[q], response };
             }
             Ok(())
         };
         self.each_link(point, &laws, &one, &none, Vec::new())
-    }
-}
-
-/// Puts the inverse of a square matrix in its place, zeros where it has none. Compiled for any size: it is long.
-fn invert(numbers: &mut [f64], size: usize) {
-    match DMatrix::from_column_slice(size, size, numbers).try_inverse() {
-        Some(inverse) => numbers.copy_from_slice(inverse.as_slice()),
-        None => numbers.fill(0.0),
     }
 }
 

@@ -1,8 +1,9 @@
 //! Where in a picture a mark is against where it was expected.
 
-use nalgebra::{Matrix2, Matrix4, Vector4};
+use nalgebra::{Matrix2, Matrix4, SMatrix, Vector4};
 
 use super::coverage::{ExposureIntegral, Local, Mark, Motion, Pose, Window, window};
+use crate::inverse::invert;
 use crate::scalar::{InstructionSet, Isa, Work};
 
 /// A picture: its brightness codes by rows, and where nothing stands before the disk.
@@ -192,10 +193,10 @@ impl Work for Locate<'_> {
         }
         let complete = whole.iter().map(|&x| f64::from(x)).sum::<f64>();
         let squares = dot(&product(&weight, &residual), &residual);
-        let covariance = normal.try_inverse()?.fixed_view::<2, 2>(2, 2).into_owned();
+        let covariance = inverted(normal)?.fixed_view::<2, 2>(2, 2).into_owned();
         let [a, b, c, d] = local.slope;
         let map = Matrix2::new(a, b, c, d);
-        let information = (map * covariance * map.transpose()).try_inverse()?;
+        let information = inverted(map * covariance * map.transpose())?;
         let offset = map * x.fixed_rows::<2>(2);
         let flat = |x: &[[f32; LANES]]| x.as_flattened()[..size].iter().map(|&x| f64::from(x)).collect();
         Some(MarkObservation {
@@ -209,6 +210,11 @@ impl Work for Locate<'_> {
             pixels: keep.then(|| (flat(&weight), flat(&residual))),
         })
     }
+}
+
+/// The inverse, if there is one.
+fn inverted<const N: usize>(mut matrix: SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+    invert(matrix.as_mut_slice(), N).then_some(matrix)
 }
 
 /// Pixels that go together. Sums are kept apart in as many, so that any instruction set adds in one order.
