@@ -1,5 +1,7 @@
 //! How far a Taylor polynomial reaches, and its values.
 
+use std::convert::identity;
+
 use super::Jets;
 use crate::integrate::ErrorNorm;
 use crate::scalar::elementary::power_rough;
@@ -36,32 +38,37 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
     #[inline(always)]
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
-        let series = self.coefficients();
+        let (series, terms) = (self.coefficients(), order.min(N - 1) + 1);
         if const { size_of::<S>() == size_of::<S::Real>() } {
-            return vector!(S, D; n => value(&series[n], order, dt, |c| c));
+            return vector!(S, D; n => value(&series[n][..terms], dt, identity));
         }
         // Derivatives fill the registers: one component after the other.
         let mut x = [S::zero(); D];
         for n in 0..D {
-            x[n] = value(&series[n], order, dt, |c| c);
+            x[n] = value(&series[n][..terms], dt, identity);
         }
         x
     }
 
+    /// The coefficients of a component up to the order.
+    #[inline(always)]
+    fn terms(&self, n: usize) -> &[S] {
+        &self.coefficients()[n][..=self.order()]
+    }
+
     #[inline(always)]
     fn real_values(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D] {
-        let order = self.order();
         if const { S::Real::LANES == 1 } {
             // Only where machines are rare.
             let mut x = [S::Real::zero(); D];
             for n in 0..D {
                 if of[n] {
-                    x[n] = value(&self.coefficients()[n], order, dt, S::real);
+                    x[n] = value(self.terms(n), dt, S::real);
                 }
             }
             return x;
         }
-        vector!(S::Real, D; n => if of[n] { value(&self.coefficients()[n], order, dt, S::real) } else { S::Real::zero() })
+        vector!(S::Real, D; n => if of[n] { value(self.terms(n), dt, S::real) } else { S::Real::zero() })
     }
 
     /// How far the solution may be followed by the series up to this order: the last two terms are then as small
@@ -117,33 +124,36 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     }
 }
 
-/// A component's value at `dt`, of which these are the coefficients; `lift` makes them what the value is to be.
+/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type.
 #[inline(always)]
-fn value<S: Copy, T: Scalar, const N: usize>(
-    series: &[S; N],
-    order: usize,
-    dt: T::Real,
-    lift: impl Fn(S) -> T,
-) -> T {
-    let order = order.min(N - 1);
-    let c = |k: usize| lift(series[k]);
+fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -> T {
     let dt2 = dt * dt;
     let dt4 = dt2 * dt2;
     // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
-    let rounds = order.div_ceil(4) - 1;
+    let (mut groups, mut highest) = series[1..].as_chunks::<4>();
+    if highest.is_empty()
+        && let [lower @ .., last] = groups
+    {
+        (groups, highest) = (lower, last);
+    }
     let mut sums = [T::zero(); 4];
-    unroll!(r in 0..4 => {
-        let k = 4 * rounds + 1 + r;
-        if k <= order {
-            sums[r] = c(k);
+    for (sum, &c) in sums.iter_mut().zip(highest) {
+        *sum = lift(c);
+    }
+    for group in groups.iter().rev() {
+        for r in 0..4 {
+            sums[r] = lift(group[r]).fused_times(sums[r], dt4);
         }
-    });
-    for round in (0..rounds).rev() {
-        unroll!(r in 0..4 => { sums[r] = c(4 * round + 1 + r).fused_times(sums[r], dt4); });
     }
     // The state itself is added last, which rounds once.
     let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
-    c(0).fused_times(low.fused_times(high, dt2), dt)
+    lift(series[0]).fused_times(low.fused_times(high, dt2), dt)
+}
+
+/// The number without derivatives, in every lane.
+#[inline(always)]
+fn broadcast<S: Scalar, const P: usize, V: InstructionSet>(c: S) -> Packet<P, V> {
+    Packet::new([c.real().lane(0); P])
 }
 
 struct Value<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
@@ -177,8 +187,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
                 if of[n] {
-                    let lift = |c: S| Packet::<P, V>::new([c.real().lane(0); P]);
-                    let found = value(&jets.coefficients()[n], jets.order(), places, lift);
+                    let found = value(jets.terms(n), places, broadcast::<S, P, V>);
                     for i in 0..P {
                         states[i][n] = S::Real::constant(found.lane(i));
                     }
