@@ -6,7 +6,7 @@ use crate::integrate::{
     Dop853, Dopri5, ErrorNorm, Failure, Integrator, MaybeTangents, Method, Taylor, Tolerance, WithTangents,
     order,
 };
-use crate::model::{AnySystem, Family};
+use crate::model::{AnySystem, Family, System};
 use crate::scalar::{Dual, Isa, Scalar, constants};
 use crate::tape::Tape;
 use crate::unroll::vector;
@@ -91,38 +91,53 @@ fn one<F: Family<D>, const D: usize, const N: usize>(
     for (i, &p) in wanted.iter().enumerate() {
         values[p] = Dual::variable(piece.values[p], first + i);
     }
+    let how = (tape, &values[..], stop);
+    if const { D > FEW } {
+        // The law, the norm and the methods that are compiled for the exponents of so many states.
+        let law = || family.build(&values);
+        return flown(law, Dopri5::default(), &WithTangents(*tolerance), piece, first, how);
+    }
+    // The norm of fits; the law's type is forgotten.
     let system = family.build(&values);
-    let system: &dyn AnySystem<Dual<f64, N>, D> = &system;
-    // Of many states the norm and the method that are compiled for their exponents, of few the norm of fits.
-    let tangents = WithTangents(*tolerance);
-    let fitted = MaybeTangents { tolerance: *tolerance, tangents: true };
+    let law: &dyn AnySystem<Dual<f64, N>, D> = &system;
+    let norm = MaybeTangents { tolerance: *tolerance, tangents: true };
+    flown(|| law, Dop853::default(), &norm, piece, first, how)
+}
+
+/// One piece by the law's power series, or by stages where there is none or it does not serve.
+fn flown<M, E, K, const D: usize, const N: usize>(
+    law: impl Fn() -> M,
+    stages: K,
+    norm: &E,
+    piece: &Segment<D>,
+    first: usize,
+    (tape, values, stop): (Option<&Tape<D>>, &[Dual<f64, N>], &CancelFlag),
+) -> Result<SegmentEnd<D>, Failure>
+where
+    M: System<Dual<f64, N>, D>,
+    E: ErrorNorm<Dual<f64, N>, D> + Copy,
+    K: Method<Dual<f64, N>, D>,
+{
     if let Some(tape) = tape {
-        let method = Taylor::new(tape, values, order(tolerance), Isa::best());
-        let flown = match const { D > FEW } {
-            true => follow(method, system, piece, first, &tangents, stop),
-            false => follow(method, system, piece, first, &fitted, stop),
-        };
-        match flown {
+        let method = Taylor::new(tape, values.to_vec(), order(norm.state()), Isa::best());
+        match follow(law(), method, norm, piece, first, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             flown => return flown,
         }
     }
-    if const { D > FEW } {
-        follow(Dopri5::default(), system, piece, first, &tangents, stop)
-    } else {
-        follow(Dop853::default(), system, piece, first, &fitted, stop)
-    }
+    follow(law(), stages, norm, piece, first, stop)
 }
 
-fn follow<E, K, const D: usize, const N: usize>(
+fn follow<M, E, K, const D: usize, const N: usize>(
+    law: M,
     method: K,
-    system: &dyn AnySystem<Dual<f64, N>, D>,
+    norm: &E,
     piece: &Segment<D>,
     first: usize,
-    norm: &E,
     stop: &CancelFlag,
 ) -> Result<SegmentEnd<D>, Failure>
 where
+    M: System<Dual<f64, N>, D>,
     E: ErrorNorm<Dual<f64, N>, D> + Copy,
     K: Method<Dual<f64, N>, D>,
 {
@@ -131,7 +146,7 @@ where
         |n: usize| if n < first { Dual::variable(piece.x[n], n) } else { Dual::constant(piece.x[n]) };
     let start = vector!(Dual<f64, N>, D; n => variable(n));
     let end = piece.t + piece.span;
-    let mut driver = Integrator::by(method, system, piece.t, start, Some(piece.span), norm);
+    let mut driver = Integrator::by(method, law, piece.t, start, Some(piece.span), norm);
     while driver.t() != end {
         stop.check()?;
         driver.advance(end)?;

@@ -12,7 +12,7 @@ use crate::analysis::{
     rows,
 };
 use crate::integrate::{Dopri5, Failure, Taylor, Tolerance, order};
-use crate::model::{AnySystem, Family};
+use crate::model::Family;
 use crate::scalar::{Dual, Isa, constants};
 
 /// Columns, one row for each orbit.
@@ -148,7 +148,7 @@ fn frames<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?.undriven()?.filled();
     let tolerance = Tolerance { rtol, atol };
-    let (states, growth, covariant, dimension) = with_wide_model!(tangents: &model, |family, values| {
+    let (states, growth, covariant, dimension) = with_wide_model!(packets: &model, |family, values| {
         let x0 = state(&state0, family.idle())?;
         let found = interrupt::run(py, |stop| follow(family, values, x0, (dt, count), &tolerance, stop))?;
         let flat = found.covariant.as_flattened().as_flattened().to_vec();
@@ -173,16 +173,15 @@ fn follow<F: Family<D>, const D: usize>(
     stop: &CancelFlag,
 ) -> Result<CovariantFrames<D>, Failure> {
     let wide: Vec<Dual<f64, D>> = constants(values);
-    // Its type is forgotten: models of as many states share what follows.
-    let system: &dyn AnySystem<Dual<f64, D>, D> = &family.build(&wide);
+    // The steps are those of a run for exponents, and share what is compiled for it.
     if let Some(tape) = &rows::tape(family, &[values.to_vec()]) {
-        let method = Taylor::new(tape, wide, order(tolerance), Isa::best());
-        match frames_of(system, method, (x0, family.idle()), span, tolerance, stop) {
+        let method = Taylor::new(tape, wide.clone(), order(tolerance), Isa::best());
+        match frames_of(family.build(&wide), method, (x0, family.idle()), span, tolerance, stop) {
             Err(failure) if tape.hands_over(&failure) => {}
             found => return found,
         }
     }
-    frames_of(system, Dopri5::default(), (x0, family.idle()), span, tolerance, stop)
+    frames_of(family.build(&wide), Dopri5::default(), (x0, family.idle()), span, tolerance, stop)
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
