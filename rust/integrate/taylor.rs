@@ -208,10 +208,10 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
         let weights = norm.weights(&at.x);
         let jets = &mut method.jets;
         jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);
-        if const { V::ISA.is_rare() } {
+        if const { V::ISA.is_rare() || size_of::<S>() > 2 * size_of::<S::Real>() } {
             return followed(jets, jets.order(), h, norm, &weights);
         }
-        // The usual orders known to the compiler.
+        // The usual orders known to the compiler: not where tangents make every operation long.
         match jets.order() {
             LOW => followed(jets, LOW, h, norm, &weights),
             HIGH => followed(jets, HIGH, h, norm, &weights),
