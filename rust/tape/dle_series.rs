@@ -49,31 +49,32 @@ pub(super) fn expand<V: InstructionSet, S: Scalar, const D: usize, const N: usiz
             }
         }
     }
-    // A step of two registers for each part, whose end waits less, but a series that fits into the registers.
-    if const { S::Real::LANES > LANES && size_of::<S>() > size_of::<S::Real>() }
-        && matches!(order, LOW | HIGH)
-    {
-        for i in 0..S::Real::LANES / LANES {
-            let part = |x: S| x.register(i);
-            let keep = |n: usize, k: usize, c: S::Register| work[n][k].set_register(i, c);
-            let mut room = [[<S::Register as Number>::zero(); N]; 3];
-            let series = &mut Series::of(&mut room, x.map(part), part(held[0]), None);
-            match order {
-                LOW => unrolled::<_, N, LOW>(series, keep),
-                _ => unrolled::<_, N, HIGH>(series, keep),
-            }
+    if const { worthwhile::<S, N>() && !V::ISA.is_rare() } && matches!(order, LOW | HIGH) {
+        if const { doubled::<S>() } {
+            return by_register(work, order, (held[0], x));
         }
-        return;
+        let series = &mut Series::of(work, x, held[0], None);
+        return match order {
+            LOW => unrolled::<_, N, LOW>(series, |_, _, _| {}),
+            _ => unrolled::<_, N, HIGH>(series, |_, _, _| {}),
+        };
     }
-    let series = &mut Series::of(work, x, held[0], None);
-    if const { worthwhile::<S, N>() && !V::ISA.is_rare() } {
+    rolled(&mut Series::of(work, x, held[0], None), order);
+}
+
+/// A step of two registers for each part, whose end waits less, but a series that fits into the registers.
+#[inline(always)]
+fn by_register<S: Scalar, const N: usize>(work: &mut [[S; N]; 3], order: usize, (w, x): (S, [S; 3])) {
+    for i in 0..S::Real::LANES / LANES {
+        let part = |x: S| x.register(i);
+        let keep = |n: usize, k: usize, c: S::Register| work[n][k].set_register(i, c);
+        let mut room = [[<S::Register as Number>::zero(); N]; 3];
+        let series = &mut Series::of(&mut room, x.map(part), part(w), None);
         match order {
-            LOW => return unrolled::<_, N, LOW>(series, |_, _, _| {}),
-            HIGH => return unrolled::<_, N, HIGH>(series, |_, _, _| {}),
-            _ => {}
+            LOW => unrolled::<_, N, LOW>(series, keep),
+            _ => unrolled::<_, N, HIGH>(series, keep),
         }
     }
-    rolled(series, order);
 }
 
 /// The series over other numbers, made of these and turned back; false for an order that is not unrolled.
@@ -99,6 +100,11 @@ fn aside<S: Scalar, T: Number, const N: usize>(
 /// Whether orders are unrolled: not where tangents make every operation long.
 const fn worthwhile<S: Scalar, const N: usize>() -> bool {
     N == HIGH + 1 && size_of::<S>() <= 2 * size_of::<S::Real>()
+}
+
+/// Whether numbers with derivatives fill two registers for each part.
+const fn doubled<S: Scalar>() -> bool {
+    S::Real::LANES > LANES && size_of::<S>() > size_of::<S::Real>()
 }
 
 #[inline(always)]
