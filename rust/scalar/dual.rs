@@ -54,40 +54,66 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
     }
 }
 
-/// Derivatives of derivatives: products of them are long, and functions of their own.
+/// Whether products of numbers with derivatives in `S` are functions of their own: derivatives of derivatives make them
+/// long.
 const fn nested<S: Scalar>() -> bool {
-    size_of::<S>() > size_of::<S::Real>() && S::Real::LANES == 1
+    S::ORDER >= 1 && S::Real::LANES == 1
 }
 
-/// `a b`, by the product rule.
+/// The same for sums: derivatives of the third order make them long, too.
+const fn deep<S: Scalar>() -> bool {
+    S::ORDER >= 2
+}
+
+/// The operation as a function of its own.
+#[inline(never)]
+fn apart<A, T>(operation: impl Fn(A) -> T, operands: A) -> T {
+    operation(operands)
+}
+
 #[inline(always)]
-fn product<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
+fn sum<S: Scalar, const N: usize>((a, b): (&Dual<S, N>, &Dual<S, N>)) -> Dual<S, N> {
+    Dual { re: a.re + b.re, d: vector!(S, N; i => a.d[i] + b.d[i]) }
+}
+
+#[inline(always)]
+fn difference<S: Scalar, const N: usize>((a, b): (&Dual<S, N>, &Dual<S, N>)) -> Dual<S, N> {
+    Dual { re: a.re - b.re, d: vector!(S, N; i => a.d[i] - b.d[i]) }
+}
+
+/// By the product rule.
+#[inline(always)]
+fn product<S: Scalar, const N: usize>((a, b): (&Dual<S, N>, &Dual<S, N>)) -> Dual<S, N> {
     Dual { re: a.re * b.re, d: vector!(S, N; i => a.d[i] * b.re + b.d[i] * a.re) }
 }
 
-/// `a/b`.
 #[inline(always)]
-fn quotient<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
+fn quotient<S: Scalar, const N: usize>((a, b): (&Dual<S, N>, &Dual<S, N>)) -> Dual<S, N> {
     let inverse = S::one() / b.re;
     let re = a.re * inverse;
     Dual { re, d: vector!(S, N; i => (a.d[i] - b.d[i] * re) * inverse) }
 }
 
-#[inline(never)]
-fn product_apart<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
-    product(a, b)
+#[inline(always)]
+fn scaled<S: Scalar, const N: usize>((a, factor): (&Dual<S, N>, f64)) -> Dual<S, N> {
+    Dual { re: a.re.scale(factor), d: vector!(S, N; i => a.d[i].scale(factor)) }
 }
 
-#[inline(never)]
-fn quotient_apart<S: Scalar, const N: usize>(a: &Dual<S, N>, b: &Dual<S, N>) -> Dual<S, N> {
-    quotient(a, b)
+#[inline(always)]
+fn negative<S: Scalar, const N: usize>(a: &Dual<S, N>) -> Dual<S, N> {
+    Dual { re: -a.re, d: vector!(S, N; i => -a.d[i]) }
+}
+
+#[inline(always)]
+fn selected<S: Scalar, const N: usize>((mask, yes, no): (S::Mask, &Dual<S, N>, &Dual<S, N>)) -> Dual<S, N> {
+    Dual { re: S::select(mask, yes.re, no.re), d: vector!(S, N; i => S::select(mask, yes.d[i], no.d[i])) }
 }
 
 impl<S: Scalar, const N: usize> Add for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Self { re: self.re + o.re, d: vector!(S, N; i => self.d[i] + o.d[i]) }
+        if const { deep::<S>() } { apart(sum, (&self, &o)) } else { sum((&self, &o)) }
     }
 }
 
@@ -95,7 +121,7 @@ impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Self { re: self.re - o.re, d: vector!(S, N; i => self.d[i] - o.d[i]) }
+        if const { deep::<S>() } { apart(difference, (&self, &o)) } else { difference((&self, &o)) }
     }
 }
 
@@ -103,7 +129,7 @@ impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        if const { nested::<S>() } { product_apart(&self, &o) } else { product(&self, &o) }
+        if const { nested::<S>() } { apart(product, (&self, &o)) } else { product((&self, &o)) }
     }
 }
 
@@ -111,7 +137,7 @@ impl<S: Scalar, const N: usize> Div for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn div(self, o: Self) -> Self {
-        if const { nested::<S>() } { quotient_apart(&self, &o) } else { quotient(&self, &o) }
+        if const { nested::<S>() } { apart(quotient, (&self, &o)) } else { quotient((&self, &o)) }
     }
 }
 
@@ -119,7 +145,7 @@ impl<S: Scalar, const N: usize> Neg for Dual<S, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { re: -self.re, d: vector!(S, N; i => -self.d[i]) }
+        if const { deep::<S>() } { apart(negative, &self) } else { negative(&self) }
     }
 }
 
@@ -165,7 +191,7 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     }
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
-        Self { re: self.re.scale(factor), d: vector!(S, N; i => self.d[i].scale(factor)) }
+        if const { deep::<S>() } { apart(scaled, (&self, factor)) } else { scaled((&self, factor)) }
     }
     #[inline(always)]
     fn times(self, factor: S::Real) -> Self {
@@ -176,6 +202,7 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         let d = vector!(S, N; i => self.d[i].fused(a.d[i], b.re).fused(b.d[i], a.re));
         Self { re: self.re.fused(a.re, b.re), d }
     }
+    const ORDER: usize = S::ORDER + 1;
     const DERIVATIVES: usize = if size_of::<S>() == size_of::<f64>() && N <= 4 { N } else { 0 };
 
     #[inline(always)]
@@ -196,7 +223,7 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     }
     #[inline(always)]
     fn select(mask: S::Mask, yes: Self, no: Self) -> Self {
-        Self { re: S::select(mask, yes.re, no.re), d: vector!(S, N; i => S::select(mask, yes.d[i], no.d[i])) }
+        if const { deep::<S>() } { apart(selected, (mask, &yes, &no)) } else { selected((mask, &yes, &no)) }
     }
     #[inline(always)]
     fn mask(value: bool) -> S::Mask {

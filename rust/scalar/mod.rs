@@ -71,6 +71,8 @@ pub trait Scalar:
 
     /// Whether it records what is done with it: then all branches are taken, and none is known.
     const SYMBOLIC: bool = false;
+    /// The order of its derivatives: 0 for a number without.
+    const ORDER: usize = 0;
     /// The derivatives of a number that has a few of them: up to three make a [`DerivativeLanes`], four a [`Spread`] number, which
     /// are faster.
     const DERIVATIVES: usize = 0;
