@@ -2,8 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What the questions of one kind may take.
+
+    Attributes
+    ----------
+    processes : int
+        How many are answered at once.
+    seconds : float
+        Processor time of a question.
+    share : float
+        Seconds after which a question ends if another one waits.
+    """
+
+    processes: int
+    seconds: float
+    share: float
+
+
+RUNS = Budget(processes=16, seconds=10.0, share=2.0)
+MAPS = Budget(processes=2, seconds=60.0, share=10.0)  # sections, diagrams, tables
+STEPS = 10_000_000  # of a run
+QUESTIONS = 64  # that a page may have open
+CONNECTIONS = 256  # in all
+CLIENT_CONNECTIONS = 64  # from one address
+BACKLOG = 128  # connections that wait to be accepted
 MESSAGE = 1 << 16  # bytes of a message on the WebSocket
-PAUSE = 10.0  # s that a sender may take between two pieces of a request
+PAUSE = 10.0  # s that a connection may be idle, or a sender pause, or the head of a request take
 UPLOAD = 300 << 20  # bytes of a film or a table
 PIXELS = 4096 * 2304  # of a film's frame
 FRAMES = 40_000  # of a film

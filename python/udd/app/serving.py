@@ -10,8 +10,6 @@ from collections.abc import Callable
 
 from udd.errors import UddError
 
-from . import limits
-
 
 def serve(
     host: str, port: int, *, fragment: str = "", browser: bool = True, ready: Callable[[str], object] = print
@@ -34,8 +32,7 @@ def serve(
     UddError
         The address cannot be used.
     """
-    import uvicorn
-
+    from .connections import raise_file_limit, server_of
     from .server import make_app, new_token
 
     listening = _listen(host, port)
@@ -50,16 +47,8 @@ def serve(
     token = new_token()
     shown = names[0] if not any_address else f"{_own_name()}:{port}"
     link = f"http://{shown}/?token={token}"
-    config = uvicorn.Config(
-        make_app(token, names, any_address=any_address),
-        log_level="warning",
-        access_log=False,
-        ws_max_size=limits.MESSAGE,
-        proxy_headers=False,
-        server_header=False,
-        timeout_graceful_shutdown=2,
-    )
-    server = uvicorn.Server(config)
+    server = server_of(make_app(token, names, any_address=any_address, prepared=True))
+    raise_file_limit()
     ready(link)
     if browser:
         webbrowser.open(link + (f"#{fragment}" if fragment else ""))
