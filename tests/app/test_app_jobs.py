@@ -77,23 +77,20 @@ def test_a_film_that_is_cut_off_is_refused(client: TestClient) -> None:
     assert "cut off" in said["answer"]["error"]
 
 
-def test_an_upload_is_no_larger_than_fits(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_an_upload_is_no_larger_than_fits(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "UPLOAD", 1 << 20)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     declared = client.post("/api/jobs/film", content=b"x" * (2 << 20))
     assert (declared.status_code, declared.text) == (413, "The file is larger than 1 MB.")
     piecewise = client.post("/api/jobs/film", content=iter([b"x" * (1 << 19)] * 4))
     assert (piecewise.status_code, piecewise.text) == (413, "The file is larger than 1 MB.")
     empty = client.post("/api/jobs/film", content=b"")
     assert (empty.status_code, empty.text) == (400, "The file is empty.")
-    assert list(tmp_path.iterdir()) == []
+    folder: Path = client.app.state.parts["folder"]  # type: ignore[attr-defined]
+    assert [path.name for path in folder.iterdir()] == ["lock"]
 
 
-def test_what_is_uploaded_is_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    folder = uploads.private_folder()
+def test_what_is_uploaded_is_private(tmp_path: Path) -> None:
+    folder = uploads.private_folder(tmp_path)
     assert folder.stat().st_mode & 0o077 == 0
 
     async def chunks() -> Any:

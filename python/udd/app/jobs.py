@@ -164,9 +164,7 @@ async def _run(job: Job) -> None:
 async def _talk(job: Job, to: asyncio.StreamWriter, back: asyncio.StreamReader) -> None:
     to.write((json.dumps(job.asked) + "\n").encode())
     with contextlib.suppress(ConnectionError):
-        await to.drain()
-        to.close()
-        await to.wait_closed()
+        await to.drain()  # and left open: the process ends with its input
     async for line in back:
         if job.state != "running":
             break

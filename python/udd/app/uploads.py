@@ -18,9 +18,9 @@ class TooLarge(UddError):
     """More was sent than is taken."""
 
 
-def private_folder() -> Path:
+def private_folder(parent: Path) -> Path:
     """A new folder that only this user can read."""
-    return Path(tempfile.mkdtemp(prefix="udd-app-"))
+    return Path(tempfile.mkdtemp(dir=parent))
 
 
 async def text(chunks: AsyncIterator[bytes]) -> str:

@@ -22,7 +22,7 @@ from typing import Any
 from udd._util.json_output import as_json
 from udd.errors import UddError
 
-from . import limits
+from . import child_process, limits
 from .error_text import sentence
 
 OUT = Path("out")
@@ -43,7 +43,8 @@ def main() -> None:
         said.flush()
 
     asked = json.loads(sys.stdin.readline())
-    _limit()
+    child_process.end_with_server()
+    child_process.limit(limits.CPU_SECONDS)
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always", UserWarning)
@@ -55,16 +56,6 @@ def main() -> None:
         tell({"error": _sentence(error, asked.get("file", ""))})
     except MemoryError:
         tell({"error": "This takes more memory than a job may have."})
-
-
-def _limit() -> None:
-    """So much and no more, where the system can do that."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
-    resource.setrlimit(resource.RLIMIT_CPU, (limits.CPU_SECONDS, limits.CPU_SECONDS + 5))
-    resource.setrlimit(resource.RLIMIT_AS, (limits.MEMORY, limits.MEMORY))
 
 
 def _sentence(error: Exception, file: str) -> str:
@@ -156,12 +147,13 @@ def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     from udd.simulation.trajectory import integrated
 
     from .growing_run import RATE, times_of
+    from .interruption import Interruptible
     from .spec import start_of
 
     start, seconds = start_of(asked["start"]), float(asked["seconds"])
     tell({"say": "filming the run"})
     times = times_of(start.model, round(seconds * RATE) + 1)
-    run = integrated(start.model, times, start.state)
+    run = Interruptible().run(lambda: integrated(start.model, times, start.state), limits.RUNS.seconds)
     render(run, OUT / "run.mp4")
     return {"parts": [{"name": "run.mp4", "title": "Film of the run"}]}
 
