@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.errors import ModelError
+from udd.errors import ModelError, UddError
 from udd.models import Model
 from udd.simulation.energy import EnergyBalance, angular_momentum, energy_balance
 from udd.simulation.trajectory import Trajectory, integrated
@@ -39,49 +40,104 @@ def times_of(model: Model, count: int) -> Array:
 
 
 def columns_of(model: Model) -> list[str]:
-    """What is told of every time: the state, and what is drawn or plotted beside it."""
+    """The columns of a run's table: the state, then what is drawn or plotted with it."""
     return [*model.state_names, page_model(model).drawn, "friction", "friction_work", "effects_work"]
+
+
+class Grown(NamedTuple):
+    """The beginning of a run.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times.
+    rows : ndarray, shape (n, columns)
+        The columns that `columns_of` names.
+    outcome : str
+        "running", or why the run ends with the last of these states.
+    motor : float
+        Power of the motor.
+    steps : int
+        Steps that the call took.
+    """
+
+    t: Array
+    rows: Array
+    outcome: str
+    motor: float
+    steps: int
+
+
+def grown(start: Start, count: int) -> Grown:
+    """Run over `count` states and return the first half of them."""
+    model = start.model
+    run = integrated(model, times_of(model, count), start.state)
+    told = count // 2
+    most = int(limits.MODEL_SECONDS * RATE)
+    outcome = "running"
+    if run.outcome != "finished" and len(run.t) <= told:
+        outcome, told = run.outcome, len(run.t)
+    elif told >= most:
+        outcome, told = "full", most
+    books = energy_balance(run)
+    steps = run.stats.accepted + run.stats.rejected
+    return Grown(run.t[:told], _table(run, books, told), outcome, float(books.motor[0]), steps)
 
 
 class Run:
     """States on a fixed grid of times, as one call of `udd.simulate` over a longer time gives them.
 
-    A call's last step is cut to end at the last time, which moves the last few states by rounding. So a call
-    runs twice as far as its states are told, and the next call repeats them bit by bit. (Steps are far
-    shorter than half a call: friction bounds them at about a second.)
+    A call's last step is cut to end at the last time, which moves the last few states by rounding. So only the
+    first half of a call's states is used, and the next call repeats them bit by bit. (Steps are far shorter
+    than half a call: friction bounds them at about a second.)
+
+    The run ends as "spent" where the next call would take more than `limits.STEPS` steps.
     """
 
     def __init__(self, start: Start) -> None:
         self.start = start
         self.outcome = "running"
+        self.motor = 0.0
         self.rows = np.empty((0, 0))
         self.t = np.empty(0)
-        self._grow(int(_FIRST * RATE))
+        self._asked = 0
+        self._refused: UddError | None = None
 
-    def _grow(self, count: int) -> None:
-        """Run over twice so many states as will be told."""
-        model = self.start.model
-        run = integrated(model, times_of(model, count), self.start.state)
-        told = count // 2
-        most = int(limits.MODEL_SECONDS * RATE)
-        self._asked = count
-        if run.outcome != "finished" and len(run.t) <= told:
-            self.outcome = run.outcome
-            told = len(run.t)
-        elif told >= most:
-            self.outcome, told = "full", most
-        books = energy_balance(run)
-        rows = _table(run, books, told)
-        self.motor = float(books.motor[0])
-        before, dim = len(self.rows), run.state.shape[1]
-        if before and not np.array_equal(rows[:before, :dim], self.rows[:, :dim]):
+    def lacks(self, count: int) -> int:
+        """Return over how many states the next call must run for `count` states; 0 if they are there.
+
+        Raises
+        ------
+        UddError
+            The run could not begin, as an earlier call showed.
+        """
+        if self._refused is not None:
+            raise self._refused
+        if self.outcome != "running" or len(self.rows) >= count:
+            return 0
+        return 2 * self._asked if self._asked else int(_FIRST * RATE)
+
+    def take(self, count: int, more: Grown) -> None:
+        """Take over what a call over `count` states gave."""
+        before, dim = len(self.rows), len(self.start.state)
+        if before and not np.array_equal(more.rows[:before, :dim], self.rows[:, :dim]):
             raise AssertionError("a longer run did not repeat a shorter one")
-        self.rows, self.t = rows, run.t[:told]
+        self._asked = count
+        self.t, self.rows, self.outcome, self.motor = more.t, more.rows, more.outcome, more.motor
+        if self.outcome == "running" and 2 * more.steps > limits.STEPS:
+            self.outcome = "spent"
+
+    def end(self, refusal: UddError) -> None:
+        """End the run where it is, as a call took too much; without states refuse it."""
+        if len(self.rows):
+            self.outcome = "spent"
+        else:
+            self._refused = refusal
 
     def piece(self, first: int, count: int) -> tuple[Array, bool]:
         """States `first` to ``first + count`` (fewer where it ends), and whether the run ends with them."""
-        while self.outcome == "running" and len(self.rows) < first + count:
-            self._grow(2 * self._asked)
+        while states := self.lacks(first + count):
+            self.take(states, grown(self.start, states))
         last = min(first + count, len(self.rows))
         return self.rows[first:last], self.outcome != "running" and last == len(self.rows)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +22,7 @@ from .spec import Start, drive_of
 Array = NDArray[np.float64]
 
 _TRANSIENT = 60  # crossings left out
-_VALUES = (90, 300)  # of the drive: a first picture, then a better one
+VALUES = (90, 300)  # of the drive: a first picture, then a better one
 _KEPT = 40  # points of every orbit in a diagram
 
 
@@ -80,13 +79,16 @@ def starts_of(start: Start) -> Array:
     return np.array([state, mirrored, third])
 
 
-def diagram(start: Start, low: float, high: float) -> Iterator[Diagram | Exponents]:
-    """A diagram over the drive and the exponents under it, first coarse, then fine."""
+def diagram(start: Start, low: float, high: float, count: int) -> Diagram:
+    """Compute the diagram over so many values of the drive."""
     model, name = beyond_the_edge(start.model), drive_of(start.model)
-    for count in _VALUES:
-        values = np.linspace(low, high, count)
-        yield _diagram(model, name, values, starts_of(start))
-        yield _exponents(model, name, values)
+    return _diagram(model, name, np.linspace(low, high, count), starts_of(start))
+
+
+def exponents(start: Start, low: float, high: float, count: int) -> Exponents:
+    """Compute the largest exponents over so many values of the drive."""
+    model, name = beyond_the_edge(start.model), drive_of(start.model)
+    return _exponents(model, name, np.linspace(low, high, count))
 
 
 def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:

@@ -7,8 +7,7 @@ import contextlib
 import math
 import secrets
 import shutil
-from collections.abc import AsyncIterator, Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import AsyncIterator, Callable, Coroutine
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,9 @@ from udd.errors import UddError
 from udd.models import Disk
 
 from . import limits, uploads
+from .calculators import Calculators
 from .error_text import sentence
+from .folders import workspace
 from .growing_run import as_csv
 from .jobs import Jobs
 from .presets import catalogue
@@ -37,15 +38,27 @@ from .stream import Page
 STATIC = Path(__file__).parent / "static"
 
 
-def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Starlette:
-    """The application; it answers to these hosts (``name:port``) and those who know the token."""
-    jobs, workers = Jobs(), ThreadPoolExecutor(1, "udd-maps")
+def make_app(token: str, hosts: list[str], *, any_address: bool = False, prepared: bool = False) -> Starlette:
+    """The application; it answers to these hosts (``name:port``) and those who know the token.
+
+    With `prepared`, processes wait for the first question.
+    """
+    jobs = Jobs()
+    state: dict[str, Any] = {}
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        async with jobs:
-            yield
-        workers.shutdown(wait=False, cancel_futures=True)
+        with workspace() as folder:
+            runs, maps = Calculators(limits.RUNS), Calculators(limits.MAPS)
+            state.update(folder=folder, runs=runs, maps=maps)
+            ready = asyncio.gather(runs.prepare(), maps.prepare()) if prepared else None
+            try:
+                async with jobs:
+                    yield
+            finally:
+                if ready is not None:
+                    ready.cancel()
+                await asyncio.gather(runs.close(), maps.close())
 
     async def page(_: Request) -> Response:
         return FileResponse(STATIC / "index.html")
@@ -55,13 +68,13 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
 
     async def table(request: Request) -> Response:
         start = start_of(parsed("the run", request.query_params.get("run", "")))
-        # A long run takes seconds, in which the pages are answered.
-        text = await asyncio.to_thread(as_csv, start, _number(request, "seconds") or math.nan)
+        seconds = _number(request, "seconds") or math.nan
+        text = await _while_there(request, state["maps"].ask(as_csv, start, seconds))
         return _download(Response(text, media_type="text/csv"), "udd-run.csv")
 
     async def new_job(request: Request) -> Response:
         kind = request.path_params["kind"]
-        folder = uploads.private_folder()
+        folder = uploads.private_folder(state["folder"])
         try:
             asked = await _asked(kind, request, folder)
         except BaseException:
@@ -80,7 +93,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
         return _download(response, f"udd-{file.name}") if "download" in request.query_params else response
 
     async def socket(websocket: WebSocket) -> None:
-        await Page(websocket, jobs, workers).serve()
+        await Page(websocket, jobs, state["runs"], state["maps"]).serve()
 
     routes = [
         Route("/", page),
@@ -94,8 +107,27 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False) -> Star
     handlers: dict[Any, Callable[..., Any]] = {UddError: _refused}
     guard = Middleware(Guard, token=token, hosts=hosts, any_address=any_address)
     app = Starlette(routes=routes, middleware=[guard], exception_handlers=handlers, lifespan=lifespan)
-    app.state.jobs = jobs
+    app.state.jobs, app.state.parts = jobs, state
     return app
+
+
+async def _while_there(request: Request, work: Coroutine[Any, Any, Any]) -> Any:
+    """Return what the work returns; it ends when the visitor has gone."""
+
+    async def gone() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+
+    tasks = [asyncio.ensure_future(work), asyncio.ensure_future(gone())]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        if not tasks[0].done():
+            raise UddError("The visitor has gone.")
+        return tasks[0].result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
 
 
 def new_token() -> str:

@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 import json
 from collections.abc import AsyncIterator, Callable
-from concurrent.futures import Executor
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -20,8 +19,10 @@ from udd._util.validation import number
 from udd.errors import UddError
 
 from . import limits, maps, wire
+from .calculators import Calculators
 from .error_text import sentence
-from .growing_run import RATE, Runs, columns_of
+from .growing_run import RATE, Runs, columns_of, grown
+from .interruption import SpentError
 from .jobs import Jobs, Send
 from .spec import message_of, start_of, whole
 
@@ -31,28 +32,28 @@ _WAITING = 64  # messages that a page may be behind
 class Page:
     """What one connected page has asked for."""
 
-    def __init__(self, socket: WebSocket, jobs: Jobs, workers: Executor) -> None:
+    def __init__(self, socket: WebSocket, jobs: Jobs, runs: Calculators, maps: Calculators) -> None:
         self._socket = socket
         self._jobs = jobs
-        self._workers = workers  # draws one map at a time, whoever asks
+        self._calculators = {"runs": runs, "maps": maps}
         self._runs = Runs()
         self._out: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(_WAITING)
-        self._maps: dict[str, asyncio.Task[None]] = {}
+        self._open: dict[asyncio.Task[None], tuple[str, int]] = {}  # questions by kind and generation
+        self._turns = {kind: asyncio.Lock() for kind in ("run", "section", "diagram")}
 
     async def serve(self) -> None:
-        """Answer until the page is gone."""
+        """Answer until the page is gone; what it asked for ends with it."""
         await self._socket.accept()
-        sender = asyncio.create_task(self._sending())
+        both = [asyncio.create_task(self._reading()), asyncio.create_task(self._sending())]
         try:
-            while True:
-                await self._answer(await self._socket.receive_text())
-        except (WebSocketDisconnect, KeyError):  # KeyError: a binary message
-            pass
+            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for job in self._jobs.jobs.values():
                 job.watchers.discard(self.post)
-            for task in [sender, *self._maps.values()]:
+            tasks = [*both, *self._open]
+            for task in tasks:
                 task.cancel()
+            await asyncio.wait(tasks)
 
     def post(self, message: dict[str, Any] | bytes) -> None:
         """Send without waiting; a page that is far behind misses pictures, not words."""
@@ -70,6 +71,11 @@ class Page:
                     await self._socket.send_bytes(message)
                 else:
                     await self._socket.send_text(json.dumps(message))
+
+    async def _reading(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect, KeyError):  # KeyError: a binary message
+            while True:
+                await self._answer(await self._socket.receive_text())
 
     async def _answer(self, text: str) -> None:
         said: dict[str, Any] = {}
@@ -99,15 +105,24 @@ class Page:
         start = start_of(said)
         if first > limits.MODEL_SECONDS * RATE:
             raise UddError("the run is not that long")
-        run = await asyncio.to_thread(self._runs.of, start)
-        rows, last = await asyncio.to_thread(run.piece, first, count)
-        if first == 0:
-            about = {"columns": columns_of(start.model), "motor": run.motor}
-            await self._out.put({"type": "run", "generation": generation, "run": which, **about})
-        await self._out.put(wire.piece(generation, which, first, rows, last))
-        if last:
-            end = {"outcome": run.outcome, "t": float(run.t[-1]), "count": len(run.t)}
-            await self._out.put({"type": "end", "generation": generation, "run": which, **end})
+
+        async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
+            run = self._runs.of(start)
+            while states := run.lacks(first + count):
+                try:
+                    run.take(states, await self._calculators["runs"].ask(grown, start, states))
+                except SpentError as error:
+                    run.end(error)
+            rows, last = run.piece(first, count)
+            if first == 0:
+                about = {"columns": columns_of(start.model), "motor": run.motor}
+                yield {"type": "run", "generation": generation, "run": which, **about}
+            yield wire.piece(generation, which, first, rows, last)
+            if last:
+                end = {"outcome": run.outcome, "t": float(run.t[-1]), "count": len(run.t)}
+                yield {"type": "end", "generation": generation, "run": which, **end}
+
+        self._begin(said, generation, answers())
 
     async def _section(self, said: dict[str, Any]) -> None:
         generation = whole(said, "generation", 0, 2**32 - 1)
@@ -118,13 +133,13 @@ class Page:
             done = 0
             while done < count:
                 done = min(count, max(200, 2 * done))
-                points, outcome = await self._drawn(maps.section, start, surface, done)
+                points, outcome = await self._calculators["maps"].ask(maps.section, start, surface, done)
                 yield wire.section(generation, points)
                 yield {"type": "section", "generation": generation, "found": len(points), "outcome": outcome}
                 if outcome != "finished":
                     return
 
-        self._begin("section", said, answers())
+        self._begin(said, generation, answers())
 
     async def _diagram(self, said: dict[str, Any]) -> None:
         generation = whole(said, "generation", 0, 2**32 - 1)
@@ -134,31 +149,40 @@ class Page:
             raise UddError("a diagram needs 0 < low < high")
 
         async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
-            steps = maps.diagram(start, low, high)
-            while (found := await self._drawn(next, steps, None)) is not None:
-                pack = wire.diagram if isinstance(found, maps.Diagram) else wire.exponents
-                yield pack(generation, found)
+            for count in maps.VALUES:
+                found = await self._calculators["maps"].ask(maps.diagram, start, low, high, count)
+                yield wire.diagram(generation, found)
+                found = await self._calculators["maps"].ask(maps.exponents, start, low, high, count)
+                yield wire.exponents(generation, found)
             yield {"type": "diagram", "generation": generation}
 
-        self._begin("diagram", said, answers())
+        self._begin(said, generation, answers())
 
-    async def _drawn(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        return await asyncio.get_running_loop().run_in_executor(self._workers, function, *arguments)
+    def _begin(
+        self, said: dict[str, Any], generation: int, answers: AsyncIterator[dict[str, Any] | bytes]
+    ) -> None:
+        """Send answers one by one, after those to earlier questions of the kind and generation.
 
-    def _begin(self, name: str, said: dict[str, Any], answers: AsyncIterator[dict[str, Any] | bytes]) -> None:
-        """Send a map's answers one by one; a newer question of the same kind ends an older one."""
+        A question of another generation ends those.
+        """
+        kind = str(said["type"])
+        for task, (other, older) in self._open.items():
+            if other == kind and older != generation:
+                task.cancel()
+        if len(self._open) >= limits.QUESTIONS:
+            raise UddError("the page asks too much at once")
 
         async def work() -> None:
             try:
-                async for answer in answers:
-                    await self._out.put(answer)
+                async with self._turns[kind]:
+                    async for answer in answers:
+                        await self._out.put(answer)
             except (UddError, OverflowError) as error:
                 await self._out.put(_refused(said, error))
 
-        older = self._maps.get(name)
-        if older is not None:
-            older.cancel()
-        self._maps[name] = asyncio.create_task(work())
+        task = asyncio.create_task(work())
+        self._open[task] = (kind, generation)
+        task.add_done_callback(self._open.pop)
 
     async def _watch(self, said: dict[str, Any]) -> None:
         job = self._jobs.jobs.get(str(said.get("job")))

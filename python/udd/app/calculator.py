@@ -1,0 +1,67 @@
+"""A process that computes for the pages: `python -m udd.app.calculator`.
+
+It reads questions from its input and writes answers to its output. A question is a pickle of the seconds of
+processor time that it may take, a function of this package and its arguments; None stops the work. An answer
+is the length of a pickle, then the pickle. Both come from this package alone, never from a visitor.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import struct
+import threading
+from typing import Any, BinaryIO
+
+from udd.errors import UddError
+
+from . import child_process
+from .interruption import Interruptible
+
+LENGTH = struct.Struct("<Q")
+
+
+class StoppedError(UddError):
+    """The server stopped the work."""
+
+
+def main() -> None:
+    """Answer questions until the input ends, which is when the server does."""
+    source, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print is no answer
+    child_process.limit()
+    work = Interruptible()
+    questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(source, work, questions), daemon=True).start()
+    while True:
+        answer = pickle.dumps(_answer(work, *questions.get()))
+        answers.write(LENGTH.pack(len(answer)))
+        answers.write(answer)
+        answers.flush()
+
+
+def _listen(source: BinaryIO, work: Interruptible, questions: queue.SimpleQueue[Any]) -> None:
+    try:
+        while True:
+            question = pickle.load(source)
+            if question is None:
+                work.stop(StoppedError("the work was stopped"))
+            else:
+                questions.put(question)
+    finally:
+        os._exit(0)
+
+
+def _answer(work: Interruptible, seconds: float, function: Any, arguments: tuple[Any, ...]) -> Any:
+    """The function's result, or the error that it raised."""
+    try:
+        return work.run(lambda: function(*arguments), seconds)
+    except MemoryError:
+        return UddError("this takes more memory than the page gives it")
+    except Exception as error:
+        return error
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+"""The processes that compute for the pages, so that nothing that a visitor asks for holds up the server.
+
+A process can be stopped at any moment, which a thread cannot. It answers one question at a time and is used
+again; a question whose task is cancelled is stopped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import pickle
+import sys
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+from udd.errors import UddError
+
+from . import limits
+from .calculator import LENGTH, StoppedError
+from .interruption import SpentError
+
+_GRACE = 0.5  # s in which a process must have stopped its work
+_LOOK_EVERY = 0.1  # s between two looks whether a question that waits may push another out
+_IDLE = 2  # processes kept for the next question
+
+
+class Calculators:
+    """Processes for questions of one kind.
+
+    Parameters
+    ----------
+    budget : limits.Budget
+        How many there may be and what a question may take.
+    """
+
+    def __init__(self, budget: limits.Budget) -> None:
+        self._budget = budget
+        self._slots = asyncio.Semaphore(budget.processes)
+        self._idle: list[_Calculator] = []
+        self._busy: set[_Calculator] = set()
+
+    async def ask(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what a function of this package returns in another process.
+
+        Parameters
+        ----------
+        function : callable
+            A function at the top level of its module.
+        *arguments
+            What can be pickled.
+
+        Raises
+        ------
+        SpentError
+            It took more processor time than a question may, or others waited and it had had its share.
+        UddError
+            What the function raised; or the process ended.
+        """
+        async with self._slot():
+            calculator = self._idle.pop() if self._idle else _Calculator()
+            self._busy.add(calculator)
+            try:
+                answer = await calculator.ask((self._budget.seconds, function, arguments))
+            finally:
+                self._busy.discard(calculator)
+                if calculator.ready and len(self._idle) < _IDLE:
+                    self._idle.append(calculator)
+                else:
+                    calculator.kill()
+        if isinstance(answer, StoppedError):
+            answer = SpentError(
+                "this took its share of computing time, and others were waiting; try again later"
+            )
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    async def prepare(self) -> None:
+        """Start a process for the first question."""
+        calculator = _Calculator()
+        await calculator.start()
+        self._idle.append(calculator)
+
+    async def close(self) -> None:
+        """End all processes at once."""
+        every = [*self._idle, *self._busy]
+        for calculator in every:
+            calculator.kill()
+        await asyncio.gather(*(calculator.wait() for calculator in every))
+
+    @contextlib.asynccontextmanager
+    async def _slot(self) -> AsyncIterator[None]:
+        """Wait for a turn; whoever waits stops the question that has run longest, once it had its share."""
+        turn = asyncio.ensure_future(self._slots.acquire())
+        try:
+            while not (await asyncio.wait({turn}, timeout=_LOOK_EVERY))[0]:
+                self._push_out()
+        except asyncio.CancelledError:
+            if not turn.cancel():
+                self._slots.release()
+            raise
+        try:
+            yield
+        finally:
+            self._slots.release()
+
+    def _push_out(self) -> None:
+        oldest = min((c for c in self._busy if not c.stopping), key=lambda c: c.began, default=None)
+        if oldest is not None and oldest.age > self._budget.share:
+            oldest.stop()
+
+
+class _Calculator:
+    """One process."""
+
+    def __init__(self) -> None:
+        self._process: asyncio.subprocess.Process | None = None
+        self._loop = asyncio.get_running_loop()
+        self.began = 0.0
+        self.stopping = False
+        self.ready = False
+        """Whether it can take another question."""
+
+    @property
+    def age(self) -> float:
+        """Seconds since its question began."""
+        return self._loop.time() - self.began
+
+    async def start(self) -> None:
+        """Start the process, out of reach of the terminal's Ctrl-C: the server ends it."""
+        try:
+            self._process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-P", "-m", "udd.app.calculator"),
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise UddError(f"no process can be started: {error.strerror or error}") from None
+        self.ready = True
+
+    async def ask(self, question: tuple[Any, ...]) -> Any:
+        """Return the answer; a cancelled question is stopped before this returns."""
+        self.began, self.stopping = self._loop.time(), False
+        if self._process is None:
+            await self.start()
+        self.ready = False
+        answer = asyncio.ensure_future(self._answer(question))
+        try:
+            return await asyncio.shield(answer)
+        except asyncio.CancelledError:
+            self.stop()
+            with contextlib.suppress(UddError):
+                await answer
+            raise
+
+    def stop(self) -> None:
+        """Make the process stop its work, or end it."""
+        self.stopping = True
+        self._say(None)
+        self._loop.call_later(_GRACE, self._give_up, self.began)
+
+    def _give_up(self, began: float) -> None:
+        if self.stopping and self.began == began and not self.ready:
+            self.kill()
+
+    async def _answer(self, question: tuple[Any, ...]) -> Any:
+        assert self._process is not None and self._process.stdout is not None
+        try:
+            self._say(question)
+            (size,) = LENGTH.unpack(await self._process.stdout.readexactly(LENGTH.size))
+            answer = pickle.loads(await self._process.stdout.readexactly(size))
+        except (OSError, EOFError):
+            if self.stopping:
+                return StoppedError("the process was ended")
+            raise UddError("the computation ended early: it took too much memory") from None
+        self.ready = True
+        return answer
+
+    def _say(self, question: tuple[Any, ...] | None) -> None:
+        if self._process is not None and self._process.stdin is not None:
+            self._process.stdin.write(pickle.dumps(question))
+
+    def kill(self) -> None:
+        """End the process."""
+        self.ready = False
+        if self._process is not None and self._process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.kill()
+
+    async def wait(self) -> None:
+        """Wait until the process has ended."""
+        if self._process is not None:
+            await self._process.wait()
