@@ -76,14 +76,23 @@ def test_a_run_has_a_number_of_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_run_that_takes_too_long_ends_for_one_that_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     with (
-        client_of(monkeypatch, share=0.1) as client,
+        client_of(monkeypatch, share=2.0) as client,
         client.websocket_connect(SOCKET) as first,
         client.websocket_connect(SOCKET) as second,
     ):
         first.send_text(question(STIFF))
+        (process,) = working(client)
         second.send_text(question(CHAOS))
         assert "others were waiting" in first.receive_json()["text"]
         assert second.receive_json()["type"] == "run"
+        assert process.returncode is None  # stopped, and used again
+
+
+def working(client: TestClient) -> list[Any]:
+    """The processes that compute runs, once there are any."""
+    runs = client.app.state.parts["runs"]  # type: ignore[attr-defined]
+    until(lambda: runs._busy and all(one._process for one in runs._busy), 10)
+    return [one._process for one in runs._busy]
 
 
 def test_a_run_ends_with_its_socket(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,8 +100,10 @@ def test_a_run_ends_with_its_socket(monkeypatch: pytest.MonkeyPatch) -> None:
         runs = client.app.state.parts["runs"]  # type: ignore[attr-defined]
         with client.websocket_connect(SOCKET) as page:
             page.send_text(question(STIFF))
-            until(lambda: [one for one in runs._busy if one.began and not one.ready and one._process], 10)
+            (process,) = working(client)
+            time.sleep(0.5)
         until(lambda: not runs._busy, 2)
+        assert process.returncode is None  # stopped, and used again
 
 
 def test_another_run_of_the_page_ends_the_one_before(monkeypatch: pytest.MonkeyPatch) -> None:

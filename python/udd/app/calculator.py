@@ -17,13 +17,9 @@ from typing import Any, BinaryIO
 from udd.errors import UddError
 
 from . import child_process
-from .interruption import Interruptible
+from .interruption import Interruptible, StoppedError
 
 LENGTH = struct.Struct("<Q")
-
-
-class StoppedError(UddError):
-    """The server stopped the work."""
 
 
 def main() -> None:

@@ -16,8 +16,8 @@ from typing import Any
 from udd.errors import UddError
 
 from . import limits
-from .calculator import LENGTH, StoppedError
-from .interruption import SpentError
+from .calculator import LENGTH
+from .interruption import SpentError, StoppedError
 
 _GRACE = 0.5  # s in which a process must have stopped its work
 _LOOK_EVERY = 0.1  # s between two looks whether a question that waits may push another out

@@ -87,9 +87,9 @@ def grown(start: Start, count: int) -> Grown:
 class Run:
     """States on a fixed grid of times, as one call of `udd.simulate` over a longer time gives them.
 
-    A call's last step is cut to end at the last time, which moves the last few states by rounding. So only the
-    first half of a call's states is used, and the next call repeats them bit by bit. (Steps are far shorter
-    than half a call: friction bounds them at about a second.)
+    A call's last step is cut to end at the last time, which moves the last few states by rounding. So only
+    the first half of a call's states is used, and the next call repeats them bit by bit. (Steps are far
+    shorter than half a call: friction bounds them at about a second.)
 
     The run ends as "spent" where the next call would take more than `limits.STEPS` steps.
     """

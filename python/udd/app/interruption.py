@@ -24,6 +24,10 @@ class SpentError(UddError):
     """The work took all the computing time that it may have."""
 
 
+class StoppedError(UddError):
+    """Another process stopped the work."""
+
+
 class Interruptible:
     """Work of the main thread that other threads can stop.
 

@@ -18,6 +18,7 @@ from udd.report.wording import pretty
 from . import limits
 from .growing_run import RATE, clock_of, columns_of, per_unit
 from .page_models import PLAIN, page_model
+from .spec import drive_of
 
 #: Amplitudes with which an effect is seen at once, about a tenth of what else acts on the disk.
 _SHOWN = {
@@ -93,7 +94,10 @@ def _model(model: Model) -> dict[str, Any]:
         for name, numbers in page.ranges.items()
     ]
     for parameter in parameters:
-        parameter["default"] = model.parameters[str(parameter["name"])]
+        name = str(parameter["name"])
+        parameter["default"] = model.parameters[name]
+        # A drive may stand still, though its slider begins above zero.
+        parameter["floor"] = 0.0 if name == drive_of(model) else parameter["least"]
     return {
         "parameters": parameters,
         "states": list(model.state_names),

@@ -1,31 +1,41 @@
 // The state of the page in its address: numbers are written so that they come back as the same bits.
+import { parse } from "./numbers.js";
+import { t } from "./texts.js";
 
-/** The run that stands behind the # of the address; null where there is none. */
+/** The run that stands behind the # of the address; null where there is none. Throws what cannot be read. */
 export function read(hash, catalogue) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
   const kind = given.get("model");
+  if (kind === null) return null;
   const about = catalogue.models[kind];
-  if (!about) return null;
+  if (!about) throw new Error(t("link_model", { text: kind }));
   const model = { kind };
   for (const p of about.parameters) {
-    model[p.name] = given.has(p.name) ? Number(given.get(p.name)) : p.default;
+    model[p.name] = given.has(p.name) ? number(p.name, given.get(p.name)) : p.default;
   }
   if (kind === "disk") {
     model.edge = given.get("edge") === "ignore" ? "ignore" : "stop";
     model.effects = given.getAll("effect").map(effectOf);
   }
-  const state = (given.get("state") ?? "").split(",").map(Number);
-  const numbers = [...about.parameters.map((p) => model[p.name]), ...state];
-  if (state.length !== about.states.length || !numbers.every(Number.isFinite)) return null;
-  return { model, state, twin: given.get("twin") === "1", tab: given.get("tab"), speed: Number(given.get("speed")) };
+  const parts = (given.get("state") ?? "").split(",");
+  if (parts.length !== about.states.length) throw new Error(t("link_state", { n: about.states.length, text: given.get("state") ?? "" }));
+  const state = parts.map((part) => number("state", part));
+  const speed = given.has("speed") ? number("speed", given.get("speed")) : 1;
+  return { model, state, twin: given.get("twin") === "1", tab: given.get("tab"), speed };
+}
+
+function number(name, text) {
+  const value = parse(text);
+  if (Number.isNaN(value)) throw new Error(t("link_number", { name, text }));
+  return value;
 }
 
 function effectOf(text) {
   const [name, rest] = [text.split(":")[0], text.split(":").slice(1).join(":")];
   const effect = { name };
   for (const part of rest.split(",").filter(Boolean)) {
-    const [key, value] = part.split("=");
-    effect[key] = key === "momentum" || key === "treatment" ? value : Number(value);
+    const [key, value = ""] = part.split("=");
+    effect[key] = key === "momentum" || key === "treatment" ? value : number(`${name} ${key}`, value);
   }
   return effect;
 }

@@ -1,5 +1,6 @@
 // The loop: a film or a table goes in, the verdict comes out.
 import { address, request } from "./link.js";
+import { NumberField } from "./numbers.js";
 import { t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
@@ -10,6 +11,10 @@ export class Loop {
     this.link = link;
     this.page = page;
     this.job = null;
+    this.known = [["W", 100], ["R", 100], ["length", 1]].map(([name, scale]) => {
+      const about = { name: t(`loop_${name}`), least: 0, most: null, optional: true };
+      return [name, scale, new NumberField($(`loop-${name}`), about)];
+    });
     $("file").addEventListener("change", () => this.choose($("file").files[0]));
     $("go").addEventListener("click", () => this.send());
     $("sample").addEventListener("click", () => this.begin("sample"));
@@ -50,9 +55,11 @@ export class Loop {
   async send() {
     const most = this.page.catalogue.limits.upload;
     if (this.file.size > most) return this.fail(t("loop_too_large", { size: most >> 20 }));
-    const number = (id, scale) => $(id).value.trim() && String(Number($(id).value.replace(",", ".")) / scale);
-    const known = { W: number("loop-W", 100), R: number("loop-R", 100), length: number("loop-length", 1) };
-    await this.begin("film", Object.fromEntries(Object.entries(known).filter(([, v]) => v)), this.file);
+    const known = this.known.map(([name, scale, field]) => [name, scale, field.value]);
+    if (known.some(([, , value]) => value === undefined)) return;
+    const given = known.filter(([, , value]) => value !== null);
+    const values = given.map(([name, scale, value]) => [name, String(+(value / scale).toPrecision(12))]);
+    await this.begin("film", Object.fromEntries(values), this.file);
   }
 
   async begin(kind, values = {}, body = undefined) {

@@ -38,7 +38,10 @@ class Page {
     this.shown = 0; // states of this run that are in the trails
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.stats = { frames: 0, delays: [], ahead: Infinity };
-    this.link.on("error", (m) => this.notice(m.text));
+    this.link.on("error", (m) => {
+      if (m.of !== "run") this.notice(m.text);
+      else if (m.generation === this.player.generation) this.player.failed = m.text;
+    });
     this.controls();
     this.fromAddress(true);
     addEventListener("hashchange", () => this.fromAddress(false));
@@ -137,12 +140,17 @@ class Page {
   }
 
   fromAddress(first) {
-    const given = url.read(location.hash, this.catalogue);
+    let given = null;
+    try {
+      given = url.read(location.hash, this.catalogue);
+    } catch (error) {
+      this.notice(error.message, true);
+    }
     if (!given && !first) return;
     const { key, model, state } = this.catalogue.presets[0];
     const start = given ?? { model, state };
     $("twin").checked = Boolean(start.twin);
-    if (start.speed > 0) this.setSpeed(start.speed);
+    if (start.speed) this.setSpeed(start.speed);
     if (start.tab) this.showMap($(`tab-${start.tab}`) ?? $("tab-section"));
     this.panel.preset(given ? "" : key);
     this.begin(structuredClone(start.model), start.state.slice());
@@ -220,6 +228,7 @@ class Page {
   }
 
   setSpeed(speed) {
+    if (!SPEEDS.includes(speed)) this.notice(t("no_speed", { speed, speeds: SPEEDS.join(", ") }));
     this.player.speed = SPEEDS.includes(speed) ? speed : 1;
     $("speed").value = this.player.speed;
     if (this.home) this.toAddress();
@@ -273,8 +282,8 @@ class Page {
       }
       this.stats.frames += 1;
       if (!player.records[0].end && player.playing) this.stats.ahead = Math.min(this.stats.ahead, player.ahead);
-      this.end();
-    }
+    } else if (!player.failed && now - player.since > 1000) $("clock").textContent = t("computing");
+    this.end();
     if (now > (this.mapsDue ?? 0)) {
       this.mapsDue = now + 200;
       if (this.tab === "section") this.sections.update();
@@ -350,9 +359,10 @@ class Page {
 
   /** Say why a run has ended, and go on where only the record was full. */
   end() {
-    const ended = this.player.ended;
+    const { ended, failed } = this.player;
     if (ended?.outcome === "full") return this.begin(this.home.model, this.shownState(), { keepTrail: true });
-    $("over").hidden = !ended;
+    $("over").hidden = !ended && !failed;
+    if (failed) $("over-text").textContent = failed;
     if (!ended) return;
     const unit = this.home.model.kind === "disk" ? "second" : "unit_of_time";
     $("over-text").textContent = t(`ended_${ended.outcome}`, { t: t(unit, { x: ended.t.toFixed(2) }) });

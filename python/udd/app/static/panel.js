@@ -1,47 +1,57 @@
 // The controls: model, drive, parameters, effects, start state.
+import { NumberField, shown } from "./numbers.js";
 import { t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** A slider with a number beside it; `changed` is told the value in the model's unit. */
+/** A slider with a number beside it; `changed` is given the value in the model's unit. */
 function slider(about, value, label, changed) {
   const box = document.createElement("div");
   box.className = "slider";
   const id = `p-${about.name}`;
+  const scaled = (v) => +(v * about.scale).toPrecision(12);
   const digits = Math.max(0, -Math.floor(Math.log10(about.step * about.scale) + 1e-9));
-  box.innerHTML = `<div class="row"><label for="${id}"></label><input type="number"><span class="unit"></span></div><input type="range">`;
+  box.innerHTML = `<div class="row"><label for="${id}"></label><input><span class="unit"></span></div><input type="range">`;
   const [number, range] = box.querySelectorAll("input");
   box.querySelector("label").textContent = label;
   box.querySelector(".unit").textContent = about.unit;
   range.id = id;
   number.setAttribute("aria-label", `${label}${about.unit ? ` [${about.unit}]` : ""}`);
-  for (const [key, v] of [["min", about.least], ["max", about.most], ["step", about.step]]) {
-    range[key] = v;
-    number[key] = +(v * about.scale).toPrecision(12);
-  }
+  for (const [key, v] of [["min", about.least], ["max", about.most], ["step", about.step]]) range[key] = v;
+  const limits = { name: label, unit: about.unit, least: scaled(about.floor), most: scaled(about.most), step: scaled(about.step) };
+  const field = new NumberField(number, limits, (typed) => {
+    const v = +(typed / about.scale).toPrecision(12);
+    show(v);
+    changed(v);
+  });
+  const write = (v) => {
+    field.show(shown(v * about.scale, digits));
+    range.setAttribute("aria-valuetext", `${number.value} ${about.unit}`);
+  };
   const show = (v) => {
     range.value = v;
-    number.value = (v * about.scale).toFixed(digits);
-    range.setAttribute("aria-valuetext", `${number.value} ${about.unit}`);
+    write(v);
   };
   range.addEventListener("input", () => {
     const v = Number(range.value);
-    number.value = (v * about.scale).toFixed(digits);
-    range.setAttribute("aria-valuetext", `${number.value} ${about.unit}`);
+    write(v);
     changed(v);
-  });
-  number.addEventListener("change", () => {
-    const v = +(Number(number.value) / about.scale).toPrecision(12);
-    if (number.value.trim() === "" || !Number.isFinite(v)) return;
-    const kept = Math.min(about.most, Math.max(about.least === 0.001 || about.least === 0.05 ? 0 : about.least, v));
-    if (kept !== v) number.value = (kept * about.scale).toFixed(digits);
-    range.value = kept;
-    changed(kept);
   });
   show(value);
   box.show = show;
   box.range = range;
+  box.mark = (text) => field.mark(text);
   return box;
+}
+
+/** A field for a number under its name. */
+function labelled(text, limits, changed) {
+  const label = document.createElement("label");
+  const span = document.createElement("span");
+  span.textContent = text;
+  const input = document.createElement("input");
+  label.append(span, input);
+  return [label, new NumberField(input, { name: text, ...limits }, changed)];
 }
 
 export class Panel {
@@ -63,7 +73,10 @@ export class Panel {
     });
     $("add-effect").replaceChildren(new Option(t("add_effect"), ""), ...effects.map((e) => new Option(`${e.title}: ${e.equation}`, e.name)));
     $("add-effect").addEventListener("change", () => this.add($("add-effect").value));
-    $("start-here").addEventListener("click", () => page.begin(page.home.model, this.startState()));
+    $("start-here").addEventListener("click", () => {
+      const state = this.startState();
+      if (state) page.begin(page.home.model, state);
+    });
     $("panel").addEventListener("submit", (e) => e.preventDefault());
   }
 
@@ -80,8 +93,9 @@ export class Panel {
     if (this.edge) this.edge.checked = model.edge === "ignore";
     $("effects-box").hidden = model.kind !== "disk";
     if (model.kind === "disk") this.effects(model);
-    for (const [k, input] of [...$("start").querySelectorAll("input")].entries()) {
-      input.value = +(state[k] * this.page.scale(about.states[k])).toPrecision(8);
+    for (const [k, field] of this.fields.entries()) {
+      field.show(String(+(state[k] * this.page.scale(about.states[k])).toPrecision(8)));
+      field.exact = { text: field.input.value, value: state[k] };
     }
   }
 
@@ -122,29 +136,33 @@ export class Panel {
     }
     const grid = document.createElement("div");
     grid.className = "numbers-grid";
-    for (const name of about.states) {
-      const label = document.createElement("label");
-      const span = document.createElement("span");
-      span.textContent = t(`s_${name}`);
-      const input = document.createElement("input");
-      input.type = "number";
-      input.step = "any";
-      label.append(span, input);
+    this.fields = about.states.map((name) => {
+      const [label, field] = labelled(t(`s_${name}`), {});
       grid.append(label);
-    }
+      return field;
+    });
     $("start").replaceChildren(grid);
   }
 
+  /** The start state as typed, or as it is where nothing was typed; null where a field cannot be used. */
   startState() {
     const about = this.page.about(this.kind);
-    return [...$("start").querySelectorAll("input")].map((input, k) => Number(input.value) / this.page.scale(about.states[k]));
+    const state = this.fields.map((field, k) => {
+      const value = field.value;
+      if (value === undefined) return undefined;
+      return field.input.value === field.exact.text ? field.exact.value : value / this.page.scale(about.states[k]);
+    });
+    return state.includes(undefined) ? null : state;
   }
 
-  /** A drive further by so many steps of its slider. */
+  /** A drive further by so many steps of its slider, as far as that goes. */
   nudge(steps) {
     const about = this.page.about(this.kind).parameters[0];
-    const now = this.page.home.model[about.name] + steps * about.step;
-    const kept = +Math.min(about.most, Math.max(about.least, now)).toPrecision(12);
+    const now = this.page.home.model[about.name];
+    const next = +(now + steps * about.step).toPrecision(12);
+    const kept = Math.min(Math.max(about.most, now), Math.max(Math.min(about.least, now), next));
+    if (kept !== next) this.page.notice(t("slider_ends", { value: shown(kept * about.scale, 2), unit: about.unit }).replace(" .", "."));
+    if (kept === now) return;
     this.sliders[about.name].show(kept);
     this.page.change({ [about.name]: kept });
   }
@@ -193,15 +211,13 @@ export class Panel {
     const grid = document.createElement("div");
     grid.className = "numbers-grid";
     for (const p of spec.parameters) {
-      const label = document.createElement("label");
-      const span = document.createElement("span");
-      span.textContent = `${p.name}${p.unit ? ` [${p.unit}]` : ""}`;
-      const input = document.createElement("input");
-      input.type = "number";
-      input.step = "any";
-      input.value = effect[p.name];
-      input.addEventListener("change", () => input.value.trim() && replaced({ [p.name]: Number(input.value) }));
-      label.append(span, input);
+      const text = `${p.name}${p.unit ? ` [${p.unit}]` : ""}`;
+      const limits = { name: p.name, unit: p.unit, least: p.least, most: p.most };
+      const [label, field] = labelled(text, limits, (value) => {
+        field.show(String(value));
+        replaced({ [p.name]: value });
+      });
+      field.show(String(effect[p.name]));
       grid.append(label);
     }
     for (const [key, choices] of [["momentum", spec.momenta], ["treatment", spec.treatments]]) {

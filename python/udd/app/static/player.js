@@ -74,6 +74,8 @@ export class Player {
     this.asked = [0, 0];
     this.at = 0;
     this.fresh = true;
+    this.failed = null; // why the run cannot be computed
+    this.since = performance.now();
     this.feed();
   }
 
