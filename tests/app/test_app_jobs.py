@@ -186,7 +186,13 @@ def test_only_so_many_jobs_wait(client: TestClient, monkeypatch: pytest.MonkeyPa
         ("/api/jobs/render?seconds=5", b"x", "is not JSON"),
         ("/api/jobs/render?seconds=5", b"[" * 60_000, "is not JSON"),
         ("/api/jobs/render?seconds=500", json.dumps(CHAOS).encode(), "A film lasts from 0.5 to 60 s."),
-        ("/api/jobs/film?W=fast", b"x", "W must be a number."),
+        ("/api/jobs/film?W=fast", b"x", "W must be a number: a number is needed, not 'fast'."),
+        (
+            "/api/jobs/film?W=0,042",
+            b"x",
+            "W must be a number: the decimal sign is a point: 0.042, not 0,042.",
+        ),
+        ("/api/jobs/film?W=1_0", b"x", "W must be a number"),
         ("/api/jobs/film?W=nan", b"x", "W must be finite."),
     ],
 )

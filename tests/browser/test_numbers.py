@@ -34,7 +34,9 @@ def marked(page: Any) -> list[str]:
         ("0", 0, "0.00"),
     ],
 )
-def test_the_drive_is_read_with_a_point_or_a_comma(opened: Opened, text: str, value: float, shown: str) -> None:
+def test_the_drive_is_read_with_a_point_or_a_comma(
+    opened: Opened, text: str, value: float, shown: str
+) -> None:
     page = opened.go(DISK)
     typed(page, DRIVE, text)
     assert page.evaluate("udd.home.model.W") == value
@@ -42,7 +44,9 @@ def test_the_drive_is_read_with_a_point_or_a_comma(opened: Opened, text: str, va
     assert marked(page) == []
 
 
-@pytest.mark.parametrize("text", ["39", "14,01", "-1", "fast", "", "1,2,3", "1.234,5", "0x10", "1e999", "3;9"])
+@pytest.mark.parametrize(
+    "text", ["39", "14,01", "-1", "fast", "", "1,2,3", "1.234,5", "0x10", "1e999", "3;9"]
+)
 def test_a_drive_that_cannot_be_used_is_marked_and_kept(opened: Opened, text: str) -> None:
     page = opened.go(DISK)
     typed(page, DRIVE, text)
@@ -145,7 +149,7 @@ def test_a_link_may_hold_a_comma_and_numbers_beyond_the_sliders(opened: Opened) 
 
 def test_a_run_that_takes_too_much_says_so_on_the_stage(opened: Opened) -> None:
     page = opened.page
-    page.goto(opened.link + "#model=disk&W=0.03&k0=1000000&state=0,0.001,0.04,0")
+    page.goto(opened.link + "#model=disk&W=0.03&k0=10000000&state=0,0.001,0.04,0")
     until(page, "document.getElementById('clock').textContent === 'computing…'", 30)
     page.wait_for_selector("#over:not([hidden])", timeout=120_000)
     assert "more than 10 s of computing" in page.locator("#over-text").text_content()

@@ -590,6 +590,40 @@ def test_numbers_that_make_no_sense(capsys: pytest.CaptureFixture[str]) -> None:
     assert "550x700" in failed(["film", "x.mp4", "--W", "0.04", "--size", "big"], capsys)
 
 
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        ("simulate --W 0,042", "--W: the decimal sign is a point: 0.042, not 0,042"),
+        ("simulate --W 0.042 --t 1,5", "--t: the decimal sign is a point"),
+        ("simulate --rate 1,5", "the decimal sign is a point: 1.5"),
+        ("simulate --rate 1:0,03", "the decimal sign is a point: 0.03"),
+        ("simulate --W 1_0", "a number is needed, not '1_0'"),
+        ("simulate --W 0.04 --state 0 0,001 0,04 0", "by commas or by spaces, not by both; the decimal sign"),
+        ("simulate --W 0.04 --effect relaxation:b=5,5", "with a decimal point"),
+        ("lyapunov 3,9", "the decimal sign is a point: 3.9"),
+        ("lyapunov --from 1 --to 2 --n 1,000", "without a sign for thousands"),
+        ("discover x.csv --budget 0,5", "--budget: the decimal sign is a point: 0.5"),
+        ("basins --w 3.9 omega=0,5:1:10 y=0:1:10", "with decimal points"),
+        ("film x.mp4 --W 0.03 --defect lens=0,5", "the decimal sign is a point: 0.5"),
+        ("track x.mp4 --calibrate readout=0,02", "the decimal sign is a point"),
+    ],
+)
+def test_a_decimal_comma_is_named(argv: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        assert main(argv.split()) == 1
+    except SystemExit as left:
+        assert left.code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_commas_separate_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+    ends = []
+    for state in (["0,0.001,0.04,0"], ["0", "0.001", "0.04", "0"], ["0,", "0.001,", "0.04,", "0"]):
+        assert main(["simulate", "--W", "0.042", "--t", "1", "--json", "--state", *state]) == 0
+        ends.append(capsys.readouterr().out)
+    assert ends[0] == ends[1] == ends[2]
+
+
 @pytest.mark.parametrize("argv", [[], ["nonsense"], ["simulate", "--nonsense"], ["fit"], ["film"]])
 def test_wrong_usage_is_two(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:

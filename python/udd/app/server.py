@@ -20,6 +20,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
+from udd._util.number_text import number_in
 from udd._util.tables import parsed
 from udd.errors import UddError
 from udd.models import Disk
@@ -166,9 +167,9 @@ def _number(request: Request, name: str) -> float | None:
     if text is None or not text.strip():
         return None
     try:
-        value = float(text)
-    except ValueError:
-        raise UddError(f"{name} must be a number.") from None
+        value = number_in(text)
+    except ValueError as error:
+        raise UddError(f"{name} must be a number: {error}.") from None
     if not math.isfinite(value):
         raise UddError(f"{name} must be finite.")
     return value

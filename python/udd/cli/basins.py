@@ -6,6 +6,7 @@ import argparse
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from udd._util.number_text import number_in
 from udd.errors import IncompleteWarning, ModelError, UddError
 
 from .export import PICTURES, add_out, checked, save
@@ -105,9 +106,11 @@ def _component(text: str) -> tuple[str, Any]:
     try:
         if not equals or len(parts) != 3:
             raise ValueError
-        first, last, n = float(parts[0]), float(parts[1]), int(parts[2])
+        first, last, n = number_in(parts[0]), number_in(parts[1]), int(parts[2])
     except ValueError:
-        raise UddError(f"a component of the grid is given as NAME=FIRST:LAST:N, not {text}") from None
+        raise UddError(
+            f"a component of the grid is given as NAME=FIRST:LAST:N, with decimal points, not {text}"
+        ) from None
     return name, axis_of(first, last, n)
 
 

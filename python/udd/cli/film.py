@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from udd._util.number_text import decimal_hint
 from udd.errors import UddError
 
 from .export import OutputFile
@@ -90,6 +91,9 @@ def _defects(given: list[str]) -> Any:
         name, sign, value = text.partition("=")
         if not sign or name not in names:
             raise UddError(f"--defect must be NAME=VALUE with a name of {', '.join(names)}, not {text}")
+        hint = decimal_hint(value)
+        if hint and isinstance(getattr(Defects, name), int | float):
+            raise UddError(f"--defect {name}: {hint}")
         try:
             found[name] = ast.literal_eval(value)
         except (ValueError, SyntaxError, RecursionError, MemoryError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from udd._util.number_text import number_in
 from udd.errors import UddError
 
 if TYPE_CHECKING:
@@ -45,10 +46,10 @@ def _rim_speed(text: str) -> float:
     """The speed of a wheel's rim from ``rate`` or ``rate:radius``."""
     rate, colon, radius = text.partition(":")
     try:
-        speed = float(rate) * (float(radius) if colon else 0.03)
-    except ValueError:
+        speed = number_in(rate) * (number_in(radius) if colon else 0.03)
+    except ValueError as error:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a rate [rad/s], or rate:radius [rad/s:m]"
+            f"{text!r} is not a rate [rad/s], or rate:radius [rad/s:m]: {error}"
         ) from None
     if not speed >= 0:
         raise argparse.ArgumentTypeError(
@@ -146,11 +147,13 @@ def effects(texts: list[str]) -> tuple[Effect, ...]:
                 choices[key.strip()] = value.strip()
                 continue
             try:
-                values[key.strip()] = float(value)
+                if not equals:
+                    raise ValueError
+                values[key.strip()] = number_in(value)
             except ValueError:
-                raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number") from None
-            if not equals:
-                raise ModelError(f"--effect {text}: {item!r} is not of the form parameter=number")
+                raise ModelError(
+                    f"--effect {text}: {item!r} is not of the form parameter=number (with a decimal point)"
+                ) from None
         momentum, treatment = choices.get("momentum"), choices.get("treatment")
         result.append(specs[name].make(momentum=momentum, treatment=treatment, **values))
     return tuple(result)
@@ -162,8 +165,19 @@ def names(texts: list[str]) -> list[str]:
 
 
 def numbers(texts: list[str], what: str) -> list[float]:
-    """Numbers given apart or with commas."""
+    """Return numbers that stand in several texts, or in a single text with commas between them.
+
+    Raises
+    ------
+    UddError
+        A text holds no number; or there are several texts with commas in them, which may be decimal commas.
+    """
+    if len(texts) > 1 and any("," in text.strip().rstrip(",") for text in texts):
+        raise UddError(
+            f"{what}: separate numbers by commas or by spaces, not by both; the decimal sign is a point; got "
+            f"{' '.join(texts)}"
+        )
     try:
-        return [float(item) for text in texts for item in text.split(",") if item.strip()]
+        return [number_in(item) for text in texts for item in text.split(",") if item.strip()]
     except ValueError:
         raise UddError(f"{what} must be numbers, not {' '.join(texts)}") from None

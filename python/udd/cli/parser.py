@@ -6,6 +6,7 @@ import argparse
 import re
 from typing import Any
 
+from udd._util.number_text import number_in
 from udd._util.versions import version_of
 
 from . import (
@@ -46,12 +47,14 @@ _COMMANDS = (
 
 
 class Parser(argparse.ArgumentParser):
-    """An ArgumentParser that takes ``-1e-3`` and ``-1,2`` for values."""
+    """An ArgumentParser that takes ``-1e-3`` and ``-1,2`` for values and names the decimal sign."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         kwargs["allow_abbrev"] = False
         super().__init__(*args, **kwargs)
         self._negative_number_matcher = re.compile(r"^-\.?\d")
+        self.register("type", float, _number)
+        self.register("type", int, _whole)
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -66,3 +69,22 @@ def make_parser() -> argparse.ArgumentParser:
     for command in _COMMANDS:
         command.add(commands)
     return parser
+
+
+def _number(text: str) -> float:
+    """Return the number that an option's text holds, for argparse."""
+    try:
+        return number_in(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _whole(text: str) -> int:
+    """Return the whole number that an option's text holds, for argparse."""
+    try:
+        if not text.isascii() or "_" in text:
+            raise ValueError
+        return int(text)
+    except ValueError:
+        hint = ", without a sign for thousands" if re.fullmatch(r"\d+([.,]\d{3})+", text) else ""
+        raise argparse.ArgumentTypeError(f"a whole number is needed{hint}, not {text[:60]!r}") from None

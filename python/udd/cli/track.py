@@ -278,7 +278,9 @@ def _calibrate(said: str) -> dict[str, Any]:
     for part in said.split(","):
         name, equals, value = (x.strip() for x in part.partition("="))
         if not equals:
-            raise UddError(f"--calibrate must be like lens=off,readout=0.02, not {said}")
+            raise UddError(
+                f"--calibrate must be like lens=off,readout=0.02 (the decimal sign is a point), not {said}"
+            )
         switch = {"on": True, "off": False}.get(value)
         found[name] = numbers([value], f"--calibrate {name}")[0] if switch is None else switch
     return found
