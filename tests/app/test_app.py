@@ -293,6 +293,43 @@ def test_nothing_but_the_static_files_is_served(client: TestClient, path: str) -
     assert client.get(path).status_code == 404
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/static/main.js", 200),
+        ("POST", "/static/main.js", 405),
+        ("GET", "/", 403),
+        ("GET", "/api/catalogue", 403),
+        ("GET", "/api/run.csv", 403),
+        ("POST", "/api/jobs/sample", 403),
+        ("GET", "/api/jobs/x/report.html", 403),
+        ("GET", "/api/socket", 403),
+    ],
+)
+def test_without_the_token_only_static_files_are_read(
+    client: TestClient, method: str, path: str, status: int
+) -> None:
+    assert client.request(method, path, headers={"x-udd-token": ""}).status_code == status
+
+
+def test_the_limits_are_those_of_the_security_table() -> None:
+    table = (Path(__file__).parents[2] / "SECURITY.md").read_text()
+    for words in (
+        f"at most {limits.UPLOAD >> 20} MB",
+        f"up to {limits.RUNS.processes} for runs ({limits.RUNS.seconds:g} s",
+        f"{limits.STEPS // 10**6} million steps",
+        f"{limits.MAPS.processes} for maps and tables ({limits.MAPS.seconds:g} s",
+        f"({limits.CPU_SECONDS // 60} minutes)",
+        f"at most {limits.MEMORY >> 30} GB",
+        f"a connection for {limits.PAUSE:g} s",
+        f"with {limits.QUESTIONS} open questions",
+        f"at most {limits.CONNECTIONS} connections, and {limits.CLIENT_CONNECTIONS} from one address",
+        f"ends after {limits.RUNS.share:g} s (a map after {limits.MAPS.share:g} s)",
+    ):
+        assert words in table, words
+    assert limits.JOBS == 8 and "eight newer jobs" in table
+
+
 def test_which_names_a_server_goes_by() -> None:
     assert hosts_of("127.0.0.1", 1) == (["127.0.0.1:1", "localhost:1"], False)
     assert hosts_of("192.168.1.5", 1) == (["192.168.1.5:1"], False)

@@ -1,4 +1,4 @@
-"""What a page may ask for."""
+"""Limits of what a page may ask for."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Budget:
-    """What the questions of one kind may take.
+    """Limits of the questions of one kind.
 
     Attributes
     ----------
