@@ -54,6 +54,23 @@ def test_folders_of_dead_servers_are_removed(tmp_path: Path, monkeypatch: pytest
             one.stdout.close()
 
 
+def test_ctrl_c_during_an_upload_and_a_job_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "made").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "made"))
+    with served(tmp_path / "log") as app, app.half_open(b"") as upload:
+        asked = f"POST /api/jobs/{{}}?{app.at.query} HTTP/1.1\r\nhost: {app.at.netloc}\r\norigin: http://{app.at.netloc}"
+        with app.half_open(asked.format("sample").encode() + b"\r\ncontent-length: 0\r\n\r\n") as job:
+            assert job.recv(4096).startswith(b"HTTP/1.1 200")
+        upload.sendall(asked.format("film").encode() + b"\r\ncontent-length: 1000\r\n\r\nabc")
+        until(lambda: list((tmp_path / "made").glob("*/*/upload")), 10)
+        until(lambda: list((tmp_path / "made").glob("*/*/out")), 20)
+        assert app.end() < 2.0
+    assert list((tmp_path / "made").iterdir()) == []
+    assert (tmp_path / "log").read_text() == "Ctrl-C ends it.\nudd: stopped\n"
+
+
 def test_the_processes_of_a_killed_server_end(tmp_path: Path) -> None:
     with served(tmp_path / "log") as app, app.open() as page:
         page.send(question(STIFF))

@@ -72,9 +72,9 @@ class Served:
         where = f"ws://{self.at.netloc}/api/socket?{self.at.query}"
         return connect(where, origin=Origin(f"http://{self.at.netloc}"))
 
-    def half_open(self) -> socket.socket:
+    def half_open(self, sent: bytes = HALF) -> socket.socket:
         made = socket.create_connection((self.at.hostname, self.at.port), 5)
-        made.sendall(HALF)
+        made.sendall(sent)
         return made
 
     def page(self) -> int:

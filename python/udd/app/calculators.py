@@ -116,6 +116,7 @@ class _Calculator:
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
         self._loop = asyncio.get_running_loop()
+        self._killed = False
         self.began = 0.0
         self.stopping = False
         self.ready = False
@@ -185,7 +186,9 @@ class _Calculator:
     def kill(self) -> None:
         """End the process."""
         self.ready = False
-        if self._process is not None and self._process.returncode is None:
+        # Once only: a second signal would take the exit status away from asyncio.
+        if self._process is not None and self._process.returncode is None and not self._killed:
+            self._killed = True
             with contextlib.suppress(ProcessLookupError):
                 self._process.kill()
 

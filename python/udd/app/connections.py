@@ -176,6 +176,14 @@ class _Server(uvicorn.Server):
             logging.getLogger(name).addFilter(OncePerMinute())
         await super().startup(sockets)
 
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        level = _logger.level
+        _logger.setLevel(logging.CRITICAL)  # that requests are cut off is meant
+        try:
+            await super().shutdown(sockets)
+        finally:
+            _logger.setLevel(level)
+
     def _complain(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error = context.get("exception")
         if not (isinstance(error, OSError) and error.errno in _NO_MORE_FILES):

@@ -48,6 +48,7 @@ class Job:
     answer: dict[str, Any] = field(default_factory=dict)
     watchers: set[Send] = field(default_factory=set)
     process: asyncio.subprocess.Process | None = None
+    killed: bool = False
 
     def said(self) -> dict[str, Any]:
         """All that is known of it."""
@@ -186,7 +187,9 @@ def _take(job: Job, message: dict[str, Any]) -> None:
 
 
 def _kill(job: Job) -> None:
-    if job.process is not None and job.process.returncode is None:
+    # Once only: a second signal would take the exit status away from asyncio.
+    if job.process is not None and job.process.returncode is None and not job.killed:
+        job.killed = True
         with contextlib.suppress(ProcessLookupError):
             job.process.kill()
 
