@@ -17,7 +17,7 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 
 from app_for_tests import CHAOS, HOST, ORIGIN, SOCKET, STIFF, TOKEN, question, served, until
-from udd.app import interruption, limits, server, worker
+from udd.app import calculators, interruption, limits, server, worker
 
 STATIC = Path(server.__file__).parent / "static"
 
@@ -75,6 +75,7 @@ def test_a_run_has_a_number_of_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_run_that_takes_too_long_ends_for_one_that_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calculators, "_GRACE", 30.0)
     with (
         client_of(monkeypatch, share=2.0) as client,
         client.websocket_connect(SOCKET) as first,
@@ -96,13 +97,14 @@ def working(client: TestClient) -> list[Any]:
 
 
 def test_a_run_ends_with_its_socket(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calculators, "_GRACE", 30.0)
     with client_of(monkeypatch) as client:
         runs = client.app.state.parts["runs"]  # type: ignore[attr-defined]
         with client.websocket_connect(SOCKET) as page:
             page.send_text(question(STIFF))
             (process,) = working(client)
             time.sleep(0.5)
-        until(lambda: not runs._busy, 2)
+        until(lambda: not runs._busy, 5)
         assert process.returncode is None  # stopped, and used again
 
 

@@ -23,7 +23,7 @@ from websockets.typing import Origin
 from app_for_tests import CHAOS, HALF, TOKEN, question, served, until
 from udd.app import connections, limits, server
 
-OPEN: list[set[Any]] = []  # connections of the servers so far
+STATES: list[Any] = []  # of the servers so far
 STATIC = Path(server.__file__).parent / "static"
 
 
@@ -40,7 +40,7 @@ def listening(monkeypatch: pytest.MonkeyPatch, **changed: Any) -> Iterator[tuple
         thread.start()
         try:
             until(lambda: app.started, 10)
-            OPEN.append(app.server_state.connections)
+            STATES.append(app.server_state)
             yield at
         finally:
             app.should_exit = True
@@ -86,9 +86,9 @@ def test_an_answer_that_nobody_reads_is_given_up(monkeypatch: pytest.MonkeyPatch
     with listening(monkeypatch, PAUSE=0.4) as at, socket.socket() as made:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         made.connect(at)
-        until(lambda: OPEN[-1], 8)
         made.sendall(f"GET /static/style.css HTTP/1.1\r\nhost: 127.0.0.1:{at[1]}\r\n\r\n".encode() * 100)
-        until(lambda: not OPEN[-1], 8)
+        until(lambda: STATES[-1].total_requests, 10)
+        until(lambda: not STATES[-1].connections, 10)
         received = 0
         made.settimeout(5)
         with contextlib.suppress(ConnectionError):

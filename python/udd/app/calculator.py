@@ -39,20 +39,31 @@ def main() -> None:
 
 def _listen(source: BinaryIO, work: Interruptible, questions: queue.SimpleQueue[Any]) -> None:
     try:
+        stopped = threading.Event()
         while True:
             question = pickle.load(source)
             if question is None:
+                stopped.set()  # for work that has not begun
                 work.stop(StoppedError("the work was stopped"))
             else:
-                questions.put(question)
+                stopped = threading.Event()
+                questions.put((stopped, *question))
     finally:
         os._exit(0)
 
 
-def _answer(work: Interruptible, seconds: float, function: Any, arguments: tuple[Any, ...]) -> Any:
+def _answer(
+    work: Interruptible, stopped: threading.Event, seconds: float, function: Any, arguments: tuple[Any, ...]
+) -> Any:
     """The function's result, or the error that it raised."""
+
+    def called() -> Any:
+        if stopped.is_set():
+            raise StoppedError("the work was stopped")
+        return function(*arguments)
+
     try:
-        return work.run(lambda: function(*arguments), seconds)
+        return work.run(called, seconds)
     except MemoryError:
         return UddError("this takes more memory than the page gives it")
     except Exception as error:

@@ -38,6 +38,7 @@ class Connection(H11Protocol):
 
     _deadline: asyncio.TimerHandle | None = None
     _since = 0.0
+    _unread = False  # whether the answer fills its buffer
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Make room among the connections, or refuse this one."""
@@ -70,11 +71,13 @@ class Connection(H11Protocol):
     def pause_writing(self) -> None:
         """Wait for the visitor to read."""
         super().pause_writing()
-        self._wait()
+        self._unread = True
+        self._look()
 
     def resume_writing(self) -> None:
         """Go on with the answer."""
         super().resume_writing()
+        self._unread = False
         self._look()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -84,9 +87,9 @@ class Connection(H11Protocol):
 
     @property
     def waiting(self) -> bool:
-        """Whether no request is being answered and no WebSocket is open."""
+        """Whether the server waits for the visitor, and no WebSocket is open."""
         upgraded = self.transport.get_protocol() is not self
-        return not upgraded and (self.cycle is None or self.cycle.response_complete)
+        return not upgraded and (self._unread or self.cycle is None or self.cycle.response_complete)
 
     def _look(self) -> None:
         if not self.waiting:
