@@ -17,7 +17,6 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -25,6 +24,8 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._util.atomic_files import write_whole
+from udd._util.input_files import LARGEST, NESTED, MemoryLimit, read_regular
+from udd._util.numpy_files import arrays_of
 from udd._util.schema import consistent, is_a
 from udd.discovery import Discovery
 from udd.discovery.nonparametric.bsplines import Spline
@@ -86,7 +87,7 @@ _BEFORE = {"Absorbed": "Confounding"}
 _RENAMED = {"Discovery": {"looks": "comparisons", "refused": "rejected"}}
 _BROKEN = (
     *(AttributeError, IndexError, KeyError, OSError, OverflowError, RecursionError, TypeError, ValueError),
-    *(EOFError, MemoryError, NotImplementedError, zipfile.BadZipFile, zlib.error),
+    *(EOFError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error),
     *(SyntaxError, tokenize.TokenError),  # of an array's header
 )
 
@@ -130,12 +131,14 @@ def save(result: Fit | Discovery, path: str | os.PathLike[str]) -> None:
     write_whole(path, content.getvalue())
 
 
-def load(path: str | os.PathLike[str]) -> Fit | Discovery:
+def load(path: str | os.PathLike[str], *, limit: float = LARGEST) -> Fit | Discovery:
     """Read a fit or a discovery that :func:`udd.save` wrote; nothing in the file is run.
 
     Parameters
     ----------
     path : path
+    limit : float, default 1e9
+        Bytes of data that the file may unpack to; more is refused.
 
     Returns
     -------
@@ -145,7 +148,7 @@ def load(path: str | os.PathLike[str]) -> Fit | Discovery:
     Raises
     ------
     UddError
-        There is no such file, it is not whole, or not one of these.
+        There is no such file, it is not whole, not one of these, no regular file, or larger than `limit`.
 
     Examples
     --------
@@ -153,16 +156,21 @@ def load(path: str | os.PathLike[str]) -> Fit | Discovery:
     >>> fit = udd.load("fit.npz")  # doctest: +SKIP
     >>> print(fit.summary())  # doctest: +SKIP
     """
+    memory = MemoryLimit(limit)
     try:
-        content = Path(path).read_bytes()
+        content = read_regular(path, memory)
     except OSError as error:
         raise UddError(f"{path} cannot be read: {error.strerror}") from None
+    except UddError as error:
+        raise UddError(f"{path}: {error}") from None
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            tree = json.loads(file["tree"].tobytes())
-            if tree["format"] != FORMAT:
-                raise UddError(f"{path} is a result in another format: {str(tree['format'])[:80]!r}")
-            arrays = [file[f"a{k}"] for k in range(len(file.files) - 1)]
+        named = arrays_of(content, memory)
+        text = named.pop("tree").tobytes()
+        memory.take(NESTED * len(text))
+        tree = json.loads(text)
+        if tree["format"] != FORMAT:
+            raise UddError(f"{path} is a result in another format: {str(tree['format'])[:80]!r}")
+        arrays = [named[f"a{k}"] for k in range(len(named))]
         result = _read(tree, arrays)
     except UddError as error:
         raise error if str(path) in str(error) else UddError(f"{path}: {error}") from None

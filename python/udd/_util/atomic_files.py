@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
-import tempfile
+import secrets
+from collections.abc import Iterator
 from pathlib import Path
 
 from udd.errors import UddError
@@ -49,24 +51,54 @@ def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
     Raises
     ------
     UddError
-        There is no such folder, it may not be written to, or the path is a folder.
+        There is no such folder, it may not be written to, the path is a folder, or the disk is full.
     """
     target = Path(path)
     require_writable(target)
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    except OSError as error:
-        raise UddError(f"{target} cannot be written: {error.strerror}") from None
-    try:
-        with os.fdopen(handle, "wb") as file:
+        with replacing(target) as name, open(name, "wb") as file:
             file.write(content)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
     except OSError as error:
-        os.unlink(name)
         raise UddError(f"{target} cannot be written: {error.strerror}") from None
+
+
+@contextlib.contextmanager
+def replacing(target: Path, suffix: str = "") -> Iterator[str]:
+    """Yield the name of an empty file to fill, which takes the place of `target` where nothing fails.
+
+    It lies in the same folder, and is on the disk before it takes that place, so that a loss of power leaves
+    the old file or the new one.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    name = _new_file(target, suffix)
+    try:
+        yield name
+        _to_disk(name, os.O_RDWR)
+        os.replace(name, target)
     except BaseException:
-        os.unlink(name)
+        with contextlib.suppress(OSError):
+            os.unlink(name)
         raise
+    with contextlib.suppress(OSError):  # a folder cannot be opened on Windows, nor synchronised everywhere
+        _to_disk(target.parent, os.O_RDONLY)
+
+
+def _new_file(target: Path, suffix: str) -> str:
+    """Make an empty file beside the target; the system takes the user's umask from its mode."""
+    while True:
+        name = target.parent / f".{target.name}.{secrets.token_hex(6)}{suffix}"
+        with contextlib.suppress(FileExistsError):
+            os.close(os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            return str(name)
+
+
+def _to_disk(path: str | Path, flags: int) -> None:
+    handle = os.open(path, flags)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
@@ -11,8 +12,14 @@ from typing import Any
 
 from udd.errors import ModelError, UddError
 
+from .input_files import LARGEST, NESTED, MemoryLimit, read_regular
+
 _LONGEST = 100  # characters of a name
 _DEEPEST = 16  # lists and tables within each other
+_NESTED_TOML = 1000  # bytes of memory that a byte of TOML may take
+_KEY = r"""[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*"""
+#: A name of more than these parts: ``a.b.c``.
+_DOTTED = re.compile(rf"(?:^|[\[{{,]){_KEY}(?:\.{_KEY}){{{_DEEPEST},}}", re.MULTILINE)
 
 
 def table(
@@ -55,21 +62,44 @@ def parsed(what: str, text: str, *, toml: bool = False, error: type[UddError] = 
     Raises
     ------
     UddError
-        Of the kind `error`: it is not that, or brackets are nested beyond all reason.
+        Of the kind `error`: it is not that, or brackets or dotted names are nested beyond all reason.
     """
+    # tomllib keeps a copy of a dotted name for each of its dots.
+    if toml and _DOTTED.search(text):
+        raise error(f"{what} has names of more than {_DEEPEST} parts")
     try:
         return tomllib.loads(text) if toml else json.loads(text)
     except (ValueError, RecursionError) as reason:
         raise error(f"{what} is not {'TOML' if toml else 'JSON'}: {reason}") from None
 
 
-def read(path: Path, *, toml: bool = False, error: type[UddError] = UddError) -> Any:
-    """What a file in JSON or TOML says; errors as by :func:`parsed`, or it cannot be read."""
+def read(path: Path, *, toml: bool = False, error: type[UddError] = UddError, limit: float = LARGEST) -> Any:
+    """What a file in JSON or TOML says.
+
+    Parameters
+    ----------
+    path : Path
+    toml : bool
+        Whether it is TOML, not JSON.
+    error : type
+        Kind of `UddError` to raise.
+    limit : float
+        Bytes of memory that it may take: a hundred, and a thousand in TOML, for each byte of the file.
+
+    Raises
+    ------
+    UddError
+        As by :func:`parsed`; it cannot be read, is no regular file, or takes more than `limit`.
+    """
     name = str(path) if len(str(path)) < 200 else f"{str(path)[:100]}..."
+    memory = MemoryLimit(limit, error)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path, memory).decode("utf-8")
+        memory.take((_NESTED_TOML if toml else NESTED) * len(text))
     except OSError as reason:
         raise error(f"{name} cannot be read: {reason.strerror}") from None
+    except UddError as reason:
+        raise error(f"{name}: {reason}") from None
     except ValueError as reason:  # no UTF-8
         raise error(f"{name} is not text: {reason}") from None
     return parsed(name, text, toml=toml, error=error)

@@ -115,7 +115,10 @@ def save_figure(path: Path, figure: Figure) -> None:
 
 
 def _zarr(path: Path, found: xr.Dataset) -> None:
-    folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+    try:
+        folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+    except OSError as error:
+        raise UddError(f"{path} cannot be written: {error.strerror}") from None
     try:
         # Zarr 3 has no arrays of strings of one length.
         words = {name: found[name].astype(object) for name in found.coords if found[name].dtype.kind == "U"}

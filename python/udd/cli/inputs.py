@@ -88,6 +88,13 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         metavar="N",
         help="where the clock jumps back: which of its runs, from 0",
     )
+    parser.add_argument(
+        OPTIONS["limit"],
+        dest="limit",
+        type=float,
+        metavar="BYTES",
+        help="bytes that a table may unpack to (default: 1e9); larger ones are refused",
+    )
     add_partial(parser)
     if several:
         parser.add_argument(
@@ -110,6 +117,8 @@ def is_film(path: Path) -> bool:
     if path.suffix.lower() in _FILMS:
         return True
     try:
+        if not path.is_file():
+            return False
         with path.open("rb") as file:
             start = file.read(4096)
     except OSError:
@@ -165,8 +174,9 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
         from udd.measurement.read import columns_of, told
 
         states, inputs = None, args.inputs
+        limit = {} if args.limit is None else {"limit": args.limit}
         if args.model is not None:
-            there = columns_of(args.file, args.columns)
+            there = columns_of(args.file, args.columns, **limit)
             model = own_model(args)
             states = [name for name in model.channels if name in there]
             if not states:
@@ -188,6 +198,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 rate=args.sampling,
                 repeated=args.repeated,
                 part=args.part,
+                **limit,
                 **known,
             )
         if said := told(measurement.meta.get("columns")):
@@ -312,7 +323,7 @@ def check_early(args: argparse.Namespace) -> None:
     if len(args.files) == 1 and getattr(args, "each", None) is not None:
         raise UddError("--each takes several files: of one nothing can have a value for each")
     if all(map(is_film, args.files)):
-        for name in ("columns", "sampling", "repeated", "part"):
+        for name in ("columns", "sampling", "repeated", "part", "limit"):
             if getattr(args, name) is not None:
                 raise UddError(f"--{name} does not apply to a film: it is of tables")
     effects(args.effect)

@@ -11,6 +11,7 @@ OPTIONS = {
     "rate": "--sampling",
     "repeated": "--repeated",
     "part": "--part",
+    "limit": "--limit",
 }
 
 # A word of a sentence: what a user wrote of a parameter with such a name, "--effect x:rate=1", is left alone.

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.input_files import LARGEST, MemoryLimit, read_regular
 from udd.errors import MeasurementError
 
 from .formats import HEAD, Table, format_of
@@ -33,6 +34,7 @@ def read_measurement(
     rate: float | None = None,
     repeated: Literal["first"] | None = None,
     part: int | None = None,
+    limit: float = LARGEST,
     **meta: Any,
 ) -> Measurement:
     r"""Read a measured motion of a disk, of a pendulum or of a machine of your own.
@@ -73,6 +75,8 @@ def read_measurement(
         Of rows with the same time keep the first; otherwise they are refused.
     part : int, optional
         Where the clock jumps back: which of the stretches between its jumps, from 0.
+    limit : float, default 1e9
+        Bytes of data that the file may unpack to: what it holds, and 8 for each number. More is refused.
     **meta
         Entries that win over those of the file, such as ``W=0.039``; None is ignored.
 
@@ -85,8 +89,9 @@ def read_measurement(
     Raises
     ------
     MeasurementError
-        The file is missing, empty, broken or of an unknown kind; a column is missing; a cell is not a number;
-        times do not increase; a value is infinite; a sigma is not positive; too few usable rows.
+        The file is missing, empty, broken, of an unknown kind, no regular file, larger than `limit`, or
+        refers to other files (HDF5); a column is missing; a cell is not a number; times do not increase; a
+        value is infinite; a sigma is not positive; too few usable rows.
 
     Examples
     --------
@@ -107,7 +112,7 @@ def read_measurement(
     if isinstance(states, str) or not (states is None or isinstance(states, Iterable)):
         raise MeasurementError(f"states is a list of columns, not {states!r}")
     drivers = _drivers(inputs)
-    tables = _load(source, given)
+    tables = _load(source, given, limit)
     about = {key: value for key, value in meta.items() if value is not None}
     try:
         record = Recorded(tables, mapping, rate=rate, repeated=repeated, part=part)
@@ -122,10 +127,17 @@ def read_measurement(
     return m
 
 
-def columns_of(path: str | os.PathLike[str], columns: Columns | None = None) -> list[str]:
+def columns_of(
+    path: str | os.PathLike[str], columns: Columns | None = None, *, limit: float = LARGEST
+) -> list[str]:
     """The names of a file's columns, read as by :func:`read_measurement`."""
     mapping, given = _mapping(columns)
-    names = [heading.name for table in _load(Path(path), given) for heading in table.headings if heading.name]
+    names = [
+        heading.name
+        for table in _load(Path(path), given, limit)
+        for heading in table.headings
+        if heading.name
+    ]
     return [*(mapping or {}), *(name for name in names if name not in (mapping or {}))]
 
 
@@ -197,17 +209,17 @@ def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str
     return found
 
 
-def _load(path: Path, given: list[str] | None) -> list[Table]:
+def _load(path: Path, given: list[str] | None, limit: float) -> list[Table]:
+    memory = MemoryLimit(limit, MeasurementError)
     try:
-        raw = path.read_bytes()
+        raw = read_regular(path, memory)
+        if not raw.strip():
+            raise MeasurementError("the file is empty")
+        return format_of(raw[:HEAD], path.suffix).read(raw, given, memory)
     except FileNotFoundError:
         raise MeasurementError(f"{path}: there is no such file") from None
     except OSError as error:
         raise MeasurementError(f"{path}: cannot be read ({error.strerror})") from None
-    if not raw.strip():
-        raise MeasurementError(f"{path}: the file is empty")
-    try:
-        return format_of(raw[:HEAD], path.suffix).read(raw, given)
     except MeasurementError as error:
         raise MeasurementError(f"{path}: {error}") from None
 

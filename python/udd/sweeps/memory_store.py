@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,10 @@ class Memory:
             v.name: np.full((*grid.shape, *(n for _, n in v.more)), fill_of(v), dtype=v.dtype)
             for v in variables_of(spec)
         }
+
+    def writing(self) -> contextlib.AbstractContextManager[None]:
+        """Nothing is written to a disk."""
+        return contextlib.nullcontext()
 
     def arguments(self, chunk: int) -> tuple[Any, ...]:
         """What `work` takes."""

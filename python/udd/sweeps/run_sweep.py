@@ -123,10 +123,11 @@ def sweep(
 
         chunks = np.flatnonzero(~done).tolist()
         try:
-            if executor is None:
-                here(result.work, chunks, result.arguments, keep)
-            else:
-                spread(executor, result.work, chunks, result.arguments, keep)
+            with result.writing():
+                if executor is None:
+                    here(result.work, chunks, result.arguments, keep)
+                else:
+                    spread(executor, result.work, chunks, result.arguments, keep)
         except KeyboardInterrupt:
             why, stopped = "stopped by Ctrl-C", True
         except ChunksLost as error:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.input_files import LARGEST
 from udd._util.tables import parsed, read, table
 from udd._util.validation import array, number, whole
 from udd.errors import ModelError, UddError
@@ -147,15 +148,21 @@ class SweepSpec:
         return cls.from_dict(parsed("the sweep", text))
 
     @classmethod
-    def read(cls, path: str | Path) -> SweepSpec:
-        """The spec in a file: TOML where its name ends so, otherwise JSON.
+    def read(cls, path: str | Path, *, limit: float = LARGEST) -> SweepSpec:
+        """Read the spec in a file: TOML if its name ends so, otherwise JSON.
+
+        Parameters
+        ----------
+        path : path
+        limit : float, default 1e9
+            Bytes of memory that it may take: a hundred, and a thousand in TOML, for each byte of the file.
 
         Raises
         ------
         UddError
-            The file cannot be read or understood; the sentence names it.
+            The file cannot be read or understood, or takes more than `limit`; the sentence names it.
         """
-        data = read(Path(path), toml=Path(path).suffix == ".toml")
+        data = read(Path(path), toml=Path(path).suffix == ".toml", limit=limit)
         try:
             return cls.from_dict(data)
         except UddError as error:

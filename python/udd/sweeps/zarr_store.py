@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,12 +65,37 @@ class SweepStore:
         self, store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, grid: Grid, threads: int
     ) -> None:
         self._spec, self._grid, self._threads = spec, grid, threads
-        self._group = _opened(store, spec)
-        if "done" not in self._group:  # made last
-            _make_template(self._group, spec, grid)
+        import zarr
+
+        self.where = f"the group {store.name}" if isinstance(store, zarr.Group) else os.fspath(store)
+        with _locked(store), self.writing():
+            self._group = _opened(store, spec, self.where)
+            if "done" not in self._group:  # made last
+                _make_template(self._group, spec, grid)
         self._arrays = {v.name: _array(self._group, v.name) for v in variables_of(spec)}
         self._done = _array(self._group, "done")
         self._reached = False
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Say where writing failed.
+
+        Raises
+        ------
+        UddError
+            The store cannot be written, as on a full disk, or another process makes it at the same time.
+        """
+        import zarr
+
+        try:
+            yield
+        except (zarr.errors.ContainsGroupError, zarr.errors.ContainsArrayError):
+            raise UddError(
+                f"{self.where} is being made by another process: call again when it is there"
+            ) from None
+        except (OSError, zarr.errors.BaseZarrError) as error:
+            said = getattr(error, "strerror", None) or str(error)
+            raise UddError(f"{self.where} cannot be used for a sweep: {said}") from None
 
     def arguments(self, chunk: int) -> tuple[Any, ...]:
         """What `work` takes."""
@@ -110,31 +137,44 @@ class SweepStore:
         return found
 
 
-def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec) -> zarr.Group:
+@contextlib.contextmanager
+def _locked(store: str | os.PathLike[str] | zarr.Group) -> Iterator[None]:
+    """Let other processes wait that would make the same store, on systems that can lock a folder."""
+    import zarr
+
+    with contextlib.ExitStack() as stack:
+        if not isinstance(store, zarr.Group):
+            with contextlib.suppress(ImportError, OSError):
+                import fcntl
+
+                place = Path(store)
+                place.mkdir(parents=True, exist_ok=True)
+                folder = os.open(place, os.O_RDONLY)
+                stack.callback(os.close, folder)
+                fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+
+
+def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, where: str) -> zarr.Group:
     """The group of this very sweep, made if there is none."""
     import zarr
 
     if isinstance(store, zarr.Group):
-        group, where = store, f"the group {store.name}"
+        group = store
         if group.metadata.zarr_format != 3:
             raise UddError(f"{where} is of Zarr format {group.metadata.zarr_format}; a sweep needs format 3")
         if _HASH not in group.attrs and not any(True for _ in group.members()):
             group.update_attributes(spec_attributes(spec))
     else:
-        where = os.fspath(store)
         place = Path(where).absolute()
-        try:
-            names = [path.name for path in place.iterdir()] if place.exists() else []
-            if "zarr.json" in names:
-                group = zarr.open_group(zarr.storage.LocalStore(place), mode="r+", zarr_format=3)
-            elif all(name.endswith(".partial") for name in names):
-                new = zarr.storage.LocalStore(place)
-                group = zarr.create_group(new, zarr_format=3, attributes=spec_attributes(spec))
-            else:
-                raise UddError(f"{where} holds other things already: a sweep needs a new or an empty folder")
-        except (OSError, zarr.errors.BaseZarrError) as error:
-            said = getattr(error, "strerror", None) or str(error)
-            raise UddError(f"{where} cannot be used for a sweep: {said}") from None
+        names = [path.name for path in place.iterdir()] if place.exists() else []
+        if "zarr.json" in names:
+            group = zarr.open_group(zarr.storage.LocalStore(place), mode="r+", zarr_format=3)
+        elif all(name.endswith(".partial") for name in names):
+            new = zarr.storage.LocalStore(place)
+            group = zarr.create_group(new, zarr_format=3, attributes=spec_attributes(spec))
+        else:
+            raise UddError(f"{where} holds other things already: a sweep needs a new or an empty folder")
     found = group.attrs.get(_HASH)
     if found is None:
         raise UddError(f"{where} holds other data already: a sweep needs a place of its own")

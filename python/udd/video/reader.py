@@ -5,19 +5,16 @@ from __future__ import annotations
 import json
 import math
 import os
-import select
-import subprocess
-import sys
-import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.child_process import ChildProcess
 from udd.errors import UddError
 
 from .decoder_process import HEAD, LOOK, NO_FILM
@@ -27,7 +24,6 @@ Plane = NDArray[np.uint8]
 PATIENCE = 60.0  # s for which the decoder may be silent
 DECODER = str(Path(__file__).with_name("decoder_process.py"))
 MEMORY = 4 << 30  # bytes of address space that it may take
-PIPE = 1 << 20  # bytes that the pipe to it should hold
 
 
 class TrackError(UddError):
@@ -70,6 +66,8 @@ class Film:
             raise TrackError(f"{self.path}: there is no such file")
         if self.path.is_dir():
             raise TrackError(f"{self.path} is a folder, not a film")
+        if not self.path.is_file():
+            raise TrackError(f"{self.path} is a device or a pipe, not a regular file: save the film first")
         if self.path.stat().st_size == 0:
             raise TrackError(f"{self.path}: the file is empty")
         if fps is not None and not (math.isfinite(fps) and fps > 0):
@@ -118,7 +116,7 @@ class Film:
     def _decoder(self) -> _Decoder:
         """The process that is left from the last run, or a new one."""
         idle, self._idle = self._idle, None
-        return _Decoder(self.path) if idle is None or idle.process.poll() is not None else idle
+        return _Decoder(self.path) if idle is None or idle.child.process.poll() is not None else idle
 
 
 class _Decoder:
@@ -126,39 +124,29 @@ class _Decoder:
 
     def __init__(self, path: Path) -> None:
         self.broken, self.whole = 0, False
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", DECODER, str(path), str(MEMORY)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            bufsize=0,
-        )
-        self.end = weakref.finalize(self, _end, self.process)
-        assert self.process.stdout is not None
-        self.pipe: IO[bytes] = self.process.stdout
-        _widen(self.pipe)
+        self.child = ChildProcess(DECODER, str(path), str(MEMORY), patience=PATIENCE)
+        self.end = self.child.end
 
     def ask(self, request: str) -> dict[str, Any]:
         """What the header says, or an error; pictures follow where a time was asked for."""
         self.broken, self.whole = 0, False
-        assert self.process.stdin is not None
         try:
-            self.process.stdin.write(request.encode() + b"\n")
-            line = self.pipe.readline() if _ready(self.pipe) else b""
+            self.child.send(request.encode() + b"\n")
+            line = self.child.line()
         except OSError:
             line = b""
         return json.loads(line) if line else {"error": NO_FILM}
 
     def pictures(self) -> Iterator[Picture]:
         head = bytearray(HEAD.size)
-        while _fill(self.pipe, head):
+        while self.child.fill(head):
             index, t, height, width, rows, columns, turns, damaged = HEAD.unpack(head)
             if index < 0:  # the end: what did not decode
                 self.broken, self.whole = height, True
                 return
             full, half = height * width, rows * columns
             room = np.empty(full + 2 * half, np.uint8)
-            if not _fill(self.pipe, room.data):
+            if not self.child.fill(room.data):
                 break
             y, u, v = room[:full], room[full : full + half], room[full + half :]
             y, u, v = y.reshape(height, width), u.reshape(rows, columns), v.reshape(rows, columns)
@@ -166,41 +154,3 @@ class _Decoder:
                 y, u, v = (np.ascontiguousarray(np.rot90(p, turns)) for p in (y, u, v))
             yield Picture(index, t, y, u, v, damaged)
         self.broken = 1  # it ended in the middle
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            pipe.close()
-    process.wait()
-
-
-def _fill(pipe: IO[bytes], room: Any) -> bool:
-    """Read exactly as many bytes as there is room for; False where the pipe ends before."""
-    view, done = memoryview(room), 0
-    while done < len(view):
-        if not _ready(pipe):
-            return False
-        got = pipe.readinto(view[done:])  # type: ignore[attr-defined]
-        if not got:
-            return False
-        done += got
-    return True
-
-
-def _ready(pipe: IO[bytes]) -> bool:
-    """Whether the decoder says something before patience ends (systems that cannot tell wait for ever)."""
-    try:
-        return bool(select.select([pipe], [], [], PATIENCE)[0])
-    except (OSError, ValueError):  # Windows selects among sockets only
-        return True
-
-
-def _widen(pipe: IO[bytes]) -> None:
-    try:
-        import fcntl
-
-        fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, PIPE)
-    except (ImportError, AttributeError, OSError):
-        pass  # not this system; it is only slower

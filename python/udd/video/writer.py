@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterable
 from fractions import Fraction
 from itertools import count
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.atomic_files import replacing
 from udd.errors import UddError
 
 SUFFIXES = (".mp4", ".mov")
@@ -58,24 +58,14 @@ def write_film(
     Frame k of them has the time stamp numbers[k] / (rate ticks), without `numbers` k / rate.
     """
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem}.", suffix=target.suffix.lower(), dir=target.parent
-        )
-    except OSError as error:
-        raise UddError(f"cannot write the film {target}: {error.strerror}") from None
-    os.close(handle)
-    try:
-        if codec == "mp4v":
-            _encode_as_opencv(name, frames, size, rate)
-        else:
-            stamps = count(0, ticks) if numbers is None else numbers
-            _encode(name, frames, stamps, size, rate, quality, codec, ticks)
-        os.chmod(name, 0o666 & ~_umask())  # mkstemp's file is for the owner alone
-        os.replace(name, target)
+        with replacing(target, target.suffix.lower()) as name:
+            if codec == "mp4v":
+                _encode_as_opencv(name, frames, size, rate)
+            else:
+                stamps = count(0, ticks) if numbers is None else numbers
+                _encode(name, frames, stamps, size, rate, quality, codec, ticks)
     except OSError as error:
         raise UddError(f"cannot write the film {target}: {error.strerror or error}") from None
-    finally:
-        Path(name).unlink(missing_ok=True)
 
 
 def _encode(
@@ -137,9 +127,3 @@ def _stream(container: Any, rate: Fraction, quality: float, codec: str) -> Any:
         # MPEG-4's quantiser runs from 1 to 31 where H.264's quality runs from 0 to 51
         q = f"{min(max(quality / 5, 1), 31):g}"
         return container.add_stream("mpeg4", rate=rate, options={"qmin": q, "qmax": q, "bf": "0"})
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

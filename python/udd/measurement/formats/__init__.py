@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from udd._util.input_files import MemoryLimit
 from udd.errors import MeasurementError
 
 from . import hdf5, matlab, numpy_arrays, parquet, text, tracker_project, zipped
@@ -12,7 +13,7 @@ from .table import Table
 
 __all__ = ["FORMATS", "Format", "Table", "format_of", "is_table"]
 
-Reader = Callable[[bytes, list[str] | None], list[Table]]
+Reader = Callable[[bytes, list[str] | None, MemoryLimit], list[Table]]
 _OFFICE = bytes.fromhex("d0cf11e0a1b11ae1")  # compound files: Excel's before 2007
 HEAD = 4096
 """Bytes at a file's beginning that tell its kind."""
@@ -40,7 +41,7 @@ def _npz(head: bytes, suffix: str) -> bool:
     return head.startswith(b"PK\3\4") and (suffix == ".npz" or b".npy" in head[:512])
 
 
-def _old_workbook(_raw: bytes, _given: list[str] | None) -> list[Table]:
+def _old_workbook(_raw: bytes, _given: list[str] | None, _memory: MemoryLimit) -> list[Table]:
     raise MeasurementError("this is an Excel workbook or another old Office file: save its sheet as CSV")
 
 

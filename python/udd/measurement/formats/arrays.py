@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.input_files import MemoryLimit
 from udd.errors import MeasurementError
 
 from .headings import Heading, headings
 from .table import Table
-
-LARGEST = 2**30  # bytes that a file may unfold to
 
 
 def tables_of(
@@ -24,6 +23,7 @@ def tables_of(
     *,
     meta: Mapping[str, Any] | None = None,
     units: Mapping[str, str] | None = None,
+    memory: MemoryLimit | None = None,
 ) -> list[Table]:
     """One table for each length of columns.
 
@@ -33,8 +33,9 @@ def tables_of(
     Raises
     ------
     MeasurementError
-        There is no array of numbers.
+        There is no array of numbers, or they take more than the limit.
     """
+    memory = memory or MemoryLimit(error=MeasurementError)
     about: dict[str, Any] = dict(meta or {})
     columns: dict[str, NDArray[np.float64]] = {}
     stated: dict[str, str] = {}
@@ -56,16 +57,18 @@ def tables_of(
             stated |= dict.fromkeys(found, (units or {}).get(name, ""))
     if not columns:
         raise MeasurementError("the file holds no arrays of numbers")
-    lengths = dict.fromkeys(len(column) for column in columns.values())
+    by_length: dict[int, dict[str, NDArray[Any]]] = {}
+    for name, column in columns.items():
+        by_length.setdefault(len(column), {})[name] = column
     tables = []
-    for length in lengths:
-        own = {name: column for name, column in columns.items() if len(column) == length}
+    for own in by_length.values():
         named = [
             replace(heading, raw=name, unit=stated.get(name) or heading.unit)
             for name, heading in zip(own, headings([_last(name) for name in own]), strict=True)
         ]
+        memory.take(sum(8 * column.size for column in own.values() if column.dtype != np.float64))
         whole: list[Any] = [np.asarray(column, dtype=np.float64) for column in own.values()]
-        tables.append(Table(named, whole, about))
+        tables.append(Table(named, whole, about, memory=memory))
     return [_named(tables, given)] if given is not None else tables
 
 

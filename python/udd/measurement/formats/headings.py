@@ -53,6 +53,9 @@ COUNTED: dict[str, str] = {"t": "s", "Y": "m", "Z": "m", "x": "m", "y": "m", "be
 USUAL: dict[str, str] = {"s": "s or ms", "m": "m, cm or mm", "rad": "deg or rad"}
 #: What may stand before a unit without brackets: ``t_ms``, ``t / s``, ``angle deg``, ``angle in deg``.
 _BEFORE_UNIT = re.compile(r"(?:\s*[_/,]\s*|\s+in\s+|\s+)(?=[^_/,\s]+$)")
+# None of these matches an opening bracket within another, so that a row of brackets is read once.
+_IN_BRACKETS = re.compile(r"_?\{[^{}]*\}|\[[^][]*\]|\([^()]*\)")
+_UNIT = re.compile(r"[\[(]([^][()]+)[])]")
 #: Names that a unit may follow without brackets; others may be states of a user's own model.
 _ENDING = ("t", "Y", "Z", "beta", "theta")
 
@@ -72,16 +75,17 @@ class Heading:
 
 def headings(cells: Sequence[str]) -> list[Heading]:
     """``t_{1}``, ``T [s]``, ``Time (ms)``, ``time ms`` and ``t_ms`` are all t, the last three in ms."""
-    bare = [re.sub(r"_?\{[^}]*\}|\[[^]]*\]|\([^)]*\)", "", cell).strip() for cell in cells]
+    bare = [_IN_BRACKETS.sub("", cell).strip() for cell in cells]
     names = [_symbol(name) for name in bare]
+    taken = set(names)
     result = []
     for cell, plain, name in zip(cells, bare, names, strict=True):
-        stated = re.findall(r"[\[(]\s*([^])]+?)\s*[])]", cell)
+        stated = [said for one in _UNIT.findall(cell) if (said := one.strip())]
         unit = next((one for one in stated if in_base_units(one)), stated[-1] if stated else "")
         # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
         base, unit_after = _parted(plain)
         known = _symbol(base)
-        if known in _ENDING and known not in names and size(known, unit_after):
+        if known in _ENDING and known not in taken and size(known, unit_after):
             name, unit = known, unit_after
         result.append(Heading(cell.strip(), name, unit))
     return result
@@ -89,7 +93,7 @@ def headings(cells: Sequence[str]) -> list[Heading]:
 
 def _parted(name: str) -> tuple[str, str]:
     """A heading without brackets as a name and what may be its unit."""
-    base, *rest = _BEFORE_UNIT.split(name, maxsplit=1)
+    base, *rest = _BEFORE_UNIT.split(" ".join(name.split()), maxsplit=1)
     return base, "".join(rest)
 
 

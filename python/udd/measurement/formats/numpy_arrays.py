@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import io
-
-import numpy as np
-
+from udd._util.input_files import MemoryLimit
+from udd._util.numpy_files import array_of, arrays_of
 from udd.errors import MeasurementError
 
-from .arrays import LARGEST, tables_of
+from .arrays import tables_of
 from .table import Table
 
 
-def read(raw: bytes, given: list[str] | None) -> list[Table]:
+def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table]:
     """Read arrays; what would have to be unpickled is refused."""
     try:
-        with np.load(io.BytesIO(raw), allow_pickle=False) as file:
-            if sum(info.file_size for info in file.zip.infolist()) > LARGEST:
-                raise MeasurementError("the archive unfolds to more than 1 GB")
-            arrays = {name: file[name] for name in file.files}
+        arrays = arrays_of(raw, memory)
     except MeasurementError:
         raise
     except Exception as error:  # of what a broken file makes NumPy raise there is no list
         raise MeasurementError(f"the NumPy archive cannot be read: {told(error)}") from None
-    return tables_of(arrays, given)
+    return tables_of(arrays, given, memory=memory)
 
 
-def read_one(raw: bytes, given: list[str] | None) -> list[Table]:
+def read_one(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table]:
     """Read the array of an .npy file."""
     try:
-        array = np.load(io.BytesIO(raw), allow_pickle=False)
+        array = array_of(raw)
     except Exception as error:
         raise MeasurementError(f"the NumPy array cannot be read: {told(error)}") from None
-    return tables_of({"column": array}, given)
+    return tables_of({"column": array}, given, memory=memory)
 
 
 def told(error: Exception | str) -> str:

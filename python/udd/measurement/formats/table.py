@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.input_files import MemoryLimit
 from udd.errors import MeasurementError
 
 from .headings import Heading
+from .text_column import TextColumn
 
+_LONGEST = 200  # characters of a cell that is kept as text
 #: What people and programs put into an empty cell.
 NOTHING = {"", "nan", "na", "n/a", "null", "none"}
 
@@ -21,16 +24,17 @@ NOTHING = {"", "nan", "na", "n/a", "null", "none"}
 class Table:
     """Columns of one length.
 
-    `columns` are numbers, or cells as text (None where a row ends before them); `lines` the lines of the file
-    that the rows stand in, where it has lines; `name` that of the table, where a file holds several.
+    `columns` are numbers, or cells as text (None if a row ends before them); `lines` the lines of the file
+    that the rows stand in, if it has lines; `name` that of the table, if a file holds several.
     """
 
     headings: list[Heading]
-    columns: list[NDArray[np.float64] | list[str | None]]
+    columns: list[NDArray[np.float64] | list[str | None] | TextColumn]
     meta: dict[str, Any] = field(default_factory=dict)
-    lines: list[int] | None = None
+    lines: NDArray[np.int32] | None = None
     comma: bool = False  # decimal comma
     name: str = ""
+    memory: MemoryLimit = field(default_factory=MemoryLimit)
 
     def __len__(self) -> int:
         return len(self.columns[0]) if self.columns else 0
@@ -70,13 +74,14 @@ class Table:
             A cell is not a number, or is not there.
         """
         column = self.columns[k]
+        if isinstance(column, TextColumn) and column.values is not None:
+            return column.values
         if isinstance(column, np.ndarray):
             return column
         out = np.empty(len(column))
         name = self.headings[k].name
-        for i, cell in enumerate(column):
+        for i, (cell, there) in enumerate(_cells(column)):
             if cell is None:
-                there = sum(other[i] is not None for other in self.columns)
                 raise MeasurementError(
                     f"{self.place(i)} ends before column {name}: {there} of {len(self.columns)} cells"
                 )
@@ -90,8 +95,26 @@ class Table:
         return out
 
     def words(self, k: int) -> NDArray[np.str_]:
-        """A column as text, empty where a cell is."""
-        return np.array([cell or "" for cell in self.columns[k]], dtype=np.str_)
+        """A column as text, empty where a cell is.
+
+        Raises
+        ------
+        MeasurementError
+            One is too long: NumPy gives each text the room of the longest.
+        """
+        column = self.columns[k]
+        cells = column.tolist() if isinstance(column, np.ndarray) else (cell for cell, _ in _cells(column))
+        longest = max((len(cell) for cell in map(_text, cells)), default=0)
+        if longest > _LONGEST:
+            raise MeasurementError(
+                f"a text in column {self.headings[k].name} has {longest} characters, more than {_LONGEST}"
+            )
+        self.memory.take(4 * longest * len(column))
+        out = np.empty(len(column), dtype=f"<U{max(1, longest)}")
+        cells = column.tolist() if isinstance(column, np.ndarray) else (cell for cell, _ in _cells(column))
+        for i, cell in enumerate(map(_text, cells)):
+            out[i] = cell
+        return out
 
     def place(self, row: int) -> str:
         """Where a row stands, in the user's terms."""
@@ -99,12 +122,24 @@ class Table:
 
     def rows(self, pick: Sequence[int] | NDArray[np.int64]) -> Table:
         """The table of some of its rows."""
+        chosen = np.asarray(pick, dtype=np.int64)
 
         def some(column: Any) -> Any:
-            return column[pick] if isinstance(column, np.ndarray) else [column[i] for i in pick]
+            if isinstance(column, TextColumn):
+                return column.picked(chosen)
+            return column[chosen] if isinstance(column, np.ndarray) else [column[i] for i in chosen]
 
         lines = None if self.lines is None else some(self.lines)
         return replace(self, columns=[some(column) for column in self.columns], lines=lines)
+
+
+def _cells(column: list[str | None] | TextColumn) -> Iterator[tuple[str | None, int]]:
+    """The cells of a column, and how many its row has."""
+    return column.cells() if isinstance(column, TextColumn) else ((cell, 0) for cell in column)
+
+
+def _text(cell: Any) -> str:
+    return str(cell) if cell else ""
 
 
 def number(cell: str, comma: bool) -> float:

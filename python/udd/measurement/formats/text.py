@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
+from itertools import chain, islice, repeat, zip_longest
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.input_files import NESTED, MemoryLimit
 from udd.errors import MeasurementError
 
 from .headings import Heading, headings
 from .table import NOTHING, Table, number
+from .text_column import Rows, TextColumn, split
+from .text_lines import Lines
 
 _FIRST = 50  # rows in which a header is looked for
 _WITH_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
@@ -25,7 +28,7 @@ _WHOLE = re.compile(r"[-+]?\d+([eE][-+]?\d+)?")
 _DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}\b|\d{1,2}:\d{2}\b")
 
 
-def read(raw: bytes, given: list[str] | None) -> list[Table]:
+def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table]:
     """Read a text table; `given` names its columns instead of a header.
 
     Lines ``# key = value`` are about the whole file. Excel's byte order mark, its line ``sep=;``, decimal
@@ -33,130 +36,183 @@ def read(raw: bytes, given: list[str] | None) -> list[Table]:
     them become seconds since the first. Tracker's export of several points begins
     with ``#multi:`` and a row of their names, and repeats the columns of each: they are called ``mass A x``.
     """
+    lines = Lines(raw, memory)
     meta: dict[str, Any] = {}
-    body: list[tuple[int, str]] = []
-    several, mark = False, ""
-    for line_number, line in enumerate(_decoded(raw).splitlines(), start=1):
-        if line.lstrip().startswith("#"):
-            several |= line.lstrip().lower().startswith("#multi:")
-            key, equals, text = line.lstrip().lstrip("#").partition("=")
-            if equals:
-                meta[key.strip()] = value(text.strip())
-        elif not body and re.fullmatch(r"sep=.", line.strip()):
-            mark = line.strip()[-1]
-        elif line.strip():
-            body.append((line_number, line))
-    if not body:
+    several = False
+    for comment in lines.comments:
+        several |= comment.lower().startswith("#multi:")
+        key, equals, text = comment.lstrip("#").partition("=")
+        if equals:
+            meta[key.strip()] = value(text.strip(), memory)
+    counts = _counted(lines)
+    if not counts.lines:
         raise MeasurementError("the file holds no rows")
-    mark = mark or _delimiter([line for _, line in body])
-    cells = [_split(line, mark) for _, line in body]
-    comma = _decimal_comma([line for _, line in body], cells, mark)
-    names, start = _header(cells, comma, given)
+    mark = lines.mark or counts.delimiter()
+    comma = _decimal_comma(lines, counts, mark)
+    names, start, above = _header(lines, mark, comma, given)
     if several and start > 1:
-        names = _of_points(names, cells[start - 2])
-    rows = [
-        (line_number, row)
-        for (line_number, _), row in zip(body[start:], cells[start:], strict=True)
-        if any(cell and cell.lower() != "nan" for cell in row)
-    ]
-    if mark == "," and not comma:
-        _no_commas_between_commas(names, [row for _, row in rows])
-    columns: list[Any] = [[row[k] if k < len(row) else None for _, row in rows] for k in range(len(names))]
-    lines = [line_number for line_number, _ in rows]
-    return [Table(_seconds(headings(names), columns, lines), columns, meta, lines, comma)]
+        names = _of_points(names, above)
+    columns, numbers = _columns(Rows(lines, mark, start, len(names)), counts.lines - start, comma, memory)
+    return [Table(_seconds(headings(names), columns, numbers), columns, meta, numbers, comma, memory=memory)]
 
 
-def value(text: str) -> Any:
+def value(text: str, memory: MemoryLimit) -> Any:
     """What stands behind the equals sign in a file's head."""
+    memory.take(NESTED * len(text) if text[:1] in ("[", "{") else len(text))
     try:
         return json.loads(text)
     except (ValueError, RecursionError):
         return text
 
 
-def _decoded(raw: bytes) -> str:
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):  # "Unicode text" of Excel
-        try:
-            return raw.decode("utf-16")
-        except UnicodeDecodeError:
-            raise MeasurementError("this is not a text table") from None
-    if b"\0" in raw[:4096]:
-        raise MeasurementError("this is not a text table")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
+@dataclass
+class Counts:
+    """How many lines there are, and how many of them may be separated by what."""
 
+    lines: int = 0
+    tabs: int = 0
+    semicolons: int = 0
+    commas: int = 0
+    blanks: int = 0  # between numbers with decimal commas
+    quotes: int = 0
 
-def _delimiter(lines: list[str]) -> str:
-    if (
-        sum("," in line and "\t" not in line and _blanks_and_commas(line.split()) for line in lines)
-        > len(lines) / 2
-    ):
+    def delimiter(self) -> str:
+        """What separates the columns."""
+        if self.blanks > self.lines / 2:
+            return " "
+        for mark, count in (("\t", self.tabs), (";", self.semicolons), (",", self.commas)):
+            if count > self.lines / 2:
+                return mark
         return " "
-    for mark in "\t;,":
-        if sum(mark in line for line in lines) > len(lines) / 2:
-            return mark
-    return " "
+
+
+def _counted(lines: Lines) -> Counts:
+    counts = Counts()
+    for _, block in lines.blocks():
+        counts.lines += len(block)
+        counts.tabs += sum("\t" in line for line in block)
+        counts.semicolons += sum(";" in line for line in block)
+        counts.quotes += sum('"' in line for line in block)
+        commas = [line for line in block if "," in line]
+        counts.commas += len(commas)
+        counts.blanks += sum("\t" not in line and _blanks_and_commas(line.split()) for line in commas)
+    return counts
 
 
 def _blanks_and_commas(cells: list[str]) -> bool:
     """Whether cells between blanks are numbers with decimal commas, as ``0,04 0,39``."""
+    if len(cells) < 2:
+        return False
     some = [cell for cell in cells if not _numeric(cell, False)]
-    return len(cells) > 1 and bool(some) and all(_WITH_COMMA.fullmatch(cell) for cell in some)
+    return bool(some) and all(_WITH_COMMA.fullmatch(cell) for cell in some)
 
 
-def _decimal_comma(lines: list[str], cells: list[list[str]], mark: str) -> bool:
+def _decimal_comma(lines: Lines, counts: Counts, mark: str) -> bool:
     """Whether numbers have decimal commas; between commas only in quotes, and not where there are points."""
     if mark != ",":
-        return mark in ";\t " and sum("," in line for line in lines) > len(lines) / 2
-    quoted = [row for row in cells if any("," in cell and _WITH_COMMA.fullmatch(cell) for cell in row)]
-    points = any("." in cell and _numeric(cell, False) for row in quoted for cell in row)
-    return len(quoted) > len(cells) / 2 and not points
+        return mark in ";\t " and counts.commas > counts.lines / 2
+    if counts.quotes <= counts.lines / 2:
+        return False
+    quoted = 0
+    for _, block in lines.blocks():
+        for row in split([line for line in block if '"' in line], mark):
+            if any("," in cell and _WITH_COMMA.fullmatch(cell) for cell in row):
+                quoted += 1
+                if any("." in cell and _numeric(cell, False) for cell in row):
+                    return False
+    return quoted > counts.lines / 2
 
 
-def _no_commas_between_commas(names: list[str], rows: list[list[str]]) -> None:
-    """Refuse rows that decimal commas have torn apart."""
-    torn = [row for row in rows if len(row) > len(names) and all(_WHOLE.fullmatch(cell) for cell in row)]
-    if len(torn) > len(rows) / 2:
+def _columns(rows: Rows, most: int, comma: bool, memory: MemoryLimit) -> tuple[list[Any], NDArray[np.int32]]:
+    """The columns, as numbers where all cells are, and the lines that the rows stand in."""
+    memory.take(most * (8 * rows.columns + 4))
+    numbers = np.empty(most, dtype=np.int32)
+    columns: list[NDArray[np.float64] | None] = [np.empty(most) for _ in range(rows.columns)]
+    done = torn = width = 0
+    for found, block in rows.blocks():
+        end = done + len(block)
+        numbers[done:end] = found
+        for k, cells in enumerate(islice(chain(zip_longest(*block), repeat((None,))), rows.columns)):
+            column = columns[k]
+            if block and column is not None and not _fill(column[done:end], cells, comma):
+                columns[k] = None
+        if rows.mark == "," and not comma:
+            for row in block:
+                if len(row) > rows.columns and all(map(_WHOLE.fullmatch, row)):
+                    torn, width = torn + 1, width or len(row)
+        done = end
+    if torn > done / 2:
         raise MeasurementError(
-            f"rows have {len(torn[0])} whole numbers for {len(names)} columns, as decimal commas between "
+            f"rows have {width} whole numbers for {rows.columns} columns, as decimal commas between "
             "commas make them: separate columns by semicolons"
         )
+    return [
+        TextColumn(rows, k, None if column is None else column[:done], done)
+        for k, column in enumerate(columns)
+    ], numbers[:done]
 
 
-def _split(line: str, mark: str) -> list[str]:
-    if mark == " ":
-        return line.split()
+def _fill(out: NDArray[np.float64], cells: Sequence[str | None], comma: bool) -> bool:
+    """Fill in the cells' numbers; False if one is none, or not there."""
     try:
-        return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")], delimiter=mark))]
-    except csv.Error as error:  # a cell longer than 128 kB
-        raise MeasurementError(f"this is not a text table ({error})") from None
+        if not comma:
+            out[:] = [float(cell) for cell in cells]  # type: ignore[arg-type]  # a missing one is caught
+            if not any("_" in cell for cell in cells):  # type: ignore[operator]
+                return True
+    except (TypeError, ValueError):
+        pass  # an empty cell, or one that is no number
+    try:
+        out[:] = [number(cell, comma) for cell in cells]  # type: ignore[arg-type]
+    except (AttributeError, ValueError):
+        return False
+    return True
 
 
-def _header(cells: list[list[str]], comma: bool, given: list[str] | None) -> tuple[list[str], int]:
-    """The names of the columns, and the row after them: a row with a time, or that above the numbers.
+def _header(
+    lines: Lines, mark: str, comma: bool, given: list[str] | None
+) -> tuple[list[str], int, list[str]]:
+    """The names of the columns, the number of rows up to them, and the row above them.
 
-    Of rows with words between their numbers the first with two numbers counts.
+    The names are a row with a time, or the row above the numbers. Of rows with words between their numbers
+    the first with two numbers counts.
     """
-    head = next((i for i, row in enumerate(cells[:_FIRST]) if _has_time(row)), None)
+    first = [row for row, _ in zip(_rows(lines, mark), range(_FIRST), strict=False)]
+    head = next((i for i, row in enumerate(first) if _has_time(row)), None)
     if given is not None:
         if head is None:
-            rows = (i for i, row in enumerate(cells) if len(row) > 1 and all(_counts(c, comma) for c in row))
-            return given, next(rows, len(cells))
-        return given, head + 1
-    if head is None:
-        whole = (i for i, row in enumerate(cells) if all(_counts(c, comma) for c in row))
-        some = (i for i, row in enumerate(cells) if sum(bool(c) and _counts(c, comma) for c in row) > 1)
-        first = next(whole, next(some, None))
-        if first is None:
-            raise _without_numbers(cells)
-        if not (first > 0 and len(cells[first - 1]) > 1):
-            raise MeasurementError(
-                'no header names the columns: say what they are, for example columns="t,theta,_"'
-            )
-        head = first - 1
-    return cells[head], head + 1
+            found = _first_row(lines, mark, lambda row: len(row) > 1 and all(_counts(c, comma) for c in row))
+            return given, sum(1 for _ in lines) if found is None else found[0], []
+        return given, head + 1, first[head - 1] if head else []
+    if head is not None:
+        return first[head], head + 1, first[head - 1] if head else []
+    found = _first_row(lines, mark, lambda row: all(_counts(c, comma) for c in row)) or _first_row(
+        lines, mark, lambda row: sum(bool(c) and _counts(c, comma) for c in row) > 1
+    )
+    if found is None:
+        raise _without_numbers(lines, mark)
+    at, names, above = found
+    if len(names) < 2:
+        raise MeasurementError(
+            'no header names the columns: say what they are, for example columns="t,theta,_"'
+        )
+    return names, at, above
+
+
+def _rows(lines: Lines, mark: str) -> Iterator[list[str]]:
+    for _, block in lines.blocks():
+        yield from split(block, mark)
+
+
+def _first_row(
+    lines: Lines, mark: str, is_it: Callable[[list[str]], bool]
+) -> tuple[int, list[str], list[str]] | None:
+    """The place of the first row of a kind, and the two rows above it; None if no row is of that kind."""
+    above: list[list[str]] = [[], []]
+    for i, row in enumerate(_rows(lines, mark)):
+        if is_it(row):
+            return i, above[1], above[0]
+        above = [above[1], row]
+    return None
 
 
 def _has_time(row: list[str]) -> bool:
@@ -172,9 +228,9 @@ def _of_points(names: list[str], points: list[str]) -> list[str]:
     return result
 
 
-def _without_numbers(cells: list[list[str]]) -> MeasurementError:
+def _without_numbers(lines: Lines, mark: str) -> MeasurementError:
     """What to say of a table in which no row has two numbers."""
-    date = next((cell for row in cells for cell in row if _DATE.match(cell)), None)
+    date = next((cell for row in _rows(lines, mark) for cell in row if _DATE.match(cell)), None)
     if date is None:
         return MeasurementError("no row holds numbers")
     return MeasurementError(
@@ -192,11 +248,11 @@ def _date(cell: str | None) -> datetime | None:
         return None
 
 
-def _seconds(heads: list[Heading], columns: list[Any], lines: Sequence[int]) -> list[Heading]:
+def _seconds(heads: list[Heading], columns: list[Any], lines: NDArray[np.int32]) -> list[Heading]:
     """Put seconds since the first date where dates stand; where no column is t, the first of these is."""
     heads = list(heads)
     for k, column in enumerate(columns):
-        first = next((cell for cell in column if cell), None)
+        first = None if column.values is not None else next((c for c, _ in column.cells() if c), None)
         if _date(first) is not None:
             columns[k] = _since_first(column, lines)
             name = heads[k].name if any(heading.name == "t" for heading in heads) else "t"
@@ -204,10 +260,10 @@ def _seconds(heads: list[Heading], columns: list[Any], lines: Sequence[int]) -> 
     return heads
 
 
-def _since_first(column: list[str | None], lines: Sequence[int]) -> NDArray[np.float64]:
+def _since_first(column: TextColumn, lines: NDArray[np.int32]) -> NDArray[np.float64]:
     first = None
     seconds = np.full(len(column), np.nan)
-    for i, cell in enumerate(column):
+    for i, (cell, _) in enumerate(column.cells()):
         if not cell or cell.lower() in NOTHING:
             continue
         date = _date(cell)

@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
+from udd._util.input_files import MemoryLimit
 from udd.errors import MeasurementError
 
 from .headings import headings
@@ -17,17 +19,20 @@ from .table import Table
 _PACKAGES = "org.opensourcephysics."
 
 
-def read(raw: bytes, given: list[str] | None) -> list[Table]:
+_ELEMENT = 200  # bytes that one takes
+
+
+def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table]:
     """Read the point masses of a project in its own coordinates, as Tracker's tables show them.
 
     The time of a frame counts from the clip's first one. A single point has columns ``x`` and ``y``, several
     have ``mass A x`` and so on; a frame in which a point was not marked is NaN.
     """
-    if b"<!ENTITY" in raw:
-        raise MeasurementError("the Tracker project holds XML entities, which are not read")
     try:
-        root = ElementTree.fromstring(raw)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:  # an unknown encoding
+        root = _tree(raw, memory)
+    except MeasurementError:
+        raise
+    except (expat.ExpatError, ValueError, LookupError) as error:  # an unknown encoding
         raise MeasurementError(f"the Tracker project is not whole ({error})") from None
     if not root.get("class", "").startswith(f"{_PACKAGES}cabrillo.tracker.TrackerPanel"):
         raise MeasurementError("this XML file is not a project of Tracker (a single tab, .trk)")
@@ -59,7 +64,32 @@ def read(raw: bytes, given: list[str] | None) -> list[Table]:
         names += ["x", "y"] if len(points) == 1 else [f"{name} x", f"{name} y"]
         seen = np.array([marks.get(n, (math.nan, math.nan)) for n in frames])
         columns += [seen[:, 0].copy(), seen[:, 1].copy()]
-    return [Table(headings(given if given is not None and len(given) == len(names) else names), columns)]
+    return [
+        Table(
+            headings(given if given is not None and len(given) == len(names) else names),
+            columns,
+            memory=memory,
+        )
+    ]
+
+
+def _tree(raw: bytes, memory: MemoryLimit) -> ElementTree.Element:
+    """The root of an XML file without definitions: those may unfold without end, or name other files."""
+    tree, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        memory.take(_ELEMENT + _ELEMENT * len(attributes))
+        tree.start(name, attributes)
+
+    def definition(*_: object) -> None:
+        raise MeasurementError("the Tracker project holds XML entities, which are not read")
+
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = begin, tree.end
+    parser.CharacterDataHandler = tree.data
+    parser.EntityDeclHandler = definition
+    parser.Parse(raw, True)
+    return tree.close()
 
 
 def _first(root: ElementTree.Element, name: str) -> ElementTree.Element:

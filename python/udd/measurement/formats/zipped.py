@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from dataclasses import replace
 from pathlib import PurePosixPath
 
+from udd._util.input_files import MemoryLimit
+from udd._util.numpy_files import opened_zip
 from udd.errors import MeasurementError
 
 from . import text, tracker_project
-from .arrays import LARGEST
 from .numpy_arrays import told
 from .table import Table
 
 _TEXT = {".csv", ".txt", ".tsv", ".dat"}
 
 
-def read(raw: bytes, given: list[str] | None) -> list[Table]:
+def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table]:
     """Read each table of an archive but those about the phone (``meta/``); a Tracker project (.trz), too."""
     try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        with opened_zip(raw, memory) as archive:
             inside = [info for info in archive.infolist() if not info.is_dir()]
             names = [info.filename for info in inside]
             if any(name.startswith("xl/") for name in names):
@@ -28,8 +27,8 @@ def read(raw: bytes, given: list[str] | None) -> list[Table]:
             if {"mimetype", "content.xml"} <= set(names):
                 raise MeasurementError("this is a spreadsheet (OpenDocument): save its sheet as CSV")
             wanted = [info for info in inside if _wanted(PurePosixPath(info.filename))]
-            if sum(info.file_size for info in wanted) > LARGEST:
-                raise MeasurementError("the archive unfolds to more than 1 GB")
+            # zipfile reads no more of an entry than the size that it states.
+            memory.take(sum(info.file_size for info in wanted))
             contents = {info.filename: archive.read(info) for info in wanted}
     except MeasurementError:
         raise
@@ -45,7 +44,7 @@ def read(raw: bytes, given: list[str] | None) -> list[Table]:
         path = PurePosixPath(name)
         one = tracker_project if path.suffix.lower() == ".trk" else text
         try:
-            tables += [replace(table, name=path.stem) for table in one.read(content, given)]
+            tables += [replace(table, name=path.stem) for table in one.read(content, given, memory)]
         except MeasurementError as error:
             refused = refused or f"{name} in the archive: {error}"
     if not tables:
