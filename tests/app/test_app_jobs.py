@@ -69,6 +69,21 @@ def test_a_file_that_cannot_be_used_gets_one_sentence(client: TestClient, conten
     assert not any(folder.exists() for folder in folders(client))
 
 
+def test_an_upload_that_names_files_of_the_host_is_refused(client: TestClient, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    secret, evil = tmp_path / "secret", tmp_path / "evil.h5"
+    secret.write_bytes(bytes(range(40)))
+    with h5py.File(evil, "w") as file:
+        file["t"] = np.arange(40) / 25
+        file.create_dataset("theta", (40,), "u1", external=[(str(secret), 0, 40)])
+    said = sent(client, evil.read_bytes(), length="1.0")
+    assert said["state"] == "failed"
+    error = "The HDF5 file cannot be read: 'theta' is stored in another file (external storage): "
+    assert said["answer"]["error"] == f"{error}copy the data into the file itself."
+    playlist = sent(client, f"ffconcat version 1.0\nfile {secret}\n".encode(), length="1.0")
+    assert playlist["state"] == "failed" and "\n" not in playlist["answer"]["error"]
+
+
 def test_a_film_that_is_cut_off_is_refused(client: TestClient) -> None:
     pytest.importorskip("cv2")
     whole = (Path(udd.__file__).parent / "demo" / "sample.mp4").read_bytes()

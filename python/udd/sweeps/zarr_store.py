@@ -64,9 +64,9 @@ class SweepStore:
     def __init__(
         self, store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, grid: Grid, threads: int
     ) -> None:
-        self._spec, self._grid, self._threads = spec, grid, threads
         import zarr
 
+        self._spec, self._grid, self._threads = spec, grid, threads
         self.where = f"the group {store.name}" if isinstance(store, zarr.Group) else os.fspath(store)
         with _locked(store), self.writing():
             self._group = _opened(store, spec, self.where)

@@ -25,6 +25,8 @@ NO_FILM = "is not a film that can be decoded, or it is cut off"
 LOOK = "look"
 MOST_BROKEN = 200  # consecutive undecodable packets after which a film is given up
 MOST_PIXELS = 1 << 26  # of a picture
+#: Formats that are lists of other files, which a film that came from anywhere must not have read.
+LISTS = {"concat", "dash", "hls", "imf", "lavfi", "rtsp", "sdp"}
 
 
 class Refused(Exception):
@@ -75,8 +77,9 @@ def opened(path: str) -> Any:
     """The container, if it holds a video of a reasonable size."""
     import av
 
+    formats = ",".join(name for name in sorted(av.formats_available) if LISTS.isdisjoint(name.split(",")))
     try:
-        container = av.open(path, metadata_errors="ignore")
+        container = av.open(path, metadata_errors="ignore", options={"format_whitelist": formats})
     except (av.error.FFmpegError, OSError, ValueError):
         raise Refused(NO_FILM) from None
     if not container.streams.video:
