@@ -1,13 +1,14 @@
 """SIGKILL at random moments of commands that write files: what is there must be complete, or absent.
 
 `python kills.py` kills each command 20 times, `python kills.py 5 track paper` the commands `track` and
-`paper` 5 times each. Half of the kills fall into the last tenth of a run, where files are written. A sweep
+`paper` 5 times each. Half of the kills fall into the last part of a run, where files are written. A sweep
 that was killed is run again, and must end in the same values. Prints how often which files were there, and
 fails if one was there in part.
 """
 
 from __future__ import annotations
 
+import contextlib
 import random
 import signal
 import subprocess
@@ -47,7 +48,7 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "save": ([sys.executable, "-W", "ignore", "-c", SAVE, "{made}/fit.npz", "{out}/fit.npz"], ["fit.npz"]),
     "paper": (
-        [*UDD, "paper", "--only", "eigenvalues,scales", "--out", "{out}/paper"],
+        [*UDD, "paper", "--only", "eigenvalues", "--only", "scales", "--out", "{out}/paper"],
         ["paper/eigenvalues.svg", "paper/eigenvalues.png", "paper/index.html"],
     ),
 }
@@ -103,12 +104,19 @@ def main() -> int:
             subprocess.run(arguments(name, made, first), check=True, capture_output=True)
             lasts = time.perf_counter() - start
             seen: Counter[str] = Counter()
-            for turn in range(turns):
+            turn = 0
+            while seen["killed"] < turns and turn < 5 * turns:
+                turn += 1
                 out = made / f"{name}{turn}"
                 out.mkdir()
                 call = arguments(name, made, out)
                 process = subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-                time.sleep(lasts * (chance.uniform(0.9, 1.02) if turn % 2 else chance.uniform(0.0, 0.9)))
+                start = time.perf_counter()
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(
+                        lasts * (chance.uniform(0.85, 1.0) if turn % 2 else chance.uniform(0.0, 0.85))
+                    )
+                    lasts = time.perf_counter() - start  # the machine has other work
                 process.kill()
                 seen["killed" if process.wait() == -signal.SIGKILL else "ended before"] += 1
                 for file in COMMANDS[name][1]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import re
 import stat
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -91,10 +93,7 @@ def read_regular(path: str | os.PathLike[str], memory: MemoryLimit) -> bytes:
     UddError
         It is not a regular file, or larger than the limit.
     """
-    # Without O_NONBLOCK a pipe would be waited for before it can be refused.
-    with open(
-        path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
-    ) as file:
+    with _opened(Path(path)) as file:
         kind = os.fstat(file.fileno())
         if not stat.S_ISREG(kind.st_mode):
             raise memory.error("is a device or a pipe, not a regular file: save its content to a file first")
@@ -104,9 +103,10 @@ def read_regular(path: str | os.PathLike[str], memory: MemoryLimit) -> bytes:
     return content
 
 
-def is_regular(path: str | os.PathLike[str]) -> bool:
-    """Return True if there is a regular file at the path."""
+def _opened(path: Path) -> IO[bytes]:
+    """Open a file, be it a pipe that nobody writes to."""
+    flag = getattr(os, "O_NONBLOCK", 0)
     try:
-        return Path(path).is_file()
-    except (OSError, ValueError):
-        return False
+        return path.open("rb") if not flag else os.fdopen(os.open(path, os.O_RDONLY | flag), "rb")
+    except ValueError:  # a null character
+        raise OSError(errno.EINVAL, os.strerror(errno.EINVAL)) from None

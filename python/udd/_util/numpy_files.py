@@ -46,9 +46,12 @@ def arrays_of(raw: bytes, memory: MemoryLimit) -> dict[str, NDArray[Any]]:
     with opened_zip(raw, memory) as archive:
         entries = archive.infolist()
         memory.take(sum(entry.file_size for entry in entries))
-        # zipfile reads no more of an entry than the size that it states.
-        contents = {entry.filename.removesuffix(".npy"): archive.read(entry) for entry in entries}
-    return {name: array_of(content) for name, content in contents.items() if content.startswith(_ARRAY)}
+        arrays = {}
+        for entry in entries:
+            content = archive.read(entry)  # no more than the size that the entry states
+            if content.startswith(_ARRAY):
+                arrays[entry.filename.removesuffix(".npy")] = array_of(content)
+    return arrays
 
 
 def array_of(raw: bytes) -> NDArray[Any]:

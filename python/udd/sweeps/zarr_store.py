@@ -72,8 +72,11 @@ class SweepStore:
             self._group = _opened(store, spec, self.where)
             if "done" not in self._group:  # made last
                 _make_template(self._group, spec, grid)
-        self._arrays = {v.name: _array(self._group, v.name) for v in variables_of(spec)}
-        self._done = _array(self._group, "done")
+        self._arrays = {
+            v.name: _array(self._group, v.name, (*grid.shape, *(n for _, n in v.more)))
+            for v in variables_of(spec)
+        }
+        self._done = _array(self._group, "done", grid.counts)
         self._reached = False
 
     @contextlib.contextmanager
@@ -230,10 +233,12 @@ def _make_template(group: zarr.Group, spec: SweepSpec, grid: Grid) -> None:
     )
 
 
-def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+def _array(group: zarr.Group, name: str, shape: tuple[int, ...]) -> zarr.Array[Any]:
     import zarr
 
     found = group.get(name)
+    if isinstance(found, zarr.Array) and found.shape != tuple(shape):
+        raise UddError(f"the store's array {name!r} has shape {found.shape}, not {tuple(shape)}")
     if not isinstance(found, zarr.Array):
         raise UddError(f"the store's array {name!r} is missing: something has changed it")
     return found
