@@ -55,7 +55,7 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
 
 
 def make(folder: Path) -> None:
-    """What the commands read."""
+    """Write the files that the commands read."""
     (folder / "spec.toml").write_text(SPEC)
     t = np.arange(0, 20, 0.05)
     theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.5]).state[:, 1]

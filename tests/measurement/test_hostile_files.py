@@ -200,7 +200,7 @@ print(json.dumps([said, peak(resource.RUSAGE_SELF) - before, peak(resource.RUSAG
 
 
 def measured(limit: float, *paths: Path) -> tuple[list[str], int, int]:
-    """What reading the files says, and bytes at the peak: how many more here, and in the reader processes."""
+    """Read the files; return the answers, and the peak of memory in bytes, here and in reader processes."""
     command = [sys.executable, "-W", "ignore", "-c", MEASURE, str(limit), *map(str, paths)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     said, here, there = json.loads(done.stdout)
@@ -274,7 +274,7 @@ def test_saved_results_have_the_limit(tmp_path: Path) -> None:
 
 
 def test_dotted_names_of_toml_are_not_copied_for_each_dot(tmp_path: Path) -> None:
-    """Of 20,000 parts they took 1.5 GB and 9 s."""
+    """A name of 20,000 parts took 1.5 GB and 9 s."""
     for name in (
         "a" + ".a" * 20_000,
         "[b" + " . b" * 20_000 + "]\nc",

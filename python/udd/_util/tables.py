@@ -57,7 +57,7 @@ def arguments(where: str, data: object, of: Callable[..., Any]) -> dict[str, Any
 
 
 def parsed(what: str, text: str, *, toml: bool = False, error: type[UddError] = ModelError) -> Any:
-    """What a text in JSON or TOML says.
+    """Parse a text in JSON or TOML.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def parsed(what: str, text: str, *, toml: bool = False, error: type[UddError] = 
 
 
 def read(path: Path, *, toml: bool = False, error: type[UddError] = UddError, limit: float = LARGEST) -> Any:
-    """What a file in JSON or TOML says.
+    """Parse a file in JSON or TOML.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What compiled libraries read: in a process that can open no other file, with limits of memory and time."""
+"""Reading by compiled libraries, in a process that can open no file, with limits on memory and time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 @dataclass
 class Content:
-    """Columns in their order, each numbers or texts; their units; what the file says beside them."""
+    """Columns of a file in their order (numbers or texts), their units, and the metadata of the file."""
 
     names: list[str] = field(default_factory=list)
     columns: list[Any] = field(default_factory=list)

@@ -55,7 +55,7 @@ class Exceeded(Exception):
 
 
 class Output:
-    """What was read, sent column by column; `left` bytes may still be sent."""
+    """The answer, sent column by column; `left` bytes may still be sent."""
 
     def __init__(self, limit: int) -> None:
         self.left = limit
@@ -320,7 +320,7 @@ def plain(value: Any) -> Any:
     first = np.asarray(value).reshape(-1)[0]
     if isinstance(first, np.number | np.bool_):
         number = first.item()
-        # Of longer floats Python has none.
+        # JSON has no longer floats.
         return float(number) if isinstance(number, np.floating) else number
     text = first.decode("utf-8", "replace") if isinstance(first, bytes) else str(first)
     return text[:LONGEST]

@@ -77,7 +77,7 @@ class Counts:
     quotes: int = 0
 
     def delimiter(self) -> str:
-        """What separates the columns."""
+        """Return the character that separates the columns."""
         if self.blanks > self.lines / 2:
             return " "
         for mark, count in (("\t", self.tabs), (";", self.semicolons), (",", self.commas)):
@@ -124,7 +124,7 @@ def _decimal_comma(lines: Lines, counts: Counts, mark: str) -> bool:
 
 
 def _columns(rows: Rows, most: int, comma: bool, memory: MemoryLimit) -> tuple[list[Any], NDArray[np.int32]]:
-    """The columns, as numbers where all cells are, and the lines that the rows stand in."""
+    """Convert the columns whose cells are all numbers; return them all, and the lines of the rows."""
     memory.take(most * (8 * rows.columns + 4))
     numbers = np.empty(most, dtype=np.int32)
     columns: list[NDArray[np.float64] | None] = [np.empty(most) for _ in range(rows.columns)]
@@ -173,8 +173,8 @@ def _header(
 ) -> tuple[list[str], int, list[str]]:
     """The names of the columns, the number of rows up to them, and the row above them.
 
-    The names are a row with a time, or the row above the numbers. Of rows with words between their numbers
-    the first with two numbers counts.
+    The names are a row with a time, or the row above the first row of numbers (two numbers suffice if every
+    row holds words).
     """
     first = [row for row, _ in zip(_rows(lines, mark), range(_FIRST), strict=False)]
     head = next((i for i, row in enumerate(first) if _has_time(row)), None)

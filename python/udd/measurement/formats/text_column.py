@@ -1,4 +1,4 @@
-"""A column of a text table: numbers if all of its cells are, else its cells as they stand in the file."""
+"""A column of a text table: numbers if all cells are numbers, else the cells as texts."""
 
 from __future__ import annotations
 
