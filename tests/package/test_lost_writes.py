@@ -184,10 +184,10 @@ def test_the_umask_holds_and_is_never_changed(tmp_path: Path, monkeypatch: pytes
 WRITING = """
 import sys
 from udd._util.atomic_files import write_whole
-print(flush=True)
 while True:
     for letter in b"abcdefgh":
         write_whole(sys.argv[1], bytes([letter]) * 3_000_000)
+        print(letter, flush=True)
 """
 
 
