@@ -325,6 +325,8 @@ class Discovery:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
         said = [sentence(title, answers) for title, answers in self.by_record]
         said += [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        if doubt := self.fit.unit_doubt:
+            said.append(f"{doubt[0].upper()}{doubt[1:]}. The fit is that of the numbers as stated.")
         if self.effects and lacks_more(self.fit, self.error_after):
             said.append("Something is missing beside what was found: it leaves more than noise does.")
         if self.excused is not None:

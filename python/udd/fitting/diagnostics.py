@@ -152,6 +152,8 @@ class Diagnostics:
         The inputs whose samples scatter.
     by_inputs : list of float
         What their noise makes of the rates that are missed, r.m.s. over a frame, if it makes all of that.
+    unit : str or None
+        The unit that explains the record far better than the one stated, in a sentence.
     """
 
     missed: list[ModelError]
@@ -164,6 +166,7 @@ class Diagnostics:
     filmed: bool = False
     inputs: list[NoisyInput] = field(default_factory=list)
     by_inputs: list[float] = field(default_factory=list)
+    unit: str | None = None
 
     @property
     def coloured(self) -> list[str]:
@@ -216,6 +219,7 @@ class Diagnostics:
                 f"{self.white[least]:.1g} in {least})"
             )
         said += [f"warning: {one.text}" for one in self.ran_off]
+        said += [f"warning: {self.unit}"] if self.unit else []
         said += [one.text for one in self.inputs]
         if self.sensor:
             said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
@@ -266,6 +270,7 @@ def doubts(fit: Fit) -> Diagnostics:
         is_film(fit.measurement),
         noisy,
         by_inputs,
+        fit.unit_doubt,
     )
 
 

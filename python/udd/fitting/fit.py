@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.effects import Effect
-from udd.errors import FitError
+from udd.errors import FitError, outside
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
@@ -25,7 +27,7 @@ from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .sensor import is_encoder
 from .solve import MOST, SolveError, solve
-from .units import ask, drive_seen, other_unit
+from .units import Scale, ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
 _FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
@@ -92,13 +94,14 @@ def fit(
     Fit
         Its ``summary()`` says first whether something is missing: how large an error of the model the record
         needed beside what a right one needs, whether the innovations are white, what ran off. Where
-        something is, the standard errors contain that.
+        something is, the standard errors contain that. If another unit explains the record far better, a
+        warning says so, and the fit is that of the numbers as stated.
 
     Raises
     ------
     FitError
         The measurement does not suit the model, is too short, or does not determine the parameters; or its
-        numbers are in another unit than they are taken to be in.
+        numbers cannot be in s, m and rad.
 
     Examples
     --------
@@ -233,7 +236,7 @@ def checked_units(
     options: Mapping[str, Any],
     fits: Callable[[], tuple[Fit, ...]],
 ) -> tuple[Fit, ...]:
-    """Fits of a measurement, unless its numbers are in another unit than they are taken to be in.
+    """Fits of a measurement, with a word on whether its numbers may be in another unit than stated.
 
     Parameters
     ----------
@@ -244,10 +247,16 @@ def checked_units(
     fits : callable
         Makes the fits.
 
+    Returns
+    -------
+    tuple of Fit
+        Of which :attr:`Fit.unit_doubt` says if another unit explains the measurement far better. A warning
+        says so too.
+
     Raises
     ------
     FitError
-        What is in another unit; or what `fits` raises.
+        Numbers that cannot be in s, m and rad; or what `fits` raises.
     """
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
@@ -256,35 +265,50 @@ def checked_units(
     ask(measurements, models)
     unknown = models[0].profile.fit.unknown
     left = [name for name in unknown if free is None or name in free]
+    asked: list[str | None] = []
 
-    def check() -> None:
-        told = other_unit(measurements, models, lambda some, own: _loosest(some, own, left))
-        if told:
-            raise FitError(told)
+    def check(ends: Sequence[Sequence[Model]] = ()) -> None:
+        if asked or not unknown:
+            return
+        asked.append(other_unit(measurements, models, ends, partial(_loosest, left)))
+        if asked[0]:
+            warnings.warn(f"{asked[0]}; the fit goes on as stated", stacklevel=outside())
 
     if any(_drive_is_off(*pair) for pair in zip(measurements, models, strict=True)):
         check()
     try:
         found = fits()
-    except SolveError:
-        if unknown:
-            check()
-        raise
-    if unknown and any(astray(one) for one in found):
+    except SolveError as error:
         check()
-    return found
+        if asked and asked[0]:  # which is why, most probably
+            raise FitError(f"{error}; {asked[0]}") from error
+        raise
+    if any(astray(one) for one in found):
+        check([one.models for one in found])
+    return tuple(replace(one, unit_doubt=asked[0]) for one in found) if asked and asked[0] else found
 
 
-def _loosest(measurements: Sequence[Measurement], models: Sequence[Model], free: Sequence[str]) -> float:
-    """The evidence of a model that is hardly held to, its drive and the camera as stated."""
-    record = record_of(measurements, models)
+def _loosest(
+    free: Sequence[str],
+    record: Record,
+    measurements: Sequence[Measurement],
+    models: Sequence[Model],
+    start: Sequence[Model],
+    scale: Scale,
+    fixed: frozenset[str],
+) -> Fit:
+    """The fit of a model with a large model error, its drive and the camera as stated."""
     profile = models[0].profile
-    parameters = free_parameters(models, free, profile.sensor.pivot)
-    schedule = levels(models[0].kind)[profile.fit.hardly :][:1]
+    some = [name for name in free if name not in fixed]
+    parameters = free_parameters(models, some, profile.sensor.pivot, each=())
+    size = scale.sizes(models[0].state_names)
+    loose = [np.array(level) * size for level in levels(models[0].kind)[profile.fit.hardly :][:1]]
+    schedule = tuple(tuple(level.tolist()) for level in loose)
     problem = Problem(
         tuple(models), record, parameters, stated(record), schedule, schedule[0], likeliest=False
     )
-    return _anneal(tuple(measurements), problem, _start(models, measurements, record)).evidence
+    point = _start(start, measurements, record)
+    return _anneal(tuple(measurements), problem, point)
 
 
 def _start(models: Sequence[Model], measurements: Sequence[Measurement], record: Record) -> Point:

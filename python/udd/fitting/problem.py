@@ -134,6 +134,8 @@ class Fit:
         The measurement's noise as the record shows it.
     widened : float
         By what `errors` were multiplied, and the covariance twice, for what the model may miss.
+    unit_doubt : str or None
+        The unit that explains the record far better than the one stated, in a sentence.
     """
 
     models: tuple[Model, ...]
@@ -156,6 +158,7 @@ class Fit:
     problem: Problem
     point: Point
     widened: float = 1.0
+    unit_doubt: str | None = None
 
     @property
     def model(self) -> Model:

@@ -3,32 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
+from udd.models.profile import OtherUnit
+
+from .problem import Fit
+from .record import Record, record_of
+
+Array = NDArray[np.float64]
 
 _DECADE = 4.0  # times that what the frames show may be off a drive in the right unit
 _FRAMES = 250  # of each measurement: enough to tell units apart, and soon done
+_FIRST = 0.6  # of these frames; the rest is asked by itself, too
 #: Nats per number seen by which another unit must be likelier. Right units win by 0.5 and more even where a
 #: strong effect is missing; what a missing effect lends to a wrong one is a tenth of that.
 _CLEARLY = 0.3
 
 
 @dataclass(frozen=True)
-class Unit:
-    """Another unit that something may be in: what it is, and the model and the measurement then.
+class Scale:
+    """What becomes of the numbers of a record in another unit: factors and shifts by the columns' names.
 
-    `nats` is what the densities of the numbers seen gain when they are counted in the unit stated.
+    The noise of the columns and the model's error are multiplied by the same factors: a unit that makes the
+    numbers small must not make them look noisy.
     """
 
-    text: str
-    model: Model
-    measurement: Measurement
-    nats: float = 0.0
+    factors: Mapping[str, float]
+    shifts: Mapping[str, float]
+
+    def sizes(self, names: Sequence[str]) -> Array:
+        """The factors of columns or states."""
+        return np.array([self.factors.get(name, 1.0) for name in names])
+
+    def record(self, record: Record, columns: Sequence[str], states: Sequence[str]) -> Record:
+        """The record in the other unit."""
+        size, shift = self.sizes(columns), np.array([self.shifts.get(name, 0.0) for name in columns])
+        moved = np.array([self.shifts.get(name, 0.0) for name in states])
+        return replace(
+            record,
+            seen=np.where(record.observed, record.seen * size + shift, 0.0),
+            sigma=record.sigma * size,
+            states=record.states * self.sizes(states) + moved,
+        )
+
+    def density(self, record: Record, columns: Sequence[str]) -> float:
+        """What the log density of the numbers gains when they are counted in the unit stated, nats."""
+        return float((record.observed * np.log(self.sizes(columns))).sum())
+
+
+STATED = Scale({}, {})
+
+#: Fits models to a record's frames, with these parameters fixed, from where others ended.
+Fitter = Callable[
+    [Record, Sequence[Measurement], Sequence[Model], Sequence[Model], Scale, frozenset[str]], Fit
+]
 
 
 def ask(measurements: Sequence[Measurement], models: Sequence[Model]) -> None:
@@ -58,70 +92,71 @@ def drive_seen(measurement: Measurement) -> float:
 
 
 def other_unit(
-    measurements: Sequence[Measurement],
-    models: Sequence[Model],
-    evidence: Callable[[Sequence[Measurement], Sequence[Model]], float],
+    measurements: Sequence[Measurement], models: Sequence[Model], ends: Sequence[Sequence[Model]], fit: Fitter
 ) -> str | None:
-    """The unit in which the numbers are far likelier than as stated, in a sentence; None where none is.
+    """Return the sentence about a unit that explains the record far better than the stated one, or None.
 
-    Drive and camera are held as they are stated: a fit in which they are free goes anywhere where an effect
-    is missing.
+    It must explain the record better, and also its last part by itself, which no chance does twice. If the unit of a parameter is
+    in question, the parameter is fixed in both units; all else that is unknown is free. A unit that only
+    makes up for a parameter that is somewhat off explains no more than the fit in which that one is free.
 
     Parameters
     ----------
     measurements, models : sequences
-    evidence : callable
-        Of measurements and models held as they are, the model's error as large as is tried; raises FitError.
+    ends : sequence of sequence of Model
+        Where fits in the stated unit ended, from which they are tried too.
+    fit : callable
+        Makes a fit that is hardly held to its model. Drive and camera are fixed as they are stated: a fit in
+        which they are free goes anywhere if an effect is missing.
     """
     short = [m.rows(np.arange(min(_FRAMES, len(m)))) for m in measurements]
-    try:
-        stated = evidence(short, models)
-    except FitError:
-        stated = -np.inf
-    best, told = stated + _CLEARLY * sum(int(m.seen.sum()) * len(m.names) for m in short), None
+    record = record_of(short, models)
+    last = record.part(~record.first(_FIRST))
+    margin = _CLEARLY * np.array([record.observed.sum(), last.observed.sum()])
+
+    def explained(
+        own: Sequence[Model], scale: Scale, fixed: frozenset[str], start: Sequence[Model] | None = None
+    ) -> Array:
+        """The evidence of the record, and of its last part by itself."""
+        columns, states = short[0].names, own[0].state_names
+        shown = []
+        for some in (record, last):
+            try:
+                fitted = fit(scale.record(some, columns, states), short, own, start or own, scale, fixed)
+            except FitError:
+                return np.array([-np.inf, -np.inf])
+            shown.append(fitted.evidence + scale.density(some, columns))
+        return np.array(shown)
+
+    stated: dict[frozenset[str], Array] = {}
+    best, text = -np.inf, None
     for tried in zip(*(_units(*pair) for pair in zip(short, models, strict=True)), strict=True):
         units = [unit for unit in tried if unit]
         if len(units) < len(tried):
             continue
-        try:
-            found = evidence([u.measurement for u in units], [u.model for u in units])
-            found += sum(u.nats for u in units)
-        except FitError:
+        own = [model.with_parameters({**model.parameters, **u.parameters}) if u.parameters else model
+               for model, u in zip(models, units, strict=True)]  # fmt: skip
+        doubted = frozenset(units[0].parameters)
+        found = explained(own, Scale(units[0].factors, units[0].shifts), doubted)
+        if not found[0] > best:
             continue
-        if found > best:
-            best, told = found, units[0].text
-    return told
+        for fixed in {doubted, frozenset[str]()}:
+            if fixed not in stated:
+                tries = [explained(models, STATED, fixed)]
+                tries += [] if fixed else [explained(models, STATED, fixed, end) for end in ends]
+                stated[fixed] = np.max(tries, axis=0)
+        clearly = (found > stated[doubted] + margin).all() and found[0] > stated[frozenset()][0]
+        if clearly and doubted:  # of two wrong lengths the nearer is no right one
+            clearly = explained(own, STATED, frozenset())[0] < found[0] + margin[0]
+        if clearly:
+            best, text = float(found[0]), units[0].text
+    return text
 
 
-def _units(measurement: Measurement, model: Model) -> Iterator[Unit | None]:
+def _units(measurement: Measurement, model: Model) -> Iterator[OtherUnit | None]:
     """The units that are tried, the same for every measurement; None for one that its frames exclude."""
     profile = model.profile
     for other in profile.fit.other_units(model):
         drive = other.parameters.get(profile.dynamics.drive or "")
-        if drive is not None and not 1 / _DECADE < drive_seen(measurement) / drive < _DECADE:
-            yield None
-            continue
-        changed = model.with_parameters(model.parameters | other.parameters) if other.parameters else model
-        moved = other.factors or other.shifts
-        scaled, nats = _scaled(measurement, other.factors, other.shifts) if moved else (measurement, 0.0)
-        yield Unit(other.text, changed, scaled, nats)
-
-
-def _scaled(
-    measurement: Measurement, factors: Mapping[str, float], shifts: Mapping[str, float]
-) -> tuple[Measurement, float]:
-    """The measurement with some of its columns multiplied and shifted, and what its log density gains."""
-    sizes = np.array([factors.get(name, 1.0) for name in measurement.names])
-    offsets = np.array([shifts.get(name, 0.0) for name in measurement.names])
-    sigma = measurement.sigma
-    scaled = Measurement(
-        measurement.t,
-        measurement.values * sizes + offsets,
-        None if sigma is None else sigma * sizes,
-        measurement.rho,
-        measurement.flag,
-        measurement.meta,
-        measurement.names,
-        inputs=measurement.inputs,
-    )
-    return scaled, int(measurement.seen.sum()) * float(np.log(sizes).sum())
+        excluded = drive is not None and not 1 / _DECADE < drive_seen(measurement) / drive < _DECADE
+        yield None if excluded else other

@@ -177,6 +177,7 @@ def _energy(model: Pendulum, state: Floats, rates: Floats) -> Powers:
 _DECADES = (-3, -2, -1, 1, 2, 3)
 _DEGREE = np.pi / 180
 _BENDS = 3.0  # times what gravity can bend a pendulum's motion
+_PULLED = 0.7  # correlation of bends and gravity's pull from which on the angle is in rad
 
 
 def _mistaken_unit(model: Pendulum, step: float, values: Floats) -> str | None:
@@ -191,8 +192,12 @@ def _mistaken_unit(model: Pendulum, step: float, values: Floats) -> str | None:
     if np.ptp(theta) <= 2 * np.pi:  # within one turn it may never have been unwrapped
         return None
     lag = max(round(period / 8 / step), 1)
-    bend = np.abs(theta[2 * lag :] - 2 * theta[lag:-lag] + theta[: -2 * lag])
-    if len(bend) and float(np.quantile(bend, 0.9)) > _BENDS * max((lag * step / pace) ** 2, 0.3):
+    bend = np.abs(_second_difference(theta, lag))
+    if (
+        len(bend)
+        and float(np.quantile(bend, 0.9)) > _BENDS * max((lag * step / pace) ** 2, 0.3)
+        and not _pulled_as_in_radians(theta, lag)
+    ):
         counts = (
             ", or counts of an encoder (multiply by 2 pi over the counts per turn)"
             if (theta == np.round(theta)).all()
@@ -206,9 +211,27 @@ def _mistaken_unit(model: Pendulum, step: float, values: Floats) -> str | None:
     return None
 
 
+def _second_difference(x: Floats, lag: int) -> Floats:
+    result: Floats = x[2 * lag :] - 2 * x[lag:-lag] + x[: -2 * lag]
+    return result
+
+
+def _pulled_as_in_radians(theta: Floats, longest: int) -> bool:
+    """Return True if an angle bends as gravity bends one in rad, whatever the length: as -sin(theta)."""
+    lag = longest
+    while lag >= 1 and len(theta) > 2 * lag + 2:
+        bend, pull = _second_difference(theta, lag), np.sin(theta[lag:-lag])
+        power = float(bend @ bend) * float(pull @ pull)
+        if power and float(bend @ pull) < -_PULLED * np.sqrt(power):
+            return True
+        lag //= 2
+    return False
+
+
 def _other_units(model: Pendulum) -> Iterator[OtherUnit]:
     yield OtherUnit(
-        "the motion is that of a pendulum whose angle is in degrees, not in rad", factors={"theta": _DEGREE}
+        "the motion is that of a pendulum whose angle is in degrees, not in rad",
+        factors={"theta": _DEGREE, "Omega": _DEGREE},
     )
     yield OtherUnit(
         "y points down, or the angle is counted from the upright: y must point up, the angle from the lowest "
@@ -274,7 +297,7 @@ Pendulum.profile = ModelProfile(
         priors={"k0": np.inf, "length": 0.05, "inertia": 0.1},
         fixed={"g": 0.01},  # gravity at a place that is not said, m/s^2
         stated=("length",),
-        unknown=("k0",),
+        unknown=("k0", "length", "inertia"),
         hardly=1,
         mistaken_unit=_mistaken_unit,
         other_units=_other_units,

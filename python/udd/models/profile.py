@@ -137,9 +137,9 @@ class OtherUnit:
     parameters : dict of str to float
         The model's parameters then.
     factors : dict of str to float
-        By what columns of the measurement are multiplied then.
+        By what columns of the measurement are multiplied then, and the states with them.
     shifts : dict of str to float
-        What is added to columns of the measurement then.
+        What is added to columns of the measurement then, and to states.
     """
 
     text: str
