@@ -25,6 +25,7 @@ from udd.fitting import (
     Fit,
     as_stated,
     checked_units,
+    continuous,
     eased,
     fit_record,
     options_of,
@@ -155,7 +156,7 @@ def discover(
         )
     if apart:
         measurement, model, state0 = (_ordered(one, order) for one in (measurement, model, state0))
-    thin = _thinned(measurement, model)
+    thin = _thinned(continuous(measurement, model), model)
     measurement = [own.measurement for own in thin]
     if len(measurement) == 1:
         measurement, model, state0 = measurement[0], _only(model), _only(state0)
@@ -198,7 +199,8 @@ def discover(
     end = search.run(begin, known)
     clock.finish("fitting the model as found")
     final = refit(end.whole)
-    told = (eased(final) if final.scatter > UNEXPLAINED else final).without_cache().doubted()
+    told = eased(final) if final.scatter > UNEXPLAINED else final
+    told = replace(told, unit_doubt=base.unit_doubt).without_cache().doubted()
     found = [
         replace(f, by_record=by_record(baseline, end.whole, f.effect, order)[0])
         for step in end.accepted
@@ -317,9 +319,7 @@ def _thinned(
         some = list(measurement)
     if not some or not all(isinstance(own, Measurement) for own in some):
         record_of(measurement, model)  # which says what is wrong
-    one = _first(model)
-    angles = one.turning if isinstance(one, FormulaModel) else one.angles if isinstance(one, Model) else ()
-    return [thinned(own, angles) for own in some]
+    return [thinned(own) for own in some]
 
 
 def _begin(search: Search, known: SearchState) -> SearchState:

@@ -12,7 +12,7 @@ import numpy as np
 from udd import _core
 from udd._util import chi_squared
 from udd.errors import FitError
-from udd.fitting import Fit, at_level, fit_record, record_of
+from udd.fitting import Fit, at_level, continuous, fit_record, record_of
 from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.model_error_schedule import reduce_model_error
 from udd.fitting.parameters import Free
@@ -139,6 +139,7 @@ def prune(
     """
     tell = progress or (lambda _text: None)
     tell("fitting all terms together")
+    measurement = continuous(measurement, model)
     record = record_of(measurement, model)
     own = model if isinstance(model, Model) else next(iter(model))
     known = list(own.parameters if free is None else free)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .continuous import continuous
 from .fit import (
     UNEXPLAINED,
     as_stated,
@@ -40,6 +41,7 @@ __all__ = [
     "at_level",
     "beyond_schedule",
     "checked_units",
+    "continuous",
     "eased",
     "extend",
     "far_off",

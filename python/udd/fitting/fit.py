@@ -17,6 +17,7 @@ from udd.measurement import Measurement
 from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
+from .continuous import continuous
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
 from .input_noise import LEVELS_APART, diffusion_by_noise
@@ -115,6 +116,7 @@ def fit(
     >>> bool(abs(result.parameters["k0"] - 0.02) < 4 * result.errors["k0"])
     True
     """
+    measurement = continuous(measurement, model)
     record = record_of(measurement, model, state0)
     options = options_of(free, camera, priors, each)
     (found,) = checked_units(

@@ -30,6 +30,7 @@ from udd.simulation.outcomes import FINISHED
 from udd.simulation.trajectory import method_for
 
 from . import Fit, Record, predicted, record_of
+from .continuous import continuous
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .fit import fit
 from .formula_models import driven
@@ -224,6 +225,7 @@ def forecast(
     """
     if not isinstance(measurement, Measurement):
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+    measurement = continuous(measurement, model.model if isinstance(model, Fit) else model)
     asked = _options(members, level)
     random = generator(rng)
     if t is not None:
@@ -321,10 +323,20 @@ def _film(fitted: Fit, measurement: Measurement, film: int | None) -> int:
         if isinstance(film, bool) or not isinstance(film, (int, np.integer)) or not 0 <= film < several:
             raise ModelError(f"film must be a whole number from 0 to {several - 1}, not {film!r}")
         return int(film)
-    own = [k for k, each in enumerate(fitted.measurements) if each is measurement]
+    own = [k for k, each in enumerate(fitted.measurements) if _same(each, measurement)]
     if several > 1 and not own:
         raise FitError(f"the fit is that of {several} measurements: say by film= which of them this one is")
     return own[0] if own else 0
+
+
+def _same(a: Measurement, b: Measurement) -> bool:
+    """Return True if two measurements have the same rows, made continuous one by one perhaps."""
+    return a is b or (
+        a.names == b.names
+        and np.array_equal(a.t, b.t)
+        and np.array_equal(a.values, b.values, equal_nan=True)
+        and np.array_equal(a.flag, b.flag)
+    )
 
 
 def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Record, float]:

@@ -14,9 +14,11 @@ from scipy.ndimage import maximum_filter1d
 
 from udd.errors import FitError
 from udd.measurement import Measurement
+from udd.measurement.unwrapping import unwrapped
 from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
+from .continuous import angles_of
 from .formula_models import checked_start, driven, guessed, slope, typical_noise
 from .sensor import few_readings, frame_noise, is_encoder, lattice, moving, noise_by_size, stated_noise
 
@@ -150,6 +152,7 @@ def record_of(
         if len(model) != 1:
             raise FitError(f"there is one measurement but {len(model)} models")
         (model,) = model
+    measurement = unwrapped(measurement, angles_of(model))
     own = model if isinstance(model, FormulaModel) else None
     start = None if state0 is None else checked_start(own, state0)
     if own and not set(measurement.names) <= set(own.channels):
@@ -206,13 +209,7 @@ def record_of(
             both = present[:, :, None] & present[:, None, :]
             correlation = covariance / (stated[:, :, None] * stated[:, None, :])
             rho[np.ix_(there, places, places)] = np.where(both, correlation, np.eye(len(columns)))
-    known = read.copy()
-    angles = [columns.index(name) for name in own.turning if name in columns] if own else [len(columns) - 1]
-    for k in angles:
-        shown = known[present[:, k], k]
-        if np.ptp(shown) <= 2 * np.pi:  # an angle that was never unwrapped, or never went round
-            known[present[:, k], k] = np.unwrap(shown)
-    guess = np.column_stack([_joined_up(t, t[there], column) for column in known.T])
+    guess = np.column_stack([_joined_up(t, t[there], column) for column in read.T])
     typical = np.array([np.median(one[np.isfinite(one)]) for one in sigma[:, places].T])
     odd = odd_frames(guess, typical, linked)
     for channel in guess.T:

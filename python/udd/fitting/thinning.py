@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
-from udd.measurement.table import ANGLES
 from udd.models import profile_of
 
 from .input_noise import noise_by_differences
@@ -53,7 +51,7 @@ class Thinned:
     steps: dict[str, float]
 
 
-def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinned:
+def thinned(measurement: Measurement) -> Thinned:
     """Block averages where a record of many frames loses nothing by it.
 
     Blocks are short beside the time in which the motion changes. What the motion bends within a block is
@@ -63,8 +61,7 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
     Parameters
     ----------
     measurement : Measurement
-    angles : collection of str
-        Columns that count modulo a turn.
+        Its angles are continuous.
     """
     n = int(measurement.seen.sum())
     many = MANY_DRIVEN if measurement.inputs else MANY
@@ -72,10 +69,7 @@ def thinned(measurement: Measurement, angles: Collection[str] = ANGLES) -> Thinn
     if n <= many or gaps:  # sensors with rates of their own have no blocks in common
         return Thinned(measurement, 1, n, {})
     t = measurement.t[measurement.seen]
-    values = measurement.values[measurement.seen].copy()
-    for k, name in enumerate(measurement.names):
-        if name in angles and np.ptp(values[:, k]) <= 2 * np.pi:
-            values[:, k] = np.unwrap(values[:, k])
+    values = measurement.values[measurement.seen]
     step = float(np.median(np.diff(t)))
     every = min(int(_change(t, values, step) / _BLOCKS / step), -(-2 * n // many))
     while every > 1:

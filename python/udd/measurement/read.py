@@ -19,7 +19,8 @@ from udd.errors import MeasurementError
 from .formats import HEAD, Table, format_of
 from .input_signal import Hold
 from .recorded import Frames, Recorded, Units, own_inputs
-from .table import ANGLES, DISK, PENDULUM, QUALITY, Measurement, check_length
+from .table import DISK, PENDULUM, QUALITY, Measurement, check_length
+from .unwrapping import unwrapped
 
 Columns = str | Sequence[str] | Mapping[str, str | tuple[str, str]]
 
@@ -83,8 +84,9 @@ def read_measurement(
     Returns
     -------
     Measurement
-        Angles are unwrapped when the file holds them wrapped to one turn. ``meta["columns"]`` says what each
-        column was taken for, where they are called otherwise in the file.
+        The angle of a disk or a pendulum is made continuous if the file keeps it within one turn; of other
+        columns the model says which are angles, and a fit makes these continuous. ``meta["columns"]`` says
+        what each column was taken for, where they are called otherwise in the file.
 
     Raises
     ------
@@ -248,8 +250,6 @@ def _measurement(
         extra["length"] = float(np.nanmedian(np.hypot(x, y))) if np.isfinite(x + y).any() else float("nan")
     else:
         values = np.column_stack([frames.column(name) for name in names])
-    for k in (k for k, name in enumerate(names) if name in ANGLES):
-        values[:, k] = unwrap(values[:, k])
     sigma = rho = None
     if any(frames.has(f"sigma_{name}") for name in names):
         sigma = np.column_stack([frames.column(f"sigma_{name}") for name in names])
@@ -275,7 +275,7 @@ def _measurement(
         frames.table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality, signals)
     )
     check_length(m)
-    return m, frames
+    return unwrapped(m), frames
 
 
 def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, ...], bool]:
@@ -321,18 +321,3 @@ _HELP = {
     " repeats the time": ' (repeated="first" keeps the first of such rows)',
     " goes back in time": " (part=0, part=1 ... reads the rows between such jumps)",
 }
-
-
-def unwrap(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Undo the wrapping of an angle [rad] that a file keeps within one turn.
-
-    An angle that spans more than a turn is unwrapped already and is returned as it is: fast
-    rotation across a gap may truly move it by more than half a turn.
-    """
-    seen = np.isfinite(angle)
-    good = angle[seen]
-    if len(good) < 2 or np.ptp(good) > 2 * np.pi + 1e-9 or np.abs(np.diff(good)).max() <= np.pi:
-        return angle
-    out = angle.copy()
-    out[seen] = np.unwrap(good)
-    return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from udd._util.validation import number
 
 from . import DISK, Measurement, MeasurementError, check_length
+from .unwrapping import unwrapped
 
 Array = NDArray[np.float64]
 LEARN = 2000  # rows from which the roughness of the motion is learnt
@@ -30,7 +32,9 @@ class _Stretch:
     noise: Array  # (n, m, m)
 
 
-def smooth(measurement: Measurement, *, gap: float = 0.1, slip: float | None = None) -> Measurement:
+def smooth(
+    measurement: Measurement, *, gap: float = 0.1, slip: float | None = None, angles: Collection[str] = ()
+) -> Measurement:
     """Average the noise of a measurement over neighbouring rows, and say how much is left.
 
     Parameters
@@ -43,6 +47,9 @@ def smooth(measurement: Measurement, *, gap: float = 0.1, slip: float | None = N
     slip : float, optional
         If given, the disk is taken to roll, dY/dT = Z Omega, up to a random slip of this standard error
         [m/s] in each row (and the error of the contact, ``meta["pivot_sigma"]``, times Omega).
+    angles : collection of str
+        Columns of a model of your own that are angles: they are made continuous first, as those of a disk and
+        a pendulum are in any case.
 
     Returns
     -------
@@ -54,7 +61,8 @@ def smooth(measurement: Measurement, *, gap: float = 0.1, slip: float | None = N
     Raises
     ------
     MeasurementError
-        No standard errors; fewer than 10 usable rows; `slip` for what is not a disk.
+        No standard errors; fewer than 10 usable rows; `slip` for what is not a disk; `angles` that are no
+        columns.
     ModelError
         `gap` or `slip` is not a positive number.
 
@@ -82,6 +90,10 @@ def smooth(measurement: Measurement, *, gap: float = 0.1, slip: float | None = N
         if measurement.names != DISK:
             raise MeasurementError(f"slip is for a disk with columns {DISK}, not {measurement.names}")
     check_length(measurement)
+    if isinstance(angles, str) or not set(angles) <= set(measurement.names):
+        known = ", ".join(measurement.names)
+        raise MeasurementError(f"angles must be a list of columns, not {angles!r:.80}: there are {known}")
+    measurement = unwrapped(measurement, angles)
     frame = float(np.median(np.diff(measurement.t)))
     stretches = _stretches(measurement, gap, frame)
     jerk, step = _learn(stretches)

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 DISK = ("Y", "Z", "beta")
 PENDULUM = ("theta",)
-ANGLES = ("beta", "theta")
 QUALITY = ("marks", "complete", "residual_px", "blur_px", "method")  # what a tracked film says of each frame
 USABLE = ("gap", "degraded")  # flags of frames that hold what they show all the same
 SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
@@ -147,6 +146,14 @@ class Measurement:
     def kind(self) -> str:
         """``"disk"`` or ``"pendulum"``; ``"own"`` where the columns are states of a user's own model."""
         return {DISK: "disk", PENDULUM: "pendulum"}.get(self.names, "own")
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """The columns of a disk or a pendulum that are angles; empty for a model of the user's own.
+
+        There the model says which states are angles.
+        """
+        return {DISK: ("beta",), PENDULUM: ("theta",)}.get(self.names, ())
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
