@@ -117,7 +117,7 @@ def test_an_angle_in_degrees_that_may_be_one_in_rad_is_a_remark():
 
 @pytest.mark.parametrize(("amplitude", "length"), [(0.7, 0.08), (0.05, 8.0), (0.7, 80.0)])
 def test_a_length_in_another_unit_is_a_remark(amplitude, length):
-    found, said = fitted(swing(amplitude), udd.Pendulum(length, k0=0.02))
+    _found, said = fitted(swing(amplitude), udd.Pendulum(length, k0=0.02))
     assert f"pendulum of 0.8 m, where {length:g} m was stated" in said
 
 

@@ -305,6 +305,11 @@ def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:
         ]
         text += f"; median standard errors {', '.join(each)}"
         data["sigma_median"] = dict(zip(m.names, spread, strict=True))
+    delays = sum("delays" in flag for flag in m.flag.tolist())
+    if delays:
+        text += f"; {delays} inserted copies of frames, whose delay is taken out of the times"
+    if "clock" in m.meta:
+        text += f"; {m.meta['clock']}"
     return text, data
 
 

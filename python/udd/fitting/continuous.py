@@ -1,11 +1,13 @@
-"""Measurements with continuous angles, as a fit needs them: the model says which columns are angles."""
+"""Measurements as a fit needs them: with continuous angles, and times that are not rounded."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
+from udd._util.steady_clock import steady_clock
 from udd.errors import outside
 from udd.measurement import Measurement
 from udd.measurement.unwrapping import unwrapped, wrapped_columns
@@ -21,15 +23,16 @@ def angles_of(model: Any) -> tuple[str, ...]:
 
 
 def continuous(measurement: Any, model: Any) -> Any:
-    """Make the angles continuous of one measurement, or of several, with one model for all or one each.
+    """Make angles continuous and a rounded clock steady, of one measurement or of several.
 
-    What is no measurement is returned as it is: a fit refuses it. A column that jumps by a turn without being
-    an angle of the model is reported, and not changed.
+    The model, one for all or one each, says which columns are angles. A column that jumps by a turn without
+    being an angle of the model is reported, and not changed. Any other object is returned as it is: a fit
+    refuses it.
     """
     if isinstance(measurement, Measurement):
         if isinstance(model, Sequence):
             model = next(iter(model), None)
-        result = unwrapped(measurement, angles_of(model))
+        result = steady(unwrapped(measurement, angles_of(model)))
         left = wrapped_columns(result)
         if left and isinstance(model, FormulaModel):
             warnings.warn(
@@ -44,3 +47,16 @@ def continuous(measurement: Any, model: Any) -> Any:
     if len(models) != len(measurement):
         return measurement
     return [continuous(one, own) for one, own in zip(measurement, models, strict=True)]
+
+
+def steady(measurement: Measurement) -> Measurement:
+    """Undo the rounding of times of a constant rate; inputs that were sampled with the rows go with them."""
+    clock = steady_clock(measurement.t)
+    if clock is None:
+        return measurement
+    t = clock.all_at(measurement.t)
+    inputs = {
+        name: replace(signal, t=t) if measurement.on_rows(name) else signal
+        for name, signal in measurement.inputs.items()
+    }
+    return replace(measurement, t=t, inputs=inputs, meta={**measurement.meta, "clock": clock.text})

@@ -154,6 +154,8 @@ class Diagnostics:
         What their noise makes of the rates that are missed, r.m.s. over a frame, if it makes all of that.
     unit : str or None
         The unit that explains the record far better than the one stated, in a sentence.
+    clock : str or None
+        That the times were rounded, and what they are taken for.
     """
 
     missed: list[ModelError]
@@ -167,6 +169,7 @@ class Diagnostics:
     inputs: list[NoisyInput] = field(default_factory=list)
     by_inputs: list[float] = field(default_factory=list)
     unit: str | None = None
+    clock: str | None = None
 
     @property
     def coloured(self) -> list[str]:
@@ -220,6 +223,7 @@ class Diagnostics:
             )
         said += [f"warning: {one.text}" for one in self.ran_off]
         said += [f"warning: {self.unit}"] if self.unit else []
+        said += [self.clock] if self.clock else []
         said += [one.text for one in self.inputs]
         if self.sensor:
             said.append(f"noise: {'; '.join(one.text for one in self.sensor)}")
@@ -271,6 +275,7 @@ def doubts(fit: Fit) -> Diagnostics:
         noisy,
         by_inputs,
         fit.unit_doubt,
+        next((str(m.meta["clock"]) for m in fit.measurements if "clock" in m.meta), None),
     )
 
 

@@ -52,7 +52,8 @@ def read_measurement(
         lines above the header, are passed over. A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or
         ``Y [mm]``, is converted to s, m or rad, and dates (ISO 8601) to seconds since the first; a warning
         tells so. An empty cell or NaN is a frame where
-        it was not seen.
+        it was not seen. Times of a constant rate that the file rounds, as to ms, are those of the rate
+        (``meta["clock"]``); times that vary by more than that stay as they are.
     columns : mapping, str or sequence of str, optional
         Which column is what: ``{"theta": "position"}``, or ``"theta=position"``; units that the columns'
         names state are converted to s, m, rad and what these make, as rpm to rad/s; a unit of another
@@ -259,6 +260,8 @@ def _measurement(
     flag = frames.words("flag") if frames.has("flag") else None
     head = {k: v for k, v in frames.table.meta.items() if k != "input_hold"}
     meta = {"source": path.name} | extra | head | meta
+    if frames.run.clock is not None:
+        meta["clock"] = frames.run.clock.text
     quality = _quality(frames, names) if "px_per_m" in meta else {}
     signals = own_inputs(frames.whole)
     units = {}

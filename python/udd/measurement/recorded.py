@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.steady_clock import SteadyClock, steady_clock
 from udd.errors import MeasurementError
 
 from .formats import Table
@@ -219,12 +220,13 @@ class Frames:
 
 @dataclass(frozen=True)
 class Run:
-    """The rows of one run of the clock, their times [s], and where these come from."""
+    """The rows of one run of the clock, their times [s], where these come from, and whether they were rounded."""
 
     table: Table
     t: NDArray[np.float64]
     heading: Heading
     conversion: Conversion
+    clock: SteadyClock | None = None
 
 
 def _run(record: Recorded, table: Table, units: Units) -> Run:
@@ -248,9 +250,10 @@ def _run(record: Recorded, table: Table, units: Units) -> Run:
     if not len(t):
         raise MeasurementError("the file holds no rows")
     pick = _rows(record, t)
-    if pick is None:
-        return Run(table, t, heading, conversion)
-    return Run(table.rows(pick), t[pick], heading, conversion)
+    if pick is not None:
+        table, t = table.rows(pick), t[pick]
+    clock = None if k is None else steady_clock(t)
+    return Run(table, t if clock is None else clock.all_at(t), heading, conversion, clock)
 
 
 def _rows(record: Recorded, t: NDArray[np.float64]) -> NDArray[np.int64] | None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.child_process import ChildProcess
+from udd._util.steady_clock import steady_clock
 from udd.errors import UddError
 
 from .decoder_process import HEAD, LOOK, NO_FILM
@@ -56,6 +57,8 @@ class Film:
 
     Brightness and colour stay apart, as films store them: positions come from the brightness, which
     has the full resolution, and names of marks from the colour, whose samples lie half a pixel off.
+    A container that counts milliseconds (Matroska, WebM, FLV) rounds the times of a constant rate: they are
+    those of the rate then, see :attr:`clock`. Times that truly vary stay as they are.
     Decoders are large and films come from anywhere, so they run in a process of their own, with limits
     on memory, pixels and silence: a film that breaks it ends there, and is an error at worst.
     """
@@ -80,12 +83,15 @@ class Film:
         said = decoder.ask(LOOK)
         if "error" in said:
             raise TrackError(f"{self.path} {said['error']}")
+        stamps = decoder.stamps(int(said["stamps"]))
         self._idle = decoder
         self.promised = int(said["frames"])  # 0 where the container does not say
         self.packets = int(said["packets"])  # coded frames that the file holds
         self.size = (int(said["width"]), int(said["height"]))
         self.forced = fps  # what the header says about time is not believed then
-        self.fps = float(fps or said["fps"] or math.nan)
+        #: The constant rate that the container's times show, if it only rounded them; None else.
+        self.clock = None if fps else steady_clock(np.unique(stamps) * said["tick"], said["tick"])
+        self.fps = float(fps or said["fps"] or (1 / self.clock.period if self.clock else math.nan))
         self.full_range = bool(said["full_range"])
         self.light = light_of_codes(self.full_range)  # of each brightness code
 
@@ -105,6 +111,9 @@ class Film:
             for picture in decoder.pictures():
                 if self.forced is not None:
                     picture = replace(picture, t=picture.index / self.forced)
+                elif self.clock is not None:
+                    # The halves of interlaced frames are half a period apart.
+                    picture = replace(picture, t=self.clock.at(picture.t, parts=2))
                 yield picture
             self.broken = decoder.broken
         finally:
@@ -136,6 +145,11 @@ class _Decoder:
         except OSError:
             line = b""
         return json.loads(line) if line else {"error": NO_FILM}
+
+    def stamps(self, count: int) -> NDArray[np.int64]:
+        """The times of so many frames, in ticks, which follow the answer to a look."""
+        room = np.empty(count, np.int64)
+        return room if self.child.fill(room.data.cast("B")) else room[:0]
 
     def pictures(self) -> Iterator[Picture]:
         head = bytearray(HEAD.size)

@@ -104,6 +104,7 @@ def meta_of(
         "source": film.path.name,
         "R": options.disk_radius,
         "fps": film.fps,
+        **({"clock": film.clock.text} if film.clock else {}),
         "frames": len(tracks),
         "frames_missing": missing,
         "frames_lost": sum(flag != "" for flag in tracks.flag),

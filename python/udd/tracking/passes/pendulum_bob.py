@@ -19,6 +19,7 @@ from udd.video.reader import Film, Picture, TrackError
 from udd.video.srgb import light_of
 
 from .frame_quality import remarks
+from .inserted_copies import inserted_copies
 
 Array = NDArray[np.float64]
 STRONG = 14.0  # of 127: how much more of its colour than the background a bob has
@@ -242,12 +243,16 @@ def _angles(
         )
     else:
         radius = path.radius
+    rest = np.abs(at - pivot) - radius
+    # a mistake along the path is as large as one across it, which the circle shows
+    spread = max(1.48 * float(np.median(np.abs(rest[seen] - np.median(rest[seen])))), 0.01)
+    t, flag = inserted_copies(t, at, flag, spread)
+    at[[one.startswith(REPEATED) for one in flag]] = complex(np.nan, np.nan)
+    seen = np.isfinite(at)
     away = at - pivot
     theta = np.full(len(t), np.nan)
     theta[seen] = np.unwrap(np.arctan2(away[seen].real, away[seen].imag))
     rest = np.abs(away) - radius
-    # a mistake along the path is as large as one across it, which the circle shows
-    spread = max(1.48 * float(np.median(np.abs(rest[seen] - np.median(rest[seen])))), 0.01)
     sigma = np.where(seen, spread / radius, np.nan)
     rate = np.abs(np.gradient(np.where(seen, at, np.nan), t))
     usual = float(np.median(area[seen]))
@@ -264,6 +269,7 @@ def _angles(
     meta: dict[str, Any] = {
         "source": film.path.name,
         "fps": film.fps,
+        **({"clock": film.clock.text} if film.clock else {}),
         "frames": len(t),
         "frames_missing": max(0, film.promised - len(t)),
         "frames_lost": int((~seen).sum()),
