@@ -156,6 +156,29 @@ def test_a_film_whose_disk_has_come_to_rest_repeats_its_picture():
     assert len(udd.fit(film.slice(0, t[last - 5]), udd.Disk(0.0)).record.t) == last - 5
 
 
+@pytest.mark.parametrize("digits", [None, 6, 4])
+@pytest.mark.parametrize("sensors", [1, 2])
+def test_the_last_digits_of_exact_data_are_no_missing_effect(digits, sensors):
+    """What is left is coloured, by the integrator or by rounding; a search finds nothing in it either."""
+    t = np.arange(0, 20, 0.05)
+    known = udd.Model(["x", "v"], ["v", "-k*x - c*v"], {"k": 9.0, "c": 0.1})
+    states = udd.simulate(known, t, [1.0, 0.0]).state
+    seen = states if digits is None else np.round(states, digits)
+    record = udd.Measurement(t, dict(zip(known.state_names[:sensors], seen.T, strict=False)))
+    found = udd.fit(record, known.with_parameters({"k": 8.5, "c": 0.12}))
+    assert not found.doubts.missing and "as a right one does" in found.summary()
+    if digits == 6:
+        assert udd.discover(record, known).verdict == "nothing missing"
+
+
+@pytest.mark.parametrize("plain", [udd.Pendulum(0.8, k0=0.01), udd.Disk(0.042)])
+def test_the_last_digits_of_an_exact_device_are_no_missing_effect(plain):
+    t = np.arange(0, 20, 0.04)
+    start = [0.0, 0.7] if plain.kind == "pendulum" else [2.0, 0.02, -0.02, 0.0]
+    states = udd.simulate(plain, t, start).state[:, 1:]
+    assert not udd.fit(udd.Measurement(t, states), plain).doubts.missing
+
+
 def test_colour_alone_does_not_tell_a_film_s_faults_from_what_is_missing():
     """An error of half the noise that comes and goes three times a second, as marks on a wheel would."""
     clean, _states = simulated.film(udd.Disk(DRIVE), np.random.default_rng(2), 60.0)

@@ -28,6 +28,9 @@ _OFF = 3.0  # standard deviations from what was stated
 _LEAST = 30  # frames of which innovations tell anything
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
+#: Of a channel's range, and of the variance that a fit assumes: what is smaller may be the record's last digits or
+#: the integrator's, and a search takes it for noise as well.
+_LAST_DIGITS, _UNRESOLVED = 1e-6, 0.1
 _BETTER = 0.8  # of the noise that a fit assumes: misfits below show that it is less
 
 
@@ -137,8 +140,8 @@ class Diagnostics:
     tight : bool
         Whether the model could be held as tightly as a right one can.
     white : dict of str to float
-        Probability that the innovations of each channel are white noise (Ljung and Box); empty where the
-        record is too short.
+        Probability that the innovations of each channel are white noise (Ljung and Box); without channels
+        whose innovations are too small to tell, and empty if the record is too short.
     ran_off : list of RunawayParameter
     factor : float
         By what the standard errors are multiplied: 1 where nothing is missing.
@@ -353,7 +356,17 @@ def _white(fit: Fit) -> dict[str, float]:
         return {}
     found = innovations(fit)
     _statistic, p = found.ljung_box(min(_LAGS, len(found.values) // 5))
-    return {name: float(value) for name, value in zip(found.names, p, strict=True) if np.isfinite(value)}
+    resolved = found.chi2 > _UNRESOLVED
+    for k, name in enumerate(found.names):
+        channel = fit.channels.index(name)
+        own = fit.record.observed[:, channel]
+        seen, misfit = fit.record.seen[own, channel], fit.misfit[own, channel]
+        resolved[k] &= np.sqrt(np.mean(misfit**2)) > _LAST_DIGITS * np.ptp(seen)
+    return {
+        name: float(value)
+        for name, value, told in zip(found.names, p, resolved, strict=True)
+        if np.isfinite(value) and told
+    }
 
 
 def ran_off(fit: Fit) -> list[RunawayParameter]:

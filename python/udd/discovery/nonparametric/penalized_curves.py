@@ -147,7 +147,8 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
         gain = g[use] ** 2 / (f + own)[use] - np.log1p(f[use] / own[use])
         return float(gain.sum() / 2)
 
-    middle = float(np.log(_typical(f[bent]) / np.median(d.roughness[bent])))
+    # Over a few values alone no curve can bend.
+    middle = float(np.log(_typical(f[bent]) / np.median(d.roughness[bent]))) if bent.any() else 0.0
     grid = middle + np.arange(-_STRETCH, _STRETCH + 0.25, 0.5)
     likely = np.array([evidence(v) for v in grid])
     # How smooth the curve is, is not known for sure: the evidence says how much each precision counts.
