@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from udd.errors import MeasurementError
 
 from .formats import Table
 from .formats.headings import COUNTED, USUAL, Heading, ending, in_base_units, size
+from .formats.text_column import TextColumn
 from .input_signal import Hold, InputSignal, named_signal
 
 Asked = str | tuple[str, str]
@@ -147,6 +148,7 @@ class Frames:
     def times(self) -> NDArray[np.float64]:
         """The times of the rows [s]."""
         self._note("t", self.run.heading, self.run.conversion)
+        self.kept += [self.table.cut] if self.table.cut else []
         return self.run.t
 
     def column(self, name: str) -> NDArray[np.float64]:
@@ -246,6 +248,7 @@ def _run(record: Recorded, table: Table, units: Units) -> Run:
         heading = table.headings[k]
         conversion = _conversion("t", heading, units)
         one = conversion.size
+        table = _timed(table, k)
         t = table.numbers(k) if one == 1.0 else table.numbers(k) * one
     if not len(t):
         raise MeasurementError("the file holds no rows")
@@ -282,6 +285,17 @@ def _framed(table: Table) -> Table:
         return table
     there = np.flatnonzero(~np.isnan(table.numbers(k)))
     return table.rows(np.arange(int(there[-1]) + 1 if len(there) else 0))
+
+
+def _timed(table: Table, k: int) -> Table:
+    """The table without a last row that has no time, as a log has that was cut off."""
+    column = table.columns[k]
+    if len(table) < 2 or not isinstance(column, TextColumn) or column.values is None:
+        return table
+    if not np.isnan(column.values[-1]):
+        return table
+    cut = f"{table.place(len(table) - 1)}, the last, has no time, and is passed over"
+    return replace(table.rows(np.arange(len(table) - 1)), cut=table.cut or cut)
 
 
 def own_inputs(table: Table) -> dict[str, InputSignal]:

@@ -149,7 +149,7 @@ class _Decoder:
     def stamps(self, count: int) -> NDArray[np.int64]:
         """The times of so many frames, in ticks, which follow the answer to a look."""
         room = np.empty(count, np.int64)
-        return room if self.child.fill(room.data.cast("B")) else room[:0]
+        return room if self.child.fill(room) else room[:0]
 
     def pictures(self) -> Iterator[Picture]:
         head = bytearray(HEAD.size)

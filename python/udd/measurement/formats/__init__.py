@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from udd._util.input_files import MemoryLimit
 from udd.errors import MeasurementError
 
-from . import hdf5, matlab, numpy_arrays, parquet, text, tracker_project, zipped
+from . import hdf5, matlab, numpy_arrays, other_xml, parquet, text, tracker_project, zipped
 from .table import Table
 
 __all__ = ["FORMATS", "Format", "Table", "format_of", "is_table"]
@@ -54,6 +54,7 @@ FORMATS = (
     Format("NumPy archive", _npz, numpy_arrays.read),
     Format("NumPy array", lambda head, _suffix: head.startswith(b"\x93NUMPY"), numpy_arrays.read_one),
     Format("archive of tables", lambda head, _suffix: head.startswith((b"PK\3\4", b"PK\5\6")), zipped.read),
+    *(Format(one.what, one.is_so, one.read) for one in other_xml.KINDS),
     Format(
         "Tracker project",
         lambda head, suffix: (

@@ -56,6 +56,8 @@ _BEFORE_UNIT = re.compile(r"(?:\s*[_/,]\s*|\s+in\s+|\s+)(?=[^_/,\s]+$)")
 # None of these matches an opening bracket within another, so that a row of brackets is read once.
 _IN_BRACKETS = re.compile(r"_?\{[^{}]*\}|\[[^][]*\]|\([^()]*\)")
 _UNIT = re.compile(r"[\[(]([^][()]+)[])]")
+#: What looks like a unit that is not known, such as V or mV/K.
+_SYMBOL = r"[\[(]?[^\W\d]{1,3}(?:[/*·][^\W\d]{1,3})?[\])]?"
 #: Names that a unit may follow without brackets; others may be states of a user's own model.
 _ENDING = ("t", "Y", "Z", "beta", "theta")
 
@@ -64,13 +66,15 @@ _ENDING = ("t", "Y", "Z", "beta", "theta")
 class Heading:
     """A column's heading: as it stands, the name without unit and TeX, and the unit that it states.
 
-    `dates` says that the numbers are seconds that were counted from dates.
+    `plain` is the name as it stands, without unit. `dates` says that the numbers are seconds that were counted
+    from dates.
     """
 
     raw: str
     name: str
     unit: str = ""
     dates: bool = False
+    plain: str = ""
 
 
 def headings(cells: Sequence[str]) -> list[Heading]:
@@ -87,7 +91,28 @@ def headings(cells: Sequence[str]) -> list[Heading]:
         known = _symbol(base)
         if known in _ENDING and known not in taken and size(known, unit_after):
             name, unit = known, unit_after
-        result.append(Heading(cell.strip(), name, unit))
+        result.append(Heading(cell.strip(), name, unit, plain=plain))
+    return result
+
+
+def stated_unit(cell: str) -> str:
+    """The known unit that a cell consists of, or that stands in it in brackets; empty if there is none."""
+    texts = [cell.strip(), *(part.strip() for part in _UNIT.findall(cell))]
+    return next((text for text in texts if in_base_units(text)), "")
+
+
+def is_unit(cell: str) -> bool:
+    """Return True if a cell is a known unit and nothing else, in brackets perhaps."""
+    return in_base_units(cell.strip("[]() ")) is not None
+
+
+def joined(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Names with the units that stand in a row below them; what is no unit there is passed over."""
+    below = [*units, *[""] * len(names)]
+    result = []
+    for name, cell in zip(names, below, strict=False):
+        unit = stated_unit(cell) or (cell.strip("[]() ") if re.fullmatch(_SYMBOL, cell) else "")
+        result.append(f"{name} ({unit})" if name and unit else name)
     return result
 
 

@@ -25,7 +25,8 @@ class Table:
     """Columns of one length.
 
     `columns` are numbers, or cells as text (None if a row ends before them); `lines` the lines of the file
-    that the rows stand in, if it has lines; `name` that of the table, if a file holds several.
+    that the rows stand in, if it has lines; `name` that of the table, if a file holds several; `cut` reports a
+    last row that was passed over.
     """
 
     headings: list[Heading]
@@ -35,6 +36,7 @@ class Table:
     comma: bool = False  # decimal comma
     name: str = ""
     memory: MemoryLimit = field(default_factory=MemoryLimit)
+    cut: str = ""
 
     def __len__(self) -> int:
         return len(self.columns[0]) if self.columns else 0
@@ -54,8 +56,11 @@ class Table:
         """
         ways = (
             lambda heading: asked in (heading.raw, f"{self.name}/{heading.raw}"),
-            lambda heading: asked == heading.name,
-            lambda heading: asked.casefold() in (heading.raw.casefold(), heading.name.casefold()),
+            lambda heading: asked in (heading.name, heading.plain),
+            lambda heading: (
+                asked.casefold()
+                in (heading.raw.casefold(), heading.name.casefold(), heading.plain.casefold())
+            ),
         )
         for way in ways:
             there = [k for k, heading in enumerate(self.headings) if way(heading)]

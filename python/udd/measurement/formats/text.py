@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 from udd._util.input_files import NESTED, MemoryLimit
 from udd.errors import MeasurementError
 
-from .headings import Heading, headings
+from .headings import Heading, headings, is_unit, joined, stated_unit
 from .table import NOTHING, Table, number
 from .text_column import Rows, TextColumn, split
 from .text_lines import Lines
 
 _FIRST = 50  # rows in which a header is looked for
 _WITH_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+#: A name in quotes, a symbol and a unit, as CASSY writes them.
+_DEFINED = re.compile(r'^"([^"]*)"\s*([^/]*?)\s*(?:/\s*(.+))?$')
 _WHOLE = re.compile(r"[-+]?\d+([eE][-+]?\d+)?")
 #: A date, or the time of a day.
 _DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}\b|\d{1,2}:\d{2}\b")
@@ -35,6 +37,7 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
     commas beside semicolons, tabs, blanks or in quotes, and empty rows are understood. Dates as ISO 8601 has
     them become seconds since the first. Tracker's export of several points begins
     with ``#multi:`` and a row of their names, and repeats the columns of each: they are called ``mass A x``.
+    Units may stand in a row below the names. A last row that was cut off is passed over.
     """
     lines = Lines(raw, memory)
     meta: dict[str, Any] = {}
@@ -52,8 +55,15 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
     names, start, above = _header(lines, mark, comma, given)
     if several and start > 1:
         names = _of_points(names, above)
-    columns, numbers = _columns(Rows(lines, mark, start, len(names)), counts.lines - start, comma, memory)
-    return [Table(_seconds(headings(names), columns, numbers), columns, meta, numbers, comma, memory=memory)]
+    below = next(islice(_rows(lines, mark), start, None), [])
+    if _are_units(below, comma):
+        names, start = (names if given is not None else joined(names, below)), start + 1
+    elif given is None and len(above) == len(names) and not _has_time(names) and all(map(is_unit, names)):
+        names = joined(above, names)
+    rows = Rows(lines, mark, start, len(names))
+    columns, numbers, cut = _columns(rows, counts.lines - start, comma, memory)
+    heads = _seconds(headings(names), columns, numbers)
+    return [Table(heads, columns, meta, numbers, comma, memory=memory, cut=cut)]
 
 
 def value(text: str, memory: MemoryLimit) -> Any:
@@ -123,13 +133,25 @@ def _decimal_comma(lines: Lines, counts: Counts, mark: str) -> bool:
     return quoted > counts.lines / 2
 
 
-def _columns(rows: Rows, most: int, comma: bool, memory: MemoryLimit) -> tuple[list[Any], NDArray[np.int32]]:
-    """Convert the columns whose cells are all numbers; return them all, and the lines of the rows."""
+def _columns(
+    rows: Rows, most: int, comma: bool, memory: MemoryLimit
+) -> tuple[list[Any], NDArray[np.int32], str]:
+    """Convert the columns whose cells are all numbers; return them all, the lines of the rows, and what is cut off.
+
+    A last row that ends before the others do was cut off, and is passed over.
+    """
     memory.take(most * (8 * rows.columns + 4))
     numbers = np.empty(most, dtype=np.int32)
     columns: list[NDArray[np.float64] | None] = [np.empty(most) for _ in range(rows.columns)]
     done = torn = width = 0
-    for found, block in rows.blocks():
+    narrowest, cut = rows.columns, ""
+    for found, block, last in _with_last(rows.blocks()):
+        if last and done + len(block) > 1:
+            narrowest = min([narrowest, *map(len, block[:-1])])
+            if len(block[-1]) < narrowest:
+                cut = f"line {found[-1]}, the last, is cut off, and is passed over"
+                found, block = found[:-1], block[:-1]
+        narrowest = min([narrowest, *map(len, block)])
         end = done + len(block)
         numbers[done:end] = found
         for k, cells in enumerate(islice(chain(zip_longest(*block), repeat((None,))), rows.columns)):
@@ -146,10 +168,26 @@ def _columns(rows: Rows, most: int, comma: bool, memory: MemoryLimit) -> tuple[l
             f"rows have {width} whole numbers for {rows.columns} columns, as decimal commas between "
             "commas make them: separate columns by semicolons"
         )
-    return [
-        TextColumn(rows, k, None if column is None else column[:done], done)
+    pick = np.arange(done) if cut else None
+    made = [
+        TextColumn(rows, k, None if column is None else column[:done], done, pick)
         for k, column in enumerate(columns)
-    ], numbers[:done]
+    ]
+    return made, numbers[:done], cut
+
+
+def _with_last(
+    blocks: Iterator[tuple[list[int], list[list[str]]]],
+) -> Iterator[tuple[list[int], list[list[str]], bool]]:
+    """Yield blocks that hold rows, and whether each is the last of them."""
+    before: tuple[list[int], list[list[str]]] | None = None
+    for found, block in blocks:
+        if block:
+            if before is not None:
+                yield *before, False
+            before = found, block
+    if before is not None:
+        yield *before, True
 
 
 def _fill(out: NDArray[np.float64], cells: Sequence[str | None], comma: bool) -> bool:
@@ -200,7 +238,8 @@ def _header(
 
 def _rows(lines: Lines, mark: str) -> Iterator[list[str]]:
     for _, block in lines.blocks():
-        yield from split(block, mark)
+        for line, row in zip(block, split(block, mark), strict=True):
+            yield _definitions(line, mark) or row
 
 
 def _first_row(
@@ -213,6 +252,24 @@ def _first_row(
             return i, above[1], above[0]
         above = [above[1], row]
     return None
+
+
+def _definitions(line: str, mark: str) -> list[str] | None:
+    """The names and units in CASSY's line ``DEF="Zeit" t / s``; None if it is another line."""
+    if not line.startswith('DEF="'):
+        return None
+    cells = line.removeprefix("DEF=").rstrip().split(mark if mark != " " else None)
+    return [_DEFINED.sub(_defined, cell.strip()) for cell in cells]
+
+
+def _defined(definition: re.Match[str]) -> str:
+    name, symbol, unit = definition.groups()
+    return f"{name or symbol} ({unit})" if unit else (name or symbol)
+
+
+def _are_units(row: list[str], comma: bool) -> bool:
+    """Return True if a row below the names holds units: one that is known at least, and no numbers."""
+    return any(stated_unit(cell) for cell in row) and not any(cell and _counts(cell, comma) for cell in row)
 
 
 def _has_time(row: list[str]) -> bool:
