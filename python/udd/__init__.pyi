@@ -43,9 +43,14 @@ from .discovery import Discovery as Discovery
 from .discovery import discover as discover
 from .discovery import prune as prune
 from .errors import ConvergenceWarning as ConvergenceWarning
+from .errors import FitError as FitError
 from .errors import IncompleteWarning as IncompleteWarning
+from .errors import IntegrationError as IntegrationError
 from .errors import Interrupted as Interrupted
+from .errors import MeasurementError as MeasurementError
+from .errors import ModelError as ModelError
 from .errors import StiffnessWarning as StiffnessWarning
+from .errors import TrackError as TrackError
 from .errors import UddError as UddError
 from .film import render as render
 from .fitting import Fit as Fit

@@ -47,6 +47,10 @@ class FitError(UddError):
     """A measurement cannot be fitted by a model."""
 
 
+class TrackError(UddError):
+    """A film cannot be read, or shows no disk that can be tracked."""
+
+
 class ConvergenceWarning(UserWarning):
     """A result's error bar does not meet the tolerance asked for."""
 

@@ -206,7 +206,7 @@ class Fit:
     @property
     def scatter(self) -> float:
         """chi2 per degree of freedom: 1 where model and noise explain the data."""
-        return self.chi2 / self.dof
+        return self.chi2 / (self.dof if self.dof > 0.0 else 1.0)
 
     @property
     def leverage(self) -> float:

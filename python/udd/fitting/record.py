@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 #: A frame is odd that lies farther off than this times what is typical; honest noise does in 1 of 1e8.
 _ODD = 9.0
 _FEWEST = 10  # frames of a fit
+_FEWEST_OF_SEVERAL = 4  # frames of each of several records: with fewer its start takes up all of them
+_SHORT = 30  # frames, below which a record by itself hardly shows its noise
 _LEAP = 0.5  # of the steps before and after, which a bend of the motion does not reach
 _CLEANED = 8  # times odd frames are looked for: those that come close together spoil each other's look
 
@@ -146,12 +148,65 @@ def record_of(
                 raise FitError(f"there are {len(measurement)} measurements but {len(starts)} starts")
             if len(models) != len(measurement):
                 raise FitError(f"there are {len(measurement)} measurements but {len(models)} models")
-            return _joined([record_of(*own) for own in zip(measurement, models, starts, strict=True)])
+            alone = len(measurement) == 1
+            records = [_record_of(*own, alone) for own in zip(measurement, models, starts, strict=True)]
+            return _joined(records if alone else _together(measurement, records))
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
     if isinstance(model, Sequence):
         if len(model) != 1:
             raise FitError(f"there is one measurement but {len(model)} models")
         (model,) = model
+    return _record_of(measurement, model, state0, True)
+
+
+def _together(measurements: Sequence[Measurement], records: Sequence[Record]) -> list[Record]:
+    """Records that are fitted together: what one alone must have all must have together.
+
+    Noise that is not stated is the same in all short records: a few frames show it to a factor.
+    """
+    count = sum(int(record.observed.any(axis=1).sum()) for record in records)
+    if count < _FEWEST:
+        raise FitError(f"the measurements hold {count} usable frames; a fit needs at least {_FEWEST}")
+    if not any(_changes(record) for record in records):
+        names = ", ".join(measurements[0].names)
+        raise FitError(f"{names}: nothing changes, and nothing can be learnt from that")
+    short = [
+        k
+        for k, (own, record) in enumerate(zip(measurements, records, strict=True))
+        if own.sigma is None and len(record.t) < _SHORT
+    ]
+    if len(short) < 2 or len({record.seen.shape[1] for record in records}) > 1:
+        return list(records)
+    shown = np.array([[_median(records[k], c) for c in range(records[0].seen.shape[1])] for k in short])
+    typical = np.sqrt((shown**2).sum(axis=0) / np.maximum((shown > 0.0).sum(axis=0), 1))
+    return [
+        replace(record, sigma=np.where(record.observed & (typical > 0.0), typical, record.sigma))
+        if k in short
+        else record
+        for k, record in enumerate(records)
+    ]
+
+
+def _median(record: Record, channel: int) -> float:
+    """The typical noise of a channel; 0 if it was not seen."""
+    own = record.sigma[record.observed[:, channel], channel]
+    return float(np.median(own)) if len(own) else 0.0
+
+
+def _changes(record: Record) -> bool:
+    """Return True if any channel changes."""
+    high = np.where(record.observed, record.seen, -np.inf).max(axis=0)
+    low = np.where(record.observed, record.seen, np.inf).min(axis=0)
+    return bool((high > low).any())
+
+
+def _record_of(
+    measurement: Any, model: Any, state0: Mapping[str, float] | None, alone: bool
+) -> Record:
+    """As :func:`record_of`, of one measurement, fitted alone or together with others."""
+    if not isinstance(measurement, Measurement):
+        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+    fewest = _FEWEST if alone else _FEWEST_OF_SEVERAL
     measurement = unwrapped(measurement, angles_of(model))
     own = model if isinstance(model, FormulaModel) else None
     start = None if state0 is None else checked_start(own, state0)
@@ -169,15 +224,14 @@ def record_of(
     if own and own.inputs:
         (own,) = driven((own,), (measurement,))
     counts = np.isfinite(measurement.values).sum(axis=0)
-    if own and len(measurement.names) > 1 and counts.min() < _FEWEST:
+    if own and len(measurement.names) > 1 and counts.min() < fewest:
         name, count = measurement.names[int(np.argmin(counts))], int(counts.min())
-        raise FitError(f"{name} was seen in {count} rows; a column needs at least {_FEWEST}: leave it out")
+        raise FitError(f"{name} was seen in {count} rows; a column needs at least {fewest}: leave it out")
     values, seen = measurement.values, measurement.seen & (np.arange(len(measurement)) < moving(measurement))
-    if seen.sum() < _FEWEST:
-        raise FitError(
-            f"the measurement holds {int(seen.sum())} usable frames; a fit needs at least {_FEWEST}"
-        )
-    if not (np.nanmax(values[seen], axis=0) > np.nanmin(values[seen], axis=0)).any():
+    if seen.sum() < fewest:
+        what = "a fit needs" if alone else "each of several that are fitted together needs"
+        raise FitError(f"the measurement holds {int(seen.sum())} usable frames; {what} at least {fewest}")
+    if alone and not (np.nanmax(values[seen], axis=0) > np.nanmin(values[seen], axis=0)).any():
         raise FitError(
             f"{', '.join(measurement.names)}: nothing changes, and nothing can be learnt from that"
         )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from udd._util.child_process import ChildProcess
 from udd._util.steady_clock import steady_clock
-from udd.errors import UddError
+from udd.errors import TrackError as TrackError
 
 from .decoder_process import HEAD, LOOK, NO_FILM
 from .srgb import light_of
@@ -25,10 +25,6 @@ Plane = NDArray[np.uint8]
 PATIENCE = 60.0  # s for which the decoder may be silent
 DECODER = str(Path(__file__).with_name("decoder_process.py"))
 MEMORY = 4 << 30  # bytes of address space that it may take
-
-
-class TrackError(UddError):
-    """A film cannot be read, or shows no disk that can be tracked."""
 
 
 @dataclass(frozen=True)
