@@ -76,7 +76,11 @@ def test_a_row_without_a_time_in_the_middle_is_refused(tmp_path: Path):
     [
         ("a.labx", '<?xml version="1.0"?><cassylab><x/></cassylab>', "a project of CASSY Lab"),
         ("b.labx", "<lab/>", "a project of CASSY Lab"),
-        ("c.phyphox", '<!-- mine --><phyphox version="1.7"><title>x</title></phyphox>', "an experiment of phyphox"),
+        (
+            "c.phyphox",
+            '<!-- mine --><phyphox version="1.7"><title>x</title></phyphox>',
+            "an experiment of phyphox",
+        ),
         ("d.xml", '<?xml version="1.0"?>\n<phyphox/>', "an experiment of phyphox"),
         ("e.cmbl", "<Document/>", "a project of Logger Pro"),
         ("f.xml", '<?xml version="1.0"?><kml/>', r"XML of another program than Tracker \(<kml>\)"),

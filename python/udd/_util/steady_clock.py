@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,9 @@ _GAPS = 0.25  # of a period, up to which the number of missing times is known
 _SLACK = 1e-3  # of the rounding: what the search for the rate is good to
 _EXACT = 1e-6  # of the rounding, within which times are not rounded at all
 _DECIMALS = range(7)
-#: Rates that cameras and films have, in Hz; each also times 1000/1001.
 _USUAL = (10, 12, 12.5, 15, 20, 24, 25, 30, 48, 50, 60, 90, 100, 120, 200, 240, 250, 480, 500, 960, 1000)
+#: Rates that cameras and films have, Hz.
+_RATES = tuple(factor * rate for rate in _USUAL for factor in (1.0, 1000 / 1001))
 
 
 @dataclass(frozen=True)
@@ -89,13 +91,12 @@ def steady_clock(t: Array, rounding: float | None = None) -> SteadyClock | None:
         return None
     period, scatter = _line(number, t)
     # The narrowest band of a slope in which all times lie, by golden section: it is convex.
-    low, high = period - 2 * rounding / number[-1], period + 2 * rounding / number[-1]
+    reach = 2 * rounding / float(number[-1])
+    low, high = period - reach, period + reach
     narrowest = _narrowest(number, t, low, high)
     if _width(number, t, narrowest) > rounding * (1 + _SLACK):
         return None
-    for rate in sorted(
-        (k * r for r in _USUAL for k in (1.0, 1000 / 1001)), key=lambda r: abs(1 / r - period)
-    ):
+    for rate in sorted(_RATES, key=lambda rate: abs(1 / rate - period)):
         fits = _width(number, t, 1 / rate) <= rounding * (1 + _SLACK)
         if fits and abs(1 / rate - period) < 4 * scatter:
             period = 1 / rate
@@ -137,7 +138,7 @@ def _within(rest: Array, start: float, rounding: float) -> bool:
 
 
 def _narrowest(number: Array, t: Array, low: float, high: float) -> float:
-    share = 0.5 * (np.sqrt(5.0) - 1.0)
+    share = 0.5 * (math.sqrt(5.0) - 1.0)
     inner = [high - share * (high - low), low + share * (high - low)]
     widths = [_width(number, t, slope) for slope in inner]
     for _ in range(60):
@@ -149,4 +150,4 @@ def _narrowest(number: Array, t: Array, low: float, high: float) -> float:
             low, inner[0], widths[0] = inner[0], inner[1], widths[1]
             inner[1] = low + share * (high - low)
             widths[1] = _width(number, t, inner[1])
-    return inner[int(np.argmin(widths))]
+    return inner[0] if widths[0] < widths[1] else inner[1]

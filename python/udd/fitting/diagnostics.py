@@ -28,8 +28,8 @@ _OFF = 3.0  # standard deviations from what was stated
 _LEAST = 30  # frames of which innovations tell anything
 #: Steps over the noise, their own step/sqrt(12) contained: less than 0.4 steps of other noise are beside it.
 _COARSE = 2.0
-#: Of a channel's range, and of the variance that a fit assumes: what is smaller may be the record's last digits or
-#: the integrator's, and a search takes it for noise as well.
+#: Of a channel's range, and of the variance that a fit assumes: smaller innovations may be the last digits of
+#: the record or of the integrator, and a search takes them for noise as well.
 _LAST_DIGITS, _UNRESOLVED = 1e-6, 0.1
 _BETTER = 0.8  # of the noise that a fit assumes: misfits below show that it is less
 

@@ -156,7 +156,7 @@ def record_of(
         if len(model) != 1:
             raise FitError(f"there is one measurement but {len(model)} models")
         (model,) = model
-    return _record_of(measurement, model, state0, True)
+    return _record_of(measurement, model, state0, alone=True)
 
 
 def _together(measurements: Sequence[Measurement], records: Sequence[Record]) -> list[Record]:
@@ -200,9 +200,7 @@ def _changes(record: Record) -> bool:
     return bool((high > low).any())
 
 
-def _record_of(
-    measurement: Any, model: Any, state0: Mapping[str, float] | None, alone: bool
-) -> Record:
+def _record_of(measurement: Any, model: Any, state0: Any, alone: bool) -> Record:
     """As :func:`record_of`, of one measurement, fitted alone or together with others."""
     if not isinstance(measurement, Measurement):
         raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")

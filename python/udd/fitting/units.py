@@ -96,9 +96,10 @@ def other_unit(
 ) -> str | None:
     """Return the sentence about a unit that explains the record far better than the stated one, or None.
 
-    It must explain the record better, and also its last part by itself, which no chance does twice. If the unit of a parameter is
-    in question, the parameter is fixed in both units; all else that is unknown is free. A unit that only
-    makes up for a parameter that is somewhat off explains no more than the fit in which that one is free.
+    It must explain the record better, and also its last part by itself: chance does not favour it twice. If
+    the unit of a parameter is in question, that parameter is fixed in both units; all other unknown ones are
+    free. A unit that only makes up for a parameter that is somewhat off explains no more than the fit in
+    which the parameter is free.
 
     Parameters
     ----------

@@ -222,7 +222,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Run:
-    """The rows of one run of the clock, their times [s], where these come from, and whether they were rounded."""
+    """The rows of one run of the clock and their times [s]: where these come from, and their rounding."""
 
     table: Table
     t: NDArray[np.float64]

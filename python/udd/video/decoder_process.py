@@ -3,9 +3,9 @@
     python -P decoder_process.py PATH MEMORY
 
 It is told what to do by lines: `look`, or the time [s] from which pictures are wanted. It answers with
-a line of JSON (what the header says; or error), then, for a look, with the times of all frames in ticks of the
-container (as many whole numbers of 8 bytes as `stamps` says), else with each picture's head and planes and an
-end. Run as a script, it imports nothing but PyAV: it is there in a fifth of the time that the
+a line of JSON: what the header says, or an error. For a look the times of all frames follow, in ticks of the
+container: as many whole numbers of 8 bytes as `stamps` says. Else each picture's head and planes follow, and
+an end. Run as a script, it imports nothing but PyAV: it is there in a fifth of the time that the
 package takes.
 """
 

@@ -66,8 +66,7 @@ _ENDING = ("t", "Y", "Z", "beta", "theta")
 class Heading:
     """A column's heading: as it stands, the name without unit and TeX, and the unit that it states.
 
-    `plain` is the name as it stands, without unit. `dates` says that the numbers are seconds that were counted
-    from dates.
+    `plain` is the name without unit. `dates` says that the numbers are seconds that were counted from dates.
     """
 
     raw: str

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,8 +25,8 @@ class Table:
     """Columns of one length.
 
     `columns` are numbers, or cells as text (None if a row ends before them); `lines` the lines of the file
-    that the rows stand in, if it has lines; `name` that of the table, if a file holds several; `cut` reports a
-    last row that was passed over.
+    that the rows stand in, if it has lines; `name` that of the table, if a file holds several; `cut` says
+    that a last row was passed over.
     """
 
     headings: list[Heading]
@@ -54,7 +54,7 @@ class Table:
         MeasurementError
             Several columns are called so.
         """
-        ways = (
+        ways: tuple[Callable[[Heading], bool], ...] = (
             lambda heading: asked in (heading.raw, f"{self.name}/{heading.raw}"),
             lambda heading: asked in (heading.name, heading.plain),
             lambda heading: (

@@ -13,8 +13,8 @@ from udd.tracking.detection.frame_flags import REPEATED
 Array = NDArray[np.float64]
 Places = NDArray[np.complex128]
 
-#: Frames on each side through which a polynomial goes, and its degree. Where the bob turns back a frame's delay
-#: shows over many frames only.
+#: Frames on each side through which a polynomial goes, and its degree. If the bob turns back there, a delay
+#: shows only over many frames.
 _SCALES = ((4, 5), (5, 4), (10, 5), (20, 6))
 _LONGEST = 3  # copies in a row
 _CLEARLY = 60.0  # decrease of chi2, in units of the scatter that is left, from which on copies are sure
@@ -74,8 +74,8 @@ def _at(
     while k + marked < len(t) and flags[k + marked].startswith(REPEATED):
         marked += 1
     if marked:
-        sides = (_Sides.about(k, k + marked, seen, *scale) for scale in _SCALES)
-        return marked, any(one.clearly(t, places, noise) is not None for one in sides if one)
+        about = [_Sides.about(k, k + marked, seen, *scale) for scale in _SCALES]
+        return marked, any(one.clearly(t, places, noise) is not None for one in about if one)
     same = _SAME * np.sqrt(2.0) * noise
     best = (0.0, 0, False)
     for count in range(1, _LONGEST + 1):
@@ -84,7 +84,9 @@ def _at(
             break
         for scale in _SCALES:
             sides = _Sides.about(k, last, seen, *scale)
-            for delayed in (False, True) if sides else ():
+            if sides is None:
+                continue
+            for delayed in (False, True):
                 gain = sides.clearly(t, places, noise, np.arange(k, last), delayed)
                 if gain is not None and gain > best[0]:
                     best = (gain, count, delayed)
