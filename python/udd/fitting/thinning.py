@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
+from udd.measurement.unwrapping import unwrapped
 from udd.models import profile_of
 
 from .input_noise import noise_by_differences
@@ -51,7 +53,7 @@ class Thinned:
     steps: dict[str, float]
 
 
-def thinned(measurement: Measurement) -> Thinned:
+def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
     """Block averages where a record of many frames loses nothing by it.
 
     Blocks are short beside the time in which the motion changes. What the motion bends within a block is
@@ -61,8 +63,10 @@ def thinned(measurement: Measurement) -> Thinned:
     Parameters
     ----------
     measurement : Measurement
-        Its angles are continuous.
+    angles : collection of str
+        Columns that are angles, in addition to those of a disk or a pendulum.
     """
+    measurement = unwrapped(measurement, angles)
     n = int(measurement.seen.sum())
     many = MANY_DRIVEN if measurement.inputs else MANY
     gaps = not np.isfinite(measurement.values[measurement.seen]).all()
