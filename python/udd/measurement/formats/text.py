@@ -136,7 +136,7 @@ def _decimal_comma(lines: Lines, counts: Counts, mark: str) -> bool:
 def _columns(
     rows: Rows, most: int, comma: bool, memory: MemoryLimit
 ) -> tuple[list[Any], NDArray[np.int32], str]:
-    """Convert the columns whose cells are all numbers; return all, the lines of the rows, and what is cut off.
+    """Convert the columns whose cells are all numbers; return all, the rows' lines, and what is cut off.
 
     A last row that ends before the others do was cut off, and is passed over.
     """
