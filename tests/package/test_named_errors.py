@@ -11,7 +11,7 @@ import pytest
 import udd
 
 #: Caught within the package: no user meets them.
-INTERNAL = {"ChunksLost", "CorrectorFailed", "TooLarge"}
+INTERNAL = {"ChunksLost", "CorrectorFailed", "Refused", "SpentError", "TooLarge"}
 SOURCES = sorted(Path(udd.__file__).parent.rglob("*.py"))
 SECTION = re.compile(
     r"^( *)(Raises|Warns)\n\1-{5,6}\n((?:\1.*\n|\n)+?)(?=\1[A-Z]\w+(?: \w+)*\n\1-{3,}\n|\1\"\"\")", re.M
