@@ -13,7 +13,7 @@ pub use spline::Spline;
 use thiserror::Error;
 
 use crate::model::{MAX_SURFACES, Sides};
-use crate::scalar::{Mask, Scalar};
+use crate::scalar::{Mask, Real, Scalar};
 
 /// The most characters of a formula.
 pub const LONGEST: usize = 10_000;
@@ -89,7 +89,7 @@ pub enum Binary {
     Sub,
     Mul,
     Div,
-    /// By `exp(b ln a)`.
+    /// By `exp(b ln a)`; a whole power of what is not positive by multiplication.
     Power,
     /// The angle of the point with the ordinate `a` and the abscissa `b`.
     Atan2,
@@ -388,7 +388,19 @@ impl Binary {
 
 #[inline(never)]
 fn power_of<S: Scalar>(a: S, b: S) -> S {
-    (b * a.ln()).exp()
+    let mut result = (b * a.ln()).exp();
+    // A recording has no values to look at.
+    if S::SYMBOLIC || !S::zero().less(a).not().any() {
+        return result;
+    }
+    for lane in 0..S::Real::LANES {
+        let exponent = b.real().lane(lane);
+        let whole = exponent as i32;
+        if a.real().lane(lane) <= 0.0 && f64::from(whole) == exponent {
+            result = S::select(S::Mask::from_lanes(|own| own == lane), power(a, whole), result);
+        }
+    }
+    result
 }
 
 #[inline(never)]

@@ -7,8 +7,13 @@ use crate::formula::{Expression, Names};
 
 /// A formula's operations on a stack: what each is called, how many numbers it takes, and the number that it holds.
 #[pyfunction]
-fn formula_operations(text: &str, variables: Vec<String>) -> PyResult<Vec<(&'static str, usize, f64)>> {
-    let names = Names { states: &variables, parameters: &[], inputs: &[], rates: false };
+#[pyo3(signature = (text, variables, parameters = Vec::new()))]
+fn formula_operations(
+    text: &str,
+    variables: Vec<String>,
+    parameters: Vec<String>,
+) -> PyResult<Vec<(&'static str, usize, f64)>> {
+    let names = Names { states: &variables, parameters: &parameters, inputs: &[], rates: false };
     let parsed = Expression::parse(text, names)
         .map_err(|mistake| ModelError::new_err(format!("the formula {mistake}")))?;
     Ok(parsed.ops().iter().map(|op| (op.name(), op.takes(), op.number())).collect())

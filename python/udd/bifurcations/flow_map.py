@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from udd import _core
 from udd.errors import ModelError
 from udd.models import Model, require_model
-from udd.models.state_scaling import coordinates_of
+from udd.models.state_scaling import coordinates_of, depends_on_time
 
 from .forced_orbits import Forcing, mirror_of, require_period
 
@@ -170,12 +170,9 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing 
     # A component that happens to be small is no smaller than a tenth of the largest.
     seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
     found = coordinates_of(model, seen)
-    # At states of no particular kind; the same in every process.
     finite = np.where(np.isfinite(found.size), found.size, 1.0)
-    probes = finite * np.random.default_rng(2).uniform(-0.9, 0.9, (8, len(finite)))
-    now, later = (model.rates(np.full(8, t), probes) for t in (0.0, 0.7371 * found.clock))
     kept = np.flatnonzero(np.isfinite(found.size))
-    if not np.array_equal(now, later):
+    if depends_on_time(model, finite, 0.7371 * found.clock):
         if forcing is None:
             raise ModelError(
                 "the rates depend on time: such a model has no equilibria, and for its cycles the forcing's "

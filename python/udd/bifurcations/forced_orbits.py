@@ -76,7 +76,14 @@ def repeats(
     if signs is not None:
         turn[kept] = signs
     t = after * random.uniform(0.0, 3.0, _PROBES)
+    if not np.isfinite(model.rates(t, states)).all():
+        # Rates may be undefined below zero.
+        states, t = np.concatenate([states, np.abs(states)]), np.tile(t, 2)
     now, later = (turn * model.rates(t, states))[:, kept], model.rates(t + after, turn * states)[:, kept]
+    defined = np.isfinite(now)
+    if not defined.any(axis=0).all() or (defined != np.isfinite(later)).any():
+        return False
+    now, later = np.where(defined, now, 0.0), np.where(defined, later, 0.0)
     return bool((np.abs(later - now) <= _SAME * np.abs(now).max(axis=0)).all())
 
 

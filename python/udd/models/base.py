@@ -142,6 +142,11 @@ class Model:
         return self.profile.dynamics.time_scale
 
     @property
+    def names_time(self) -> bool:
+        """Whether a formula of the rates may contain the time `t`; that of a compiled law may."""
+        return True
+
+    @property
     def kinematic(self) -> tuple[str, ...]:
         """The states whose equation only says that another is their rate; none of a compiled law."""
         return ()

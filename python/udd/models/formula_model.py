@@ -217,6 +217,14 @@ class FormulaModel(Model):
         return _core.observed(self, times, rows).reshape(*shape, len(self.channels))
 
     @property
+    def names_time(self) -> bool:
+        """Whether a formula of the rates contains the time `t` or a measured input."""
+        own = self._own
+        variables = [*own.states, *own.inputs]
+        parsed = (_core.formula_operations(text, variables, own.parameters) for text in own.equations)
+        return bool(own.inputs) or any(name == "t" for operations in parsed for name, _, _ in operations)
+
+    @property
     def kinematic(self) -> tuple[str, ...]:
         """The states whose equation only says that another one is their rate, as in ``theta' = v``."""
         pairs = zip(self.state_names, self.texts, strict=True)

@@ -58,14 +58,39 @@ def coordinates_of(model: Model, states: Floats) -> Coordinates:
         [sizes.get(name, float(top) or 1.0) for name, top in zip(model.state_names, largest, strict=True)]
     )
     angle = np.array([name in model.angles for name in model.state_names])
-    # At states of no particular kind; the same in every process.
-    probes = size * np.random.default_rng(1).uniform(-0.9, 0.9, (8, len(size)))
+    probes = probes_of(model, size, seed=1)
     for k in np.flatnonzero(angle):
         turned = probes.copy()
         turned[:, k] += 1.0
-        if np.array_equal(_rates(model, probes), _rates(model, turned)):
+        if same_rates(_rates(model, probes), _rates(model, turned)):
             size[k] = np.inf
     return Coordinates(size, angle, clock, tuple(_mirrors(model, probes)))
+
+
+def probes_of(model: Model, size: Floats, seed: int, count: int = 8) -> Floats:
+    """States of no particular kind, the same in every process, of these sizes (dim,).
+
+    If the rates are undefined at some of them, as a root is below zero, their absolute values come too.
+    """
+    probes: Floats = size * np.random.default_rng(seed).uniform(-0.9, 0.9, (count, len(size)))
+    if np.isfinite(_rates(model, probes)).all():
+        return probes
+    return np.concatenate([probes, np.abs(probes)])
+
+
+def same_rates(first: Floats, second: Floats) -> bool:
+    """Return True if rates (n, dim) agree to the bit, and in each component at least once as numbers."""
+    defined = np.isfinite(first).any(axis=0).all()
+    return bool(defined and np.array_equal(first, second, equal_nan=True))
+
+
+def depends_on_time(model: Model, size: Floats, after: float) -> bool:
+    """Return True if the rates differ after this time or are nowhere defined; False if no formula has `t`."""
+    if not model.names_time:
+        return False
+    probes = probes_of(model, size, seed=2)
+    now, later = (model.rates(np.full(len(probes), t), probes) for t in (0.0, after))
+    return not same_rates(now, later)
 
 
 def _sizes(model: Model) -> tuple[dict[str, float], float]:
@@ -84,6 +109,6 @@ def _mirrors(model: Model, probes: Floats) -> list[Floats]:
     for signs in product((1.0, -1.0), repeat=probes.shape[1]):
         sign = np.array(signs)
         # To the bit: a changed sign costs no rounding.
-        if (sign < 0).any() and np.array_equal(_rates(model, sign * probes), sign * rates):
+        if (sign < 0).any() and same_rates(_rates(model, sign * probes), sign * rates):
             found.append(sign)
     return found
