@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from scipy import optimize
 
 from .bifurcation_functions import TestFunctions, test_functions_at
@@ -16,10 +17,19 @@ from .pseudo_arclength import CorrectorFailed, CurvePoint, nearest_of_family, ne
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["bifurcations_between", "changes", "frequency_of", "locate", "location_error", "point_at"]
+__all__ = [
+    "bifurcations_between",
+    "changes",
+    "frequency_of",
+    "locate",
+    "location_error",
+    "pitchfork_at",
+    "point_at",
+]
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
+_NODES = 12  # points of a curve about a pitchfork
 _SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
 _NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
 _SURE = 2.0  # and how far beyond the largest scatter the error may lie
@@ -118,6 +128,53 @@ def turning(
         else:
             high = (middle, fold)
     return sigma, place
+
+
+def pitchfork_at(
+    curve: EquilibriumCurve, a: CurvePoint, step: float, sigma: float
+) -> tuple[float, CurvePoint, float]:
+    """The pitchfork near the distance `sigma` from `a`, where the parameter turns along its side branch.
+
+    The equations are singular there. The curve is smooth, so that polynomials through its points about the
+    pitchfork, none of them too near, give it to rounding.
+
+    Returns
+    -------
+    sigma : float
+    place : CurvePoint
+    error : float
+        A bound of the parameter's error: what one degree less changes.
+
+    Raises
+    ------
+    CorrectorFailed
+        The curve cannot be followed about the pitchfork.
+    """
+    width = 0.5 * step
+    distances = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    points = [newton_corrector(curve, a.u + (sigma + width * x) * a.tangent, a.tangent) for x in distances]
+    fits = [_turning_of(distances, np.array(points), degree) for degree in (_NODES - 2, _NODES - 1)]
+    (_, before, _), (x, u, along) = fits
+    error = abs(float(u[-1] - before[-1])) * curve.scale + float(rounding_of(curve.value(u)))
+    return sigma + width * x, CurvePoint(u, along / np.linalg.norm(along)), error
+
+
+def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, Floats, Floats]:
+    """The distance at which the parameter turns, the point and its slope, by polynomials of this degree.
+
+    Raises
+    ------
+    CorrectorFailed
+        It does not turn.
+    """
+    table = chebyshev.chebfit(distances, points, degree)
+    slope = chebyshev.chebder(table)
+    roots = chebyshev.chebroots(slope[:, -1])
+    real = roots.real[(np.abs(roots.imag) < _STILL) & (np.abs(roots.real) < 1.0)]
+    if not len(real):
+        raise CorrectorFailed("the parameter does not turn there")
+    x = float(real[np.argmin(np.abs(real))])
+    return x, np.asarray(chebyshev.chebval(x, table)), np.asarray(chebyshev.chebval(x, slope))
 
 
 def _on_axis(pair: complex) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ import numpy as np
 from udd.errors import IntegrationError
 
 from .bifurcation_functions import FUNCTIONS, TestFunctions, test_functions_at
-from .bifurcation_location import bifurcations_between, location_error, point_at
+from .bifurcation_location import bifurcations_between, location_error, pitchfork_at, point_at
 from .branch import AnyCurve, BifurcationPoint
 from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
@@ -128,13 +129,36 @@ def _locate_bifurcations(
     for kind, sigma, place, signs in bifurcations_between(curve, here, gone, before, after):
         if kind == "end":
             # The parameter turns where no multiplier passes 1: the branch meets itself there.
-            way.places.append((curve, place, signs, arclength + sigma))
+            if isinstance(curve, EquilibriumCurve):
+                sigma, place = _record_pitchfork(curve, here, gone, sigma, place, way, limits, arclength)
+            else:
+                way.places.append((curve, place, signs, arclength + sigma))
             way.end = _branch_origin(curve, place, here)
         else:
             errors = _errors(curve, here, sigma, place, gone, kind)
             _record_point(curve, place, signs, kind, errors, way, limits, arclength + sigma)
         if way.end:
             return
+
+
+def _record_pitchfork(
+    curve: EquilibriumCurve,
+    here: CurvePoint,
+    gone: float,
+    sigma: float,
+    place: CurvePoint,
+    way: BranchTrace,
+    limits: ContinuationLimits,
+    arclength: float,
+) -> tuple[float, CurvePoint]:
+    """Note the pitchfork at which a side branch turns, and return its distance and place."""
+    error = float("nan")
+    # If the curve cannot be followed about it, the place is less accurate.
+    with suppress(CorrectorFailed, IntegrationError):
+        sigma, place, error = pitchfork_at(curve, here, gone, sigma)
+    signs, errors = test_functions_at(curve, place), (error, float("nan"))
+    _record_point(curve, place, signs, "branch point", errors, way, limits, arclength + sigma)
+    return sigma, place
 
 
 def _record_point(
