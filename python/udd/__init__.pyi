@@ -50,6 +50,7 @@ from .errors import Interrupted as Interrupted
 from .errors import MeasurementError as MeasurementError
 from .errors import ModelError as ModelError
 from .errors import StiffnessWarning as StiffnessWarning
+from .errors import ToleranceWarning as ToleranceWarning
 from .errors import TrackError as TrackError
 from .errors import UddError as UddError
 from .film import render as render

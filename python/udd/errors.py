@@ -55,6 +55,10 @@ class ConvergenceWarning(UserWarning):
     """A result's error bar does not meet the tolerance asked for."""
 
 
+class ToleranceWarning(UserWarning):
+    """A component of the state falls below `atol`, grows again, and its error changes what follows."""
+
+
 class StiffnessWarning(UserWarning):
     """A run's steps are held down by stability, not by accuracy: another method is meant for it."""
 

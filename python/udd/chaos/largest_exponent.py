@@ -16,6 +16,7 @@ from udd.errors import ConvergenceWarning, IntegrationError, ModelError
 from udd.models import DLE, Model
 from udd.models.parameter_batch import default_state, parameter_batch
 from udd.simulation.batch import Batch
+from udd.simulation.below_tolerance import warn_of_some
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 from udd.simulation.trajectory import initial_state, tolerances
 
@@ -133,6 +134,9 @@ def lyapunov(
     ConvergenceWarning
         Where the standard error does not meet `tol` after the time `t`, or an orbit of an array has no
         exponent.
+    ToleranceWarning
+        A component falls below `atol` and grows again, and an error of `atol` changes what follows; some of
+        many orbits are checked.
 
     Notes
     -----
@@ -180,6 +184,8 @@ def lyapunov(
             rows = orbits.rows(part)
             batch = Batch(model, rows, start[None, :], rtol, atol, workers, show(first))
             found = _core.lyapunov(batch, False, time, skipped, goal)
+            if first == 0:
+                warn_of_some(model, rows, found["end"], min(time, LOOK * time_scale), rtol, atol)
             done = found["outcome"] == FINISHED
             exponents[part] = np.where(done, found["value"][:, 0], np.nan)
             if with_error:
@@ -206,6 +212,9 @@ def lyapunov(
     exponents = exponents.reshape(shape)
     return (exponents, errors.reshape(shape)) if with_error else exponents
 
+
+LOOK = 2000.0
+"""So many typical times an orbit is checked for components below `atol`."""
 
 PORTION = 1 << 10
 """So many orbits are handed to the core at a time."""

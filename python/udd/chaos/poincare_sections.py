@@ -20,6 +20,7 @@ from udd.errors import IncompleteWarning, ModelError, interrupted
 from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
 from udd.simulation.batch import RUN_OPTIONS, Batch, RunOptions
+from udd.simulation.below_tolerance import warn_of_some
 from udd.simulation.outcomes import OUTCOMES
 from udd.simulation.trajectory import tolerances
 
@@ -284,6 +285,9 @@ def poincare(
     IncompleteWarning
         Where orbits end before the surface is crossed n times; after Ctrl-C where a partial result was asked
         for.
+    ToleranceWarning
+        A component falls below `atol` and grows again, and an error of `atol` changes what follows; some of
+        many orbits are checked.
 
     Notes
     -----
@@ -349,6 +353,7 @@ def poincare(
             model,
         )
     _tell(found["outcome"], numbers, count, made, chosen["partial"])
+    warn_of_some(model, rows, starts, found["t_end"], rtol, atol)
     return made
 
 

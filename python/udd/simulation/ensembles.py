@@ -17,6 +17,7 @@ from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
 
 from .batch import Batch
+from .below_tolerance import warn_of_some
 from .model_inputs import driven
 from .outcomes import OUTCOMES
 from .trajectory import checked_times, method_for, tolerances
@@ -140,6 +141,9 @@ def ensemble(
     -----
     IncompleteWarning
         Ctrl-C, where a partial result was asked for.
+    ToleranceWarning
+        A component falls below `atol` and grows again, and an error of `atol` changes what follows; some of
+        the runs are checked.
 
     Examples
     --------
@@ -179,4 +183,7 @@ def ensemble(
     stopped = int((names == "interrupted").sum())
     if stopped:
         interrupted(made, f"{stopped} of {runs} runs were interrupted and are NaN", partial)
+    else:
+        span = float(times[-1] - times[0])
+        warn_of_some(model, rows, starts, span, rtol, atol, float(times[0]))
     return made

@@ -17,6 +17,7 @@ from udd._util.validation import array, number
 from udd.errors import IncompleteWarning, ModelError
 from udd.models import Model, require_model
 
+from .below_tolerance import warn_of
 from .model_inputs import driven
 
 if TYPE_CHECKING:
@@ -305,6 +306,9 @@ def simulate(
     StiffnessWarning
         A model of your own that is stiff is run by a method for those that are not; the warning comes while
         the run goes on.
+    ToleranceWarning
+        A component falls below `atol` and grows again in proportion to itself, as a population does: an error
+        of `atol` there changes what follows.
 
     Examples
     --------
@@ -331,6 +335,7 @@ def simulate(
             IncompleteWarning,
             stacklevel=2,
         )
+    warn_of(found.model, found.t, found.state, *tolerances(rtol, atol))
     return found
 
 
