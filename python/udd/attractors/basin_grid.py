@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.validation import whole
-from udd.chaos.recurrence import tightness
 from udd.errors import ModelError, interrupted
 from udd.models import Model
-from udd.models.state_scaling import Floats, coordinates_of
+from udd.models.state_scaling import Floats
 from udd.simulation.batch import RUN_OPTIONS, RunOptions
 from udd.simulation.outcomes import FINISHED, OUTCOMES
 
@@ -34,6 +33,7 @@ from .dataset import (
     time_unit,
 )
 from .matching import mirror_images
+from .motion_size import sized_by_motion
 from .section_runs import ALL_OUTCOMES, INTERRUPTED, START_OUTSIDE
 
 if TYPE_CHECKING:
@@ -117,11 +117,14 @@ def basins(
     -----
     IncompleteWarning
         After Ctrl-C, where a partial result was asked for.
+    ToleranceWarning
+        A component falls below `atol` and grows again, and an error of `atol` changes what follows.
 
     Notes
     -----
-    Periodic orbits are identified by their section points, aperiodic attractors by overlapping point sets,
-    equilibria by their rates. A slow transient is integrated until it converges. Aperiodic motions are
+    Periodic orbits are identified by their section points, aperiodic attractors by overlapping point sets.
+    At an equilibrium no eigenvalue has a positive real part, and the orbit comes nearer to it for several
+    times the slowest decay. A slow transient is integrated until it converges. Aperiodic motions are
     integrated for twice the time, and again as long as some of them leave; those that still do so at
     `max_extension` are "undecided".
 
@@ -151,12 +154,13 @@ def basins(
     axes, starts = _starts(model, grid, state0)
     rows = parameter_rows(model, {}, 1)
     runner = section_runner(model, rows, section, direction, chosen, t_max, transient + n)
-    judge = MotionClassifier(model, None, coordinates_of(model, starts), tightness(runner.rtol))
+    coordinates, stopped = sized_by_motion(runner, rows[0], starts, transient, n)
+    judge = MotionClassifier(model, None, coordinates, runner)
     samples = InitialStates(runner, AttractorCatalogue(judge), starts, n, extend * (transient + n))
 
     shown = sys.stderr.isatty() if chosen["progress"] is None else chosen["progress"]
     with tqdm(total=len(starts), unit="start", disable=not shown, leave=False) as bar:
-        stopped = samples.run(transient, bar)
+        stopped = stopped or samples.run(transient, bar)
     told_of = {"n": n, "transient": transient, "max_extension": extend, "complete": int(not stopped)}
     attrs = of_result(runner, "basins of attraction", told_of)
     for k, name in enumerate(model.state_names):

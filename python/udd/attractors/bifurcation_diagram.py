@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.validation import number, whole
-from udd.chaos.recurrence import SETTLING, tightness
+from udd.chaos.recurrence import SETTLING
 from udd.errors import ModelError, interrupted
 from udd.models import Model
 from udd.models.state_scaling import Floats, coordinates_of
 from udd.simulation.batch import RUN_OPTIONS, RunOptions
+from udd.simulation.below_tolerance import warn_of_some
 
 from .arguments import parameter_rows, parameter_values, section_runner, start_states
 from .classification import Classification, MotionClassifier, again, decided, follow, put
@@ -181,7 +182,7 @@ def bifurcation(
     of_job = np.broadcast_to(axis, shape).ravel()
     rows = parameter_rows(model, {parameter: of_job}, places.size)
     runner = section_runner(model, rows, section, direction, chosen, t_max, transient + n)
-    judge = MotionClassifier(model, parameter, coordinates_of(middle, begin), tightness(runner.rtol))
+    judge = MotionClassifier(model, parameter, coordinates_of(middle, begin), runner)
     found = nothing(places.size, n, begin.shape[1])
     verdicts = Classification.none(places.size)
 
@@ -197,6 +198,9 @@ def bifurcation(
     with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
         added = perturbation(judge.coordinates.size, nudge)
         stopped = run_in_order(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
+    if not stopped:
+        each = np.minimum(found.t_end, runner.t_each * (transient + n))
+        warn_of_some(model, rows, begin[:1], each, runner.rtol, runner.atol)
     told, kinds = DiagramLabels.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
     try:
         if attractors and (partial or not stopped):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.chaos.recurrence import APERIODIC, SETTLING, Tightness, periods
+from udd.chaos.recurrence import APERIODIC, SETTLING, Tightness, periods, tightness
+from udd.chaos.rest import equilibrium_near
 from udd.models import Model
 from udd.models.state_scaling import Coordinates, Floats
 from udd.simulation.outcomes import FINISHED
 
 from .attractor import Attractor
+from .motion_size import rest_test
 from .section_runs import INTERRUPTED, OUT_OF_TIME, UNDECIDED, Crossings, SectionRunner
 
 
@@ -23,7 +26,12 @@ class MotionClassifier:
     model: Model
     parameter: str | None
     coordinates: Coordinates
-    tight: Tightness
+    runner: SectionRunner
+
+    @cached_property
+    def tight(self) -> Tightness:
+        """How well points must agree."""
+        return tightness(self.runner.rtol)
 
     def __call__(self, found: Crossings, values: Floats) -> Classification:
         """The verdict on each job; `values` (jobs,) are those of the parameter that varies."""
@@ -33,16 +41,41 @@ class MotionClassifier:
         period[whole] = periods(self.coordinates(found.points[whole]), self.tight)
         rest = np.zeros(jobs, dtype=bool)
         # An equilibrium lies on the section, or the motion never gets there.
+        crossed = np.flatnonzero((period == 1) & (found.outcome == FINISHED))
         for rows, states in (
-            (np.flatnonzero((period == 1) & (found.outcome == FINISHED)), found.points[:, -1]),
+            (crossed, found.points[:, -1]),
             (np.flatnonzero(found.outcome == OUT_OF_TIME), found.end),
         ):
             for value in np.unique(values[rows]):
                 here = rows[values[rows] == value]
-                speed = self.coordinates.speed(self.at(value), states[here])
-                rest[here] = speed < 20.0 * self.tight.settled
+                model = self.at(value)
+                slow = here[self.coordinates.speed(model, states[here]) < 20.0 * self.tight.settled]
+                rest[slow], passes = self._resting(model, states[slow])
+                # A cycle may be slow, too, but does not stay next to an equilibrium.
+                period[slow[passes if rows is crossed else ~rest[slow]]] = SETTLING
         period[rest] = 1
         return Classification(period, rest)
+
+    def _resting(self, model: Model, states: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which of these states, where little moves, are at an attracting equilibrium; which pass another."""
+        # A diagram also shows orbits that a symmetry keeps on what repels.
+        kept = np.flatnonzero(np.isfinite(self.coordinates.size))
+        test = rest_test(self.runner, model, self.coordinates)
+        rest, passes = np.zeros((2, len(states)), dtype=bool)
+        known: list[Floats] = []
+        for k, state in enumerate(states):
+            place = self.coordinates(state)
+            if any(np.abs(place - other).max(initial=0.0) < self.tight.same for other in known):
+                rest[k] = True
+            elif test(state, attracts=self.parameter is None) is not None:
+                rest[k] = True
+                known.append(place)
+            elif (near := equilibrium_near(model, state, kept, 0.0)) is not None:
+                there = state.copy()
+                there[kept] = near.state
+                off = np.abs(self.coordinates(there) - place).max(initial=0.0)
+                passes[k] = off < 20.0 * self.tight.settled
+        return rest, passes
 
     def at(self, value: float) -> Model:
         """The model with a value of the parameter."""
@@ -97,6 +130,13 @@ def decided(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
     return known
 
 
+def followed_on(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
+    """Which jobs still settle: they nearly come back, or nearly rest, and can be followed further."""
+    some: NDArray[np.bool_] = np.isin(found.outcome, (FINISHED, OUT_OF_TIME))
+    some &= verdicts.period == SETTLING
+    return some
+
+
 def follow(
     runner: SectionRunner,
     judge: MotionClassifier,
@@ -114,7 +154,7 @@ def follow(
     found = runner(rows, starts, transient, n)
     verdicts = judge(found, values)
     spent = transient + n
-    while len(open_ := np.flatnonzero((found.outcome == FINISHED) & (verdicts.period == SETTLING))):
+    while len(open_ := np.flatnonzero(followed_on(found, verdicts))):
         stopped = (found.outcome == INTERRUPTED).any()
         if 2 * spent + n > longest and not stopped:
             found.outcome[open_] = UNDECIDED

@@ -5,23 +5,23 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._util.validation import number, whole
-from udd.errors import ConvergenceWarning, IncompleteWarning, IntegrationError
+from udd.errors import ConvergenceWarning, IntegrationError
 from udd.models import DLE, Model, require_model
 from udd.models.parameter_batch import default_state
-from udd.models.state_scaling import coordinates_of
 from udd.simulation.batch import Batch
-from udd.simulation.outcomes import FINISHED, OUTCOMES
+from udd.simulation.below_tolerance import warn_from
+from udd.simulation.outcomes import FAILED, FINISHED, OUTCOMES
 from udd.simulation.trajectory import initial_state, tolerances
 
-from .largest_exponent import reason, span
-from .recurrence import SETTLING, periods, tightness
+from .fate import Fate, Orbit
+from .largest_exponent import LOOK, reason, span
 
 if TYPE_CHECKING:
     from .poincare_sections import Section
@@ -33,9 +33,10 @@ _Floats = NDArray[np.float64]
 _SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
 _POWER = 2.0  # neighbours that part no faster than this power of the time are no chaos
 _STAYS = 1e-3  # an exponent that is smaller than this, per typical time, is as good as zero
-_FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
-_LATE = 4  # times that a motion that nearly comes back is looked at again
-_POINTS = 600  # section points in which a periodic motion shows itself
+_GROWTH = 3.0  # a distance that changes by less than exp of this does not change
+_LONG = 1e3  # mean times between section points: a run that shows what does not settle
+_PERIODS = 10.0  # a run of fewer periods does not show which exponent of a cycle is zero
+_FAR = 1e6  # times its start, or from 0: a run that fails there has gone to infinity
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +50,18 @@ class Spectrum:
     standard_errors : ndarray, shape (dim,)
         From the scatter of the means over blocks of the run.
     dimension : float
-        The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero.
-    verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "undecided"}
-        What the orbit does in the end. Periodic orbits and equilibria are told by the orbit itself, which
-        comes back or rests; chaos by a largest exponent at least four standard errors above zero, and by
-        neighbours that part faster than as the square of the time (in typical times); a torus
-        (quasiperiodic motion) by two exponents or more that are smaller than 1e-3 per typical time, and none
-        above.
+        The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero; NaN of an orbit
+        that escapes.
+    verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "escapes", "undecided"}
+        What the orbit does in the end, wherever its origin is and however large it is. At an equilibrium the
+        orbit comes nearer to it for several times its slowest decay. A periodic orbit comes back, modulo
+        turns of angles, and one exponent is zero; a running pendulum is one. An orbit that escapes has a
+        component, not an angle, that grows without bound. Chaos has a largest exponent at least four standard
+        errors above zero, and neighbours that part faster than as the square of the time (in typical times);
+        in a plane there is none. A torus (quasiperiodic motion) has two exponents or more that are smaller
+        than 1e-3 per typical time, and none above. Time counts as a direction if the rates depend on it.
     period : float
-        The period of a periodic orbit, else NaN.
+        The period of a periodic orbit that was seen to come back, else NaN.
     invariants : dict of str to float
         What must vanish on every bounded orbit, such as ``"<z>"`` or the sum of the exponents less the mean
         divergence: how far the run is from it. Averages of chaotic motion scatter like the exponents do.
@@ -141,12 +145,15 @@ def lyapunov_spectrum(
     ModelError
         A drive or an option that cannot be used.
     IntegrationError
-        The disk leaves the wheels (use ``edge="ignore"``), or the solution blows up.
+        The disk leaves the wheels (use ``edge="ignore"``), or the rates cease to be defined. An orbit that
+        goes to infinity has the verdict "escapes"; its exponents are NaN if it does so in the transient.
 
     Warns
     -----
     ConvergenceWarning
         Where the standard error does not meet `tol` after the time `t`.
+    ToleranceWarning
+        A component falls below `atol` and grows again, and an error of `atol` changes what follows.
     IncompleteWarning
         Where the orbit does not cross the `section` so often, as at rest, or on Ctrl-C meanwhile.
 
@@ -183,64 +190,59 @@ def lyapunov_spectrum(
     run = _Run(model, rtol, atol)
     if section is not None:
         run.refuse(section, start)
-    found = run(start, time, skipped, goal)
-    fate = run.fate(found["end"][0])
+    found, fate = run.look(start, time, skipped, goal)
     spent, finer = float(found["time"][0]), goal
     while not (fate.ordered or _positive(found, time_scale)) and spent < time:
         # Neither order nor chaos yet: on from here, for longer.
         finer /= 2.0
-        found = run(found["end"][0], time - spent, 0.0, finer)
-        fate = run.fate(found["end"][0])
+        found, fate = run.look(found["end"][0], time - spent, 0.0, finer)
         spent += float(found["time"][0])
     if not fate.ordered:
         # Chaos that has not ended may yet do so; without tangents the way there is short.
         fate = run.fate(found["end"][0], time - spent)
-    other = fate.kind != "aperiodic" and (_positive(found, time_scale) or fate.t > 0.0)
+    settles = fate.kind not in ("aperiodic", "escapes")
+    other = settles and (_positive(found, time_scale) or fate.t > 0.0)
     aside = spent + fate.t if other else 0.0
-    if fate.kind != "aperiodic" and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
+    if settles and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
         # The averages are of the way there: once more, of what it leads to.
-        found = run(fate.state, time, 0.0, goal)
-        fate = run.fate(found["end"][0])
+        found, fate = run.look(fate.state, time, 0.0, goal)
         if fate.kind == "settling" and _positive(found, time_scale):
             # Neighbours part all the way: chaos in bands too narrow to be told from points.
             fate = replace(fate, kind="aperiodic")
-        aside = aside if fate.kind != "aperiodic" else 0.0
+        aside = aside if fate.kind not in ("aperiodic", "escapes") else 0.0
     values, errors = found["value"][0], found["standard_error"][0]
-    converged = bool(errors[0] <= goal) and fate.kind != "settling"
-    if fate.kind == "settling":
+    verdict = _verdict(run, fate, found)
+    settles = fate.kind == "settling" and verdict == "undecided"
+    converged = bool(errors[0] <= goal) and not settles
+    if settles:
         warnings.warn(
             f"the motion still settles after t = {spent + fate.t:g}: these are no exponents of its end; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
             stacklevel=2,
         )
-    elif not converged:
+    elif not converged and fate.kind != "escapes":
         warnings.warn(
             f"the largest exponent has a standard error of {errors[0]:.2g}, above tol = {goal:g}; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
             stacklevel=2,
         )
-    if fate.ordered:
-        verdict = fate.kind
-    else:
-        verdict = "undecided"
-        if fate.kind == "aperiodic" and _positive(found, time_scale):
-            verdict = "chaos"
-        elif fate.kind == "aperiodic" and _on_torus(model, found):
-            verdict = "torus"
+    if fate.kind not in ("equilibrium", "escapes"):
+        warn_from(model, found["end"][0], 0.0, min(time, LOOK * time_scale), rtol, atol)
     order = np.argsort(-values, kind="stable")
     values, errors = values[order], errors[order]
     # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
-    dimension = {"equilibrium": 0.0, "periodic orbit": 1.0}.get(verdict) or kaplan_yorke(values)
+    known = {"equilibrium": 0.0, "periodic orbit": 1.0, "escapes": np.nan}
+    dimension = known[verdict] if verdict in known else kaplan_yorke(values)
     if verdict == "torus":
         dimension = kaplan_yorke(np.where(np.abs(values) < _STAYS / time_scale, 0.0, values))
     return Spectrum(
         values,
         errors,
-        0.0 if verdict == "equilibrium" else dimension,
+        dimension,
         verdict,
-        fate.period,
+        fate.period if verdict == "periodic orbit" else np.nan,
         _invariants(model, values, found["mean"][0], found["product"][0]),
         float(found["time"][0]),
         aside,
@@ -249,6 +251,53 @@ def lyapunov_spectrum(
         model,
         None if section is None else run.points(found["end"][0], section),
     )
+
+
+def _verdict(run: _Run, fate: Fate, found: _core._Orbits) -> str:
+    """The verdict: the fate of the orbit if the exponents agree with it, else what the exponents say."""
+    time_scale = run.model.time_scale
+    zeros = _zeros(run, found)
+    if fate.kind == "periodic orbit":
+        # Nothing grows or shrinks along a cycle.
+        long = float(found["time"][0]) > _PERIODS * fate.period
+        return "undecided" if long and zeros < 1 else fate.kind
+    if fate.ordered:
+        return fate.kind
+    if fate.kind == "settling":
+        return "torus" if _neither_settles_nor_parts(run, fate, found) else "undecided"
+    if _positive(found, time_scale):
+        # Orbits in a plane cannot cross, so that none of them is chaotic.
+        return "chaos" if len(run.kept) + run.timed > 2 else "undecided"
+    value = found["value"][0]
+    if value.max() < _STAYS / time_scale and np.isfinite(fate.clock):
+        # Neighbours stay as near as they are over many returns of the orbit.
+        if zeros >= 2 and float(found["time"][0]) > _PERIODS * fate.clock:
+            return "torus"
+        if zeros == 1:
+            return "periodic orbit"
+    return "undecided"
+
+
+def _neither_settles_nor_parts(run: _Run, fate: Fate, found: _core._Orbits) -> bool:
+    """Whether distances in two directions stayed as they were for the whole of a long run.
+
+    A torus that nearly comes back looks as if it settled, but what settles shrinks meanwhile.
+    """
+    time = float(found["time"][0])
+    growth = found["value"][0] * time
+    free = len(run.model.state_names) - len(run.kept)
+    stay = int((np.abs(growth) < _GROWTH).sum()) - free + run.timed
+    return bool(stay >= 2 and growth.max() < _GROWTH and time > _LONG * fate.clock)
+
+
+def _zeros(run: _Run, found: _core._Orbits) -> int:
+    """In how many directions distances stay as they are, beside angles that nothing depends on.
+
+    Time is a direction, too, if the rates depend on it.
+    """
+    free = len(run.model.state_names) - len(run.kept)
+    small = np.maximum(_SIGMAS * np.nan_to_num(found["standard_error"][0]), _STAYS / run.model.time_scale)
+    return int((np.abs(found["value"][0]) < small).sum()) - free + run.timed
 
 
 def _positive(found: _core._Orbits, time_scale: float) -> bool:
@@ -262,99 +311,30 @@ def _positive(found: _core._Orbits, time_scale: float) -> bool:
     return bool(value > _SIGMAS * found["standard_error"][0, 0] and grown)
 
 
-def _on_torus(model: Model, found: _core._Orbits) -> bool:
-    """Whether distances stay as they are in two directions, and grow in none."""
-    # Angles that nothing depends on neither grow nor shrink on any motion.
-    free = int((~np.isfinite(coordinates_of(model, found["end"]).size)).sum())
-    value, zero = found["value"][0], _STAYS / model.time_scale
-    return bool(value.max() < zero and (np.abs(value) < zero).sum() - free >= 2)
-
-
 @dataclass(frozen=True)
-class _Fate:
-    """What an orbit is on: a verdict, "settling" or "aperiodic".
-
-    From `state` on, after the time `t`, if it is ordered.
-    """
-
-    kind: str
-    period: float
-    state: _Floats
-    t: float
-
-    @property
-    def ordered(self) -> bool:
-        """Whether the orbit comes back, or rests."""
-        return self.kind in ("equilibrium", "periodic orbit")
-
-
-@dataclass(frozen=True)
-class _Run:
+class _Run(Orbit):
     """One orbit's exponents and fate."""
-
-    model: Model
-    rtol: float
-    atol: float
 
     def __call__(self, start: _Floats, time: float, skipped: float, goal: float) -> _core._Orbits:
         row = np.array([list(self.model.parameters.values())])
         batch = Batch(self.model, row, start[None, :], self.rtol, self.atol)
-        found = _core.lyapunov(batch, True, time, skipped, goal)
-        outcome = int(found["outcome"][0])
-        if outcome != FINISHED:
-            raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome])}")
-        return found
+        return _core.lyapunov(batch, True, time, skipped, goal)
 
-    def points(self, start: _Floats, section: str | Sequence[str] | None = None, **few: Any) -> Section:
-        """Where the orbit crosses a surface from here on."""
-        from .poincare_sections import poincare
-
-        options = {"n": _POINTS, "transient": 0, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
-        return poincare(self.model, section, state0=start, **options)
+    def look(self, start: _Floats, time: float, skipped: float, goal: float) -> tuple[_core._Orbits, Fate]:
+        """The exponents of a run, and what becomes of the orbit after it."""
+        found = self(start, time, skipped, goal)
+        outcome, end = int(found["outcome"][0]), found["end"][0]
+        if outcome == FINISHED:
+            return found, self.fate(end)
+        plain = [name not in self.model.angles for name in self.model.state_names]
+        far = np.abs(end) > _FAR * np.maximum(1.0, np.abs(start))
+        if outcome == FAILED and (far & plain).any():
+            return found, Fate("escapes", np.nan, end, 0.0)
+        raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome])}")
 
     def refuse(self, section: str | Sequence[str], start: _Floats) -> None:
         """Refuse a surface that cannot be used, before the long run."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", IncompleteWarning)
-            self.points(start, section, n=1, t_max=1e-9)
-
-    def fate(self, start: _Floats, longest: float = 0.0) -> _Fate:
-        """What the orbit does from here on: 600 section points, and more for the time `longest`."""
-        tight = tightness(self.rtol)
-        coordinates = coordinates_of(self.model, start[None])
-
-        def rests(state: _Floats, within: float) -> bool:
-            return bool(coordinates.speed(self.model, state[None])[0] < within)
-
-        if rests(start, tight.settled):
-            return _Fate("equilibrium", np.nan, start, 0.0)
-        state, spent, seen, skip, late = start, 0.0, 0, 0, 0
-        while True:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", IncompleteWarning)
-                points = self.points(state, transient=skip)
-            state, spent = points.end, spent + float(points.t_end)
-            if points.outcome != "finished":
-                kind = "equilibrium" if rests(state, 20.0 * tight.settled) else "aperiodic"
-                return _Fate(kind, np.nan, state, spent)
-            places = coordinates(points.state)
-            period = int(periods(places[None], tight)[0])
-            if period > 0:
-                # An equilibrium on the section, and the slow spiral into it, have the period 1.
-                if period == 1 and rests(state, 20.0 * tight.settled):
-                    return _Fate("equilibrium", np.nan, state, spent)
-                time = float(points.t[-1] - points.t[-1 - period])
-                last = period * (len(places) // period - 1)
-                moved = np.abs(places[last : last + period] - places[:period]).max()
-                there = skip == 0 and moved < tight.same
-                return _Fate("periodic orbit", time, *((start, 0.0) if there else (state, spent)))
-            seen += skip + _POINTS
-            enough = spent >= longest or seen >= _FOLLOWED
-            if enough and (period != SETTLING or late == _LATE):
-                return _Fate("settling" if period == SETTLING else "aperiodic", np.nan, state, spent)
-            # Intermittent chaos nearly comes back for a while: it is looked at again, a little later.
-            late += enough
-            skip = _POINTS if late else 2 * skip + _POINTS
+        self.points_if_any(start, section, n=1, t_max=1e-9)
 
 
 def kaplan_yorke(exponents: ArrayLike) -> float:

@@ -50,7 +50,8 @@ def add(commands: Any) -> None:
         "--spectrum",
         action="store_true",
         help="all exponents, the Kaplan-Yorke dimension, a verdict (chaos, periodic orbit, torus, "
-        "equilibrium, undecided) and the period of a periodic orbit; without it the largest exponent only",
+        "equilibrium, escapes, undecided) and the period of a periodic orbit; without it the largest "
+        "exponent only",
     )
     parser.add_argument(
         "--t",

@@ -1,0 +1,79 @@
+"""How large the motions are whose attractors are compared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from udd.chaos.rest import RestTest
+from udd.errors import UddError
+from udd.models import Model
+from udd.models.state_scaling import Coordinates, Floats, coordinates_of
+from udd.simulation.below_tolerance import warn_of_some
+from udd.simulation.outcomes import FINISHED
+from udd.simulation.trajectory import integrated
+
+from .section_runs import INTERRUPTED, OUT_OF_TIME, SectionRunner
+
+_LONGEST = 1e3  # times the longest time for a section point: a slow decay is followed for no longer
+_PILOTS = 16
+_RETURNS = 20  # section points along which the extent of a motion is measured
+_SAMPLES = 1000
+
+
+def rest_test(runner: SectionRunner, model: Model, coordinates: Coordinates) -> RestTest:
+    """The test whether orbits of a model settle at an equilibrium."""
+    kept = np.flatnonzero(np.isfinite(coordinates.size))
+    longest = _LONGEST * runner.t_each
+    return RestTest(model, kept, coordinates.clock, longest, runner.rtol, runner.atol)
+
+
+def sized_by_motion(
+    runner: SectionRunner, row: Floats, starts: Floats, transient: int, n: int
+) -> tuple[Coordinates, bool]:
+    """The coordinates for orbits from states (jobs, dim), and whether Ctrl-C stopped the search for them.
+
+    Warn if runs lose components below `atol`.
+
+    If the model has no sizes itself, a component's size is half its range along some of the motions, on
+    the way to rest, or among the states: the origin does not count.
+    """
+    model = runner.model
+    coordinates = coordinates_of(model, starts)
+    if model.profile.dynamics.sizes is not None:
+        return coordinates, False
+    some = np.unique(np.linspace(0, len(starts) - 1, min(_PILOTS, len(starts))).astype(int))
+    found = runner(np.tile(row, (len(some), 1)), starts[some], transient, n)
+    stopped = bool((found.outcome == INTERRUPTED).any())
+    if not stopped:
+        warn_of_some(model, row[None], starts[some], found.t_end, runner.rtol, runner.atol)
+    rests = rest_test(runner, model, coordinates)
+    range_, way = np.zeros((2, starts.shape[1]))
+    for job in np.flatnonzero(np.isin(found.outcome, (FINISHED, OUT_OF_TIME))):
+        if found.outcome[job] == FINISHED and rests(found.points[job, -1]) is None:
+            span = float(found.t[job, -1] - found.t[job, -1 - min(_RETURNS, n - 1)])
+            range_ = np.maximum(range_, _range(runner, found.points[job, -1], span))
+        else:
+            # What rests is moved by errors alone.
+            way = np.maximum(way, _range(runner, starts[some[job]], float(found.t_end[job])))
+    between = np.ptp(starts, axis=0)
+    noise = 100.0 * (runner.atol + runner.rtol * np.abs(starts).max(axis=0))
+    size = coordinates.size
+    for measured in (between, way, range_):
+        size = np.where(measured > noise, 0.5 * measured, size)
+    size = np.where(np.isfinite(coordinates.size), size, np.inf)
+    return replace(coordinates, size=size), stopped
+
+
+def _range(runner: SectionRunner, start: Floats, span: float) -> Floats:
+    """The range of each component along an orbit, zero if it ends before."""
+    times = np.linspace(0.0, span, _SAMPLES)
+    try:
+        run = integrated(runner.model, times, start, rtol=runner.rtol, atol=runner.atol, method="auto")
+    except UddError:
+        return np.zeros(len(start))
+    if run.outcome != "finished":
+        return np.zeros(len(start))
+    result: Floats = np.ptp(run.state, axis=0)
+    return result

@@ -1,0 +1,210 @@
+"""What an orbit ends on: rest, a cycle, infinity, or a motion that does not come back."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.errors import IncompleteWarning, ToleranceWarning, UddError
+from udd.models import Model
+from udd.models.state_scaling import Coordinates, coordinates_of, depends_on_time
+from udd.simulation.trajectory import integrated
+
+from .recurrence import SETTLING, Tightness, periods, tightness
+from .rest import RestTest
+
+if TYPE_CHECKING:
+    from .poincare_sections import Section
+
+__all__ = ["Fate", "Orbit"]
+
+_Floats = NDArray[np.float64]
+
+_FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
+_LATE = 4  # times that a motion that nearly comes back is looked at again
+_POINTS = 600  # section points in which a periodic motion shows itself
+_RETURNS = 20.0  # mean times between section points that show how large a motion is
+_SAMPLES = 2000
+_NOISE = 100.0  # times the tolerance: a component that moves less rests
+_GROWS = 1.3  # by this factor, each time that the time doubles, unbounded motions grow
+_DOUBLINGS = 8
+_FAR = 1e12  # times its first size: a motion that grew so far is unbounded
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What an orbit is on: a verdict, "settling" or "aperiodic".
+
+    From `state` on, after the time `t`, if it is ordered. `clock` is the mean time between section points,
+    NaN where there are none.
+    """
+
+    kind: str
+    period: float
+    state: _Floats
+    t: float
+    clock: float = float("nan")
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the orbit comes back, rests, or goes to infinity."""
+        return self.kind in ("equilibrium", "periodic orbit", "escapes")
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Orbits of a model, run with these tolerances."""
+
+    model: Model
+    rtol: float
+    atol: float
+
+    @cached_property
+    def kept(self) -> NDArray[np.intp]:
+        """The components of the state on which the rates depend, and those that are no angles."""
+        return np.flatnonzero(np.isfinite(self._coordinates.size))
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether the rates depend on time."""
+        size = np.where(np.isfinite(self._coordinates.size), self._coordinates.size, 1.0)
+        return depends_on_time(self.model, size, 0.7371 * self._coordinates.clock)
+
+    @cached_property
+    def _coordinates(self) -> Coordinates:
+        return coordinates_of(self.model, np.ones((1, len(self.model.state_names))))
+
+    def points(self, start: _Floats, section: str | Sequence[str] | None = None, **few: Any) -> Section:
+        """Where the orbit crosses a surface from here on."""
+        from .poincare_sections import poincare
+
+        options = {"n": _POINTS, "transient": 0, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
+        return poincare(self.model, section, state0=start, **options)
+
+    def points_if_any(
+        self, start: _Floats, section: str | Sequence[str] | None = None, **few: Any
+    ) -> Section:
+        """The same, without a warning if there are fewer."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IncompleteWarning)
+            warnings.simplefilter("ignore", ToleranceWarning)
+            return self.points(start, section, **few)
+
+    def fate(self, start: _Floats, longest: float = 0.0) -> Fate:
+        """What the orbit does from here on: 600 section points, and more for the time `longest`."""
+        rests = RestTest(
+            self.model, self.kept, self._coordinates.clock, max(longest, 2e5 * self.model.time_scale),
+            self.rtol, self.atol,
+        )  # fmt: skip
+        if rests(start) is not None:
+            return Fate("equilibrium", np.nan, start, 0.0)
+        # A section that is not crossed for a long time is left at once for one across the flow.
+        crossed = self.points_if_any(start, n=1).outcome != "time ran out"
+        section = None
+        if not crossed:
+            start = self._turned_back(start)
+            section = self._across(start)
+        state, spent, seen, skip, late = start, 0.0, 0, 0, 0
+        while True:
+            points = self.points_if_any(state, section, transient=skip)
+            state, spent = points.end, spent + float(points.t_end)
+            if points.outcome in ("escaped", "failed"):
+                return Fate("escapes" if self.unbounded(start) else "aperiodic", np.nan, start, spent)
+            if points.outcome != "finished":
+                if rests(state) is not None:
+                    return Fate("equilibrium", np.nan, state, spent)
+                if section is None:
+                    section = self._across(state)
+                    continue
+                return Fate("escapes" if self.unbounded(start) else "aperiodic", np.nan, state, spent)
+            clock = float(points.t[-1] - points.t[0]) / (len(points.t) - 1)
+            coordinates, tight = self._compared(points.state[-1], clock)
+            places = coordinates(points.state)
+            period = int(periods(places[None], tight)[0])
+            if period > 0:
+                # An equilibrium on the section, and the slow spiral into it, have the period 1.
+                if period == 1 and rests(state) is not None:
+                    return Fate("equilibrium", np.nan, state, spent)
+                if self.unbounded(state, clock):
+                    return Fate("escapes", np.nan, state, spent)
+                time = float(points.t[-1] - points.t[-1 - period])
+                last = period * (len(places) // period - 1)
+                moved = np.abs(places[last : last + period] - places[:period]).max(initial=0.0)
+                there = skip == 0 and moved < tight.same
+                return Fate("periodic orbit", time, *((start, 0.0) if there else (state, spent)), clock)
+            seen += skip + _POINTS
+            enough = spent >= longest or seen >= _FOLLOWED
+            if enough and (period != SETTLING or late == _LATE):
+                if self.unbounded(state, clock):
+                    return Fate("escapes", np.nan, state, spent)
+                if rests(state) is not None:
+                    return Fate("equilibrium", np.nan, state, spent)
+                return Fate("settling" if period == SETTLING else "aperiodic", np.nan, state, spent, clock)
+            # Intermittent chaos nearly comes back for a while: it is looked at again, a little later.
+            late += enough
+            skip = _POINTS if late else 2 * skip + _POINTS
+
+    def _turned_back(self, state: _Floats) -> _Floats:
+        """A state without whole turns of its angles, which cost digits."""
+        angle = np.array([name in self.model.angles for name in self.model.state_names])
+        return np.where(angle, np.arctan2(np.sin(state), np.cos(state)), state)
+
+    def _across(self, state: _Floats) -> str:
+        """The plane through a state across the flow, modulo turns of angles: what recurs crosses it."""
+        names, rates = self.model.state_names, self.model.rates(0.0, state)
+        largest = np.abs(rates[self.kept]).max(initial=0.0) or 1.0
+        terms = []
+        for k in self.kept:
+            away = f"({names[k]} - ({float(state[k])!r}))"
+            away = f"sin{away}" if names[k] in self.model.angles else away
+            terms.append(f"({float(rates[k] / largest)!r})*{away}")
+        return " + ".join(terms)
+
+    def _compared(self, state: _Floats, clock: float) -> tuple[Coordinates, Tightness]:
+        """How states are compared: by the extent of the motion, if the model has no sizes of its own."""
+        if self.model.profile.dynamics.sizes is not None:
+            return coordinates_of(self.model, state[None]), tightness(self.rtol)
+        run = self._sampled(state, _RETURNS * clock)
+        if run is None:
+            return coordinates_of(self.model, state[None]), tightness(self.rtol)
+        extent, largest = 0.5 * np.ptp(run, axis=0), np.abs(run).max(axis=0)
+        angle = np.array([name in self.model.angles for name in self.model.state_names])
+        moves = extent > _NOISE * (self.atol + self.rtol * largest)
+        free = ~np.isfinite(self._coordinates.size)
+        size = np.where(free | ~(moves | angle), np.inf, extent)
+        # Errors are relative to the state, which may be larger than the motion.
+        worse = (largest / np.where(moves, extent, np.inf))[~angle].max(initial=1.0)
+        return replace(self._coordinates, size=size), tightness(self.rtol * min(worse, 1e3))
+
+    def _sampled(self, state: _Floats, span: float) -> _Floats | None:
+        """States along the orbit, or None if it ends before."""
+        times = np.linspace(0.0, span, _SAMPLES + 1)
+        try:
+            run = integrated(self.model, times, state, rtol=self.rtol, atol=self.atol, method="auto")
+        except UddError:
+            return None
+        return run.state if run.outcome == "finished" else None
+
+    def unbounded(self, state: _Floats, clock: float | None = None) -> bool:
+        """Whether a component that is no angle grows without bound: each time that the time doubles."""
+        plain = [k for k, name in enumerate(self.model.state_names) if name not in self.model.angles]
+        span = _RETURNS * (self._coordinates.clock if clock is None else clock)
+        first = last = None
+        for _ in range(_DOUBLINGS):
+            run = self._sampled(state, span)
+            if run is None:
+                return True
+            size = np.abs(run[:, plain] - state[plain]).max(axis=0)
+            if first is not None and last is not None:
+                if not (size > _GROWS * last).any():
+                    return False
+                if (size > _FAR * np.maximum(first, np.abs(state[plain]))).any():
+                    return True
+            first, last, span = size if first is None else first, size, 2.0 * span
+        return True

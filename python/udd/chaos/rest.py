@@ -1,0 +1,147 @@
+"""Whether an orbit settles at an equilibrium: by Newton's method, the eigenvalues there, and the orbit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.errors import UddError
+from udd.models import Model
+from udd.simulation.trajectory import integrated
+
+__all__ = ["Equilibrium", "RestTest", "equilibrium_near"]
+
+_Floats = NDArray[np.float64]
+
+_STEPS = 100  # of Newton's method
+_SAME = 1e-10  # a step of Newton's method below this part of the state, or of all steps, is the last
+_REST = 1e-6  # of the rates at first may be left,
+_ROUNDING = 1e-14  # of the largest component: no step is more accurate
+_TINY = 1e-290  # near the smallest numbers nothing is relative
+_ZERO = 1e-8  # real parts below this part of the largest eigenvalue are zero
+_SPANS = 10.0  # times that of the slowest decay an orbit is followed,
+_LEAVES = 40.0  # and times that of the slowest growth: rounding is large then, unless a symmetry forbids it
+_LEFT = 0.1  # of the largest distance may be left then
+_SAMPLES = 200
+_TIMES = (0.0, 0.7371)  # in typical times: an equilibrium of rates that depend on time is there at both
+
+
+class Equilibrium(NamedTuple):
+    """A state (r,) in the components that count, and the slopes (r, r) of the rates and their eigenvalues."""
+
+    state: _Floats
+    slopes: _Floats
+    eigenvalues: NDArray[np.complex128]
+
+    @property
+    def repels(self) -> bool:
+        """Whether an eigenvalue has a positive real part: no attractor has one."""
+        return bool((self.eigenvalues.real > _ZERO * np.abs(self.eigenvalues).max(initial=0.0)).any())
+
+
+def equilibrium_near(model: Model, state: _Floats, kept: NDArray[np.intp], t: float) -> Equilibrium | None:
+    """The equilibrium to which Newton's method goes from a state (dim,), with the components `kept`."""
+    place, gone = np.array(state, dtype=np.float64), np.zeros(len(kept))
+    first: _Floats | None = None
+    with np.errstate(all="ignore"):
+        for _ in range(_STEPS):
+            try:
+                here = _core.expansion(model, t, place.tolist(), False)
+            except UddError:
+                return None
+            rate, slopes = here["rate"][kept], here["by_state"][np.ix_(kept, kept)]
+            first = np.abs(rate) if first is None else first
+            if not (np.isfinite(rate).all() and np.isfinite(slopes).all()):
+                return None
+            # Directions in which the rates do not change, as along a line of equilibria, stay as they are.
+            step = -np.linalg.lstsq(slopes, rate, rcond=1e-12)[0]
+            place[kept] += step
+            gone = np.maximum(gone, np.abs(step))
+            size = np.maximum(np.abs(place[kept]), gone)
+            if (np.abs(step) <= _SAME * size + _ROUNDING * size.max() + _TINY).all():
+                break
+        else:
+            return None
+        rounding = _ROUNDING * (np.abs(slopes) @ (100.0 * size + 10.0 * size.max()))
+        left = np.abs(rate + slopes @ step)
+        if not np.isfinite(place).all() or (left > rounding + _REST * first + _TINY).any():
+            return None
+    return Equilibrium(place[kept], slopes, np.linalg.eigvals(slopes).astype(complex))
+
+
+@dataclass(frozen=True)
+class RestTest:
+    """Whether orbits of a model settle at an equilibrium that attracts, or rest on one that does not.
+
+    An equilibrium is one of the components `kept`: angles on which nothing depends may turn. Distances are
+    compared with those that the orbit itself passes through, so that neither the origin nor the units count.
+
+    Attributes
+    ----------
+    model : Model
+    kept : ndarray of int (r,)
+    clock : float
+        A typical time, used only if the rates depend on time.
+    longest : float
+        An orbit is followed for no longer than this.
+    rtol, atol : float
+    """
+
+    model: Model
+    kept: NDArray[np.intp]
+    clock: float
+    longest: float
+    rtol: float
+    atol: float
+
+    def __call__(self, state: _Floats, attracts: bool = False) -> Equilibrium | None:
+        """The equilibrium at which the orbit from a state (dim,) settles, or None.
+
+        With `attracts`, one that repels is none, even if the orbit rests on it.
+        """
+        rest = equilibrium_near(self.model, state, self.kept, 0.0)
+        if rest is None:
+            return None
+        # Where runs no longer come nearer: the error of a component moves the others.
+        noise = 10.0 * (self.atol + self.rtol * np.abs(rest.state))
+        fastest = float(np.abs(rest.eigenvalues).max(initial=0.0))
+        if fastest > 0.0:
+            noise = noise + np.abs(rest.slopes) @ noise / fastest
+        if self.model.names_time:
+            later = equilibrium_near(self.model, state, self.kept, _TIMES[1] * self.clock)
+            off = np.abs(state[self.kept] - rest.state)
+            if later is None or (np.abs(later.state - rest.state) > _LEFT * off + noise).any():
+                return None
+        if rest.repels and attracts:
+            return None
+        return self._settled(state, rest, noise)
+
+    def _settled(self, state: _Floats, rest: Equilibrium, noise: _Floats) -> Equilibrium | None:
+        """The equilibrium that an orbit has come near to after several times its slowest decay."""
+        if not rest.repels and (np.abs(state[self.kept] - rest.state) <= noise).all():
+            return rest
+        real = rest.eigenvalues.real
+        least = _ZERO * np.abs(rest.eigenvalues).max(initial=0.0)
+        rates = np.concatenate([-real[real < -least] / _SPANS, real[real > least] / _LEAVES])
+        if not len(rates):
+            return None
+        span = min(1.0 / float(rates.min()), self.longest)
+        times = np.linspace(0.0, span, _SAMPLES + 1)
+        try:
+            run = integrated(self.model, times, state, rtol=self.rtol, atol=self.atol, method="auto")
+        except UddError:
+            return None
+        # Of a line of equilibria it may be another.
+        end = equilibrium_near(self.model, run.state[-1], self.kept, 0.0)
+        if run.outcome != "finished" or end is None or end.repels != rest.repels:
+            return None
+        away = np.abs(run.state[:, self.kept] - end.state)
+        quarter = _SAMPLES // 4
+        first, late = away[:quarter].max(axis=0), away[-quarter:].max(axis=0)
+        # One that leaves may happen to be near again at the end.
+        stays = (away[quarter:].max(axis=0) <= first + noise).all()
+        return end if stays and (late <= _LEFT * first + noise).all() else None

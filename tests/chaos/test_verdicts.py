@@ -1,0 +1,72 @@
+"""Verdicts on motions of known kind, wherever their origin is and however large they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+from known_attractors import drawn
+
+XV = ["x", "v"]
+
+
+@pytest.mark.parametrize(
+    ("model", "start", "verdict", "dimension"),
+    [
+        # Linear: every orbit but one goes to infinity.
+        (udd.Model(["x", "y"], ["0.1*x - y", "x + 0.1*y"]), [0.5, 0.5], "escapes", np.nan),
+        (udd.Model(["x", "y"], ["0.2*x", "-y"]), [1e-3, 1.0], "escapes", np.nan),
+        (udd.Model(["x"], ["x^2"]), [1.0], "escapes", np.nan),
+        (udd.Model(["x", "y"], ["1", "-y"]), [1.0, 1.0], "escapes", np.nan),
+        # Two exponents of -0.05: no cycle.
+        (udd.Model(XV, ["v", "-(x - 0.5) - 0.1*v"]), [1.0, 0.0], "equilibrium", 0.0),
+        (udd.Model(XV, ["v", "-(x + 1e4) - 0.1*v"]), [1.0, 0.0], "equilibrium", 0.0),
+        # One exponent is zero and nothing rests.
+        (
+            udd.Model(["q", "v"], ["v", "2 - 0.5*v - sin(q)"], angles=["q"]),
+            [0.0, 3.0],
+            "periodic orbit",
+            1.0,
+        ),
+        (udd.Model(["q"], ["1.5 - sin(q)"], angles=["q"]), [0.0], "periodic orbit", 1.0),
+        (udd.Model(["q"], ["0.5 - sin(q)"], angles=["q"]), [0.0], "equilibrium", 0.0),
+        (udd.Model(XV, ["v", "(1 - (x - 1e3)^2)*v - (x - 1e3)"]), [1001.0, 0.0], "periodic orbit", 1.0),
+        (udd.Model(XV, ["v", "(1 - (x/1e-4)^2)*v - x"]), [1e-4, 0.0], "periodic orbit", 1.0),
+        # Rates that depend on time: the exponent of time is none of the two, both below zero.
+        (udd.Model(XV, ["v", "-x - 0.2*v + cos(0.8*t)"]), [1.0, 0.0], "periodic orbit", 1.0),
+    ],
+)
+def test_verdicts(model: udd.Model, start: list[float], verdict: str, dimension: float) -> None:
+    found = udd.lyapunov_spectrum(model, state0=start)
+    assert found.verdict == verdict
+    assert found.dimension == dimension or np.isnan([found.dimension, dimension]).all()
+
+
+def test_a_running_phase_has_its_period() -> None:
+    # Adler's equation: T = 2 pi/sqrt(a^2 - 1).
+    model = udd.Model(["q"], ["a - sin(q)"], {"a": 1.5}, angles=["q"])
+    found = udd.lyapunov_spectrum(model, state0=[0.0])
+    assert found.period == pytest.approx(2 * np.pi / np.sqrt(1.25), rel=1e-6)
+
+
+def test_a_passage_by_an_equilibrium_is_no_rest() -> None:
+    # From 1e-12 beside the saddle (0, 0) of two wells without friction, whose orbit is a cycle around both.
+    model = udd.Model(XV, ["v", "x - x^3"])
+    assert udd.lyapunov_spectrum(model, state0=[1e-2, 0.0]).verdict != "equilibrium"
+
+
+def test_a_disk_that_leaves_and_a_law_that_ends_are_no_escape() -> None:
+    with pytest.raises(udd.errors.IntegrationError, match="left the wheels"):
+        udd.lyapunov_spectrum(udd.Disk(0.039))
+    with pytest.raises(udd.errors.IntegrationError, match="blew up"):
+        udd.lyapunov_spectrum(udd.Model(["x"], ["sqrt(x) - 2"]), state0=[1.0])
+
+
+# One of each kind with another origin and other units, and others that were wrong once; the whole is in
+# benches/python/known_attractors.py.
+@pytest.mark.parametrize("number", [32, 36, 39, 40, 47, 48, 49, 53, 57, 60])
+def test_known_attractors(number: int) -> None:
+    case = list(drawn(number + 1, 7))[number]
+    found = udd.lyapunov_spectrum(case.model, state0=case.start, tol=5e-3 * max(1.0, case.model.time_scale))
+    assert found.verdict == case.kind
