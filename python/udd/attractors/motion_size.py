@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from udd.chaos.rest import RestTest
-from udd.errors import UddError
 from udd.models import Model
 from udd.models.state_scaling import Coordinates, Floats, coordinates_of
 from udd.simulation.below_tolerance import warn_of_some
 from udd.simulation.outcomes import FINISHED
-from udd.simulation.trajectory import integrated
+from udd.simulation.sampling import states_along
 
 from .section_runs import INTERRUPTED, OUT_OF_TIME, SectionRunner
 
@@ -68,12 +67,6 @@ def sized_by_motion(
 
 def _range(runner: SectionRunner, start: Floats, span: float) -> Floats:
     """The range of each component along an orbit, zero if it ends before."""
-    times = np.linspace(0.0, span, _SAMPLES)
-    try:
-        run = integrated(runner.model, times, start, rtol=runner.rtol, atol=runner.atol, method="auto")
-    except UddError:
-        return np.zeros(len(start))
-    if run.outcome != "finished":
-        return np.zeros(len(start))
-    result: Floats = np.ptp(run.state, axis=0)
+    states = states_along(runner.model, span, _SAMPLES, start, runner.rtol, runner.atol)
+    result: Floats = np.zeros(len(start)) if states is None else np.ptp(states, axis=0)
     return result

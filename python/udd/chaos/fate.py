@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.errors import IncompleteWarning, ToleranceWarning, UddError
+from udd.errors import IncompleteWarning, ToleranceWarning
 from udd.models import Model
 from udd.models.state_scaling import Coordinates, coordinates_of, depends_on_time
-from udd.simulation.trajectory import integrated
+from udd.simulation.sampling import states_along
 
 from .recurrence import SETTLING, Tightness, periods, tightness
 from .rest import RestTest
@@ -184,12 +184,7 @@ class Orbit:
 
     def _sampled(self, state: _Floats, span: float) -> _Floats | None:
         """States along the orbit, or None if it ends before."""
-        times = np.linspace(0.0, span, _SAMPLES + 1)
-        try:
-            run = integrated(self.model, times, state, rtol=self.rtol, atol=self.atol, method="auto")
-        except UddError:
-            return None
-        return run.state if run.outcome == "finished" else None
+        return states_along(self.model, span, _SAMPLES + 1, state, self.rtol, self.atol)
 
     def unbounded(self, state: _Floats, clock: float | None = None) -> bool:
         """Whether a component that is no angle grows without bound: each time that the time doubles."""

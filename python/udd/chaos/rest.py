@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd import _core
 from udd.errors import UddError
 from udd.models import Model
-from udd.simulation.trajectory import integrated
+from udd.simulation.sampling import states_along
 
 __all__ = ["Equilibrium", "RestTest", "equilibrium_near"]
 
@@ -130,16 +130,14 @@ class RestTest:
         if not len(rates):
             return None
         span = min(1.0 / float(rates.min()), self.longest)
-        times = np.linspace(0.0, span, _SAMPLES + 1)
-        try:
-            run = integrated(self.model, times, state, rtol=self.rtol, atol=self.atol, method="auto")
-        except UddError:
+        states = states_along(self.model, span, _SAMPLES + 1, state, self.rtol, self.atol)
+        if states is None:
             return None
         # Of a line of equilibria it may be another.
-        end = equilibrium_near(self.model, run.state[-1], self.kept, 0.0)
-        if run.outcome != "finished" or end is None or end.repels != rest.repels:
+        end = equilibrium_near(self.model, states[-1], self.kept, 0.0)
+        if end is None or end.repels != rest.repels:
             return None
-        away = np.abs(run.state[:, self.kept] - end.state)
+        away = np.abs(states[:, self.kept] - end.state)
         quarter = _SAMPLES // 4
         first, late = away[:quarter].max(axis=0), away[-quarter:].max(axis=0)
         # One that leaves may happen to be near again at the end.

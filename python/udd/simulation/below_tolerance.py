@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
-from udd.errors import ToleranceWarning, UddError, outside
+from udd.errors import StiffnessWarning, ToleranceWarning, UddError, outside
 from udd.models import Model
 
 __all__ = ["growing_components", "warn_from", "warn_of", "warn_of_some"]
@@ -128,7 +128,9 @@ def warn_along(model: Model, times: _Floats, states: _Floats, rtol: float, atol:
 def _states(model: Model, times: _Floats, start: _Floats, rtol: float, atol: float) -> _core._Run:
     """A run by the method that sections and exponents use."""
     method = "taylor" if _core.has_series(model) else "dop853"
-    return _core.simulate(model, times, math.nan, start.tolist(), rtol, atol, method, False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StiffnessWarning)
+        return _core.simulate(model, times, math.nan, start.tolist(), rtol, atol, method, False)
 
 
 def _matters(model: Model, k: int, times: _Floats, state: _Floats, rtol: float, atol: float) -> bool:
