@@ -170,18 +170,23 @@ fn symmetries() {
     }
 }
 
-/// An angle of any size gives a value as good as the angle itself, and one from -1 to 1.
+/// Angles of any size, alone and in a packet beside small ones.
 #[test]
-fn large_angles() {
-    for size in [1e6, 1e8, 1e10, 1e13, 2.2e15] {
-        for x in numbers(20_000, -size, size) {
-            let most = 1.2e-16 * x.abs() + 2e-16;
-            assert!((sin(x) - x.sin()).abs() <= most && (cos(x) - x.cos()).abs() <= most, "{x}");
-            assert!(sin(x).abs() <= 1.0 && cos(x).abs() <= 1.0, "{x}");
+fn angles_far_from_zero() {
+    for (x, (sine, sine_rest), (cosine, cosine_rest)) in points::FAR {
+        for (value, high, low) in [(sin(x), sine, sine_rest), (cos(x), cosine, cosine_rest)] {
+            let error = ((value - high) - low).abs() / ulp(high);
+            assert!(error <= 1.0, "x = {x:e}: {value:e} is {error} ulp from {high:e}");
+        }
+        assert!(same(sin(-x), -sin(x)) && same(cos(-x), cos(x)), "{x:e}");
+        let (s, c) = sin_cos(Packet::<4>::new([0.3, x, -2e5, -x]));
+        for (lane, x) in [0.3, x, -2e5, -x].into_iter().enumerate() {
+            assert!(same(s.lane(lane), sin(x)) && same(c.lane(lane), cos(x)), "{x:e}");
         }
     }
-    for x in [2251799813685247.5, 2251799813685248.0, 1e16, 1e22, 1e100, 1e308, f64::MAX] {
-        assert!(sin(x).abs() <= 1.0 && cos(x).abs() <= 1.0, "{x}");
+    for size in [3e5, 1e6, 1e8, 1e10, 1e13, 2.2e15, 1e18, 1e30, 1e100, 1e300] {
+        agrees(sin, f64::sin, 1.0, (-size, size));
+        agrees(cos, f64::cos, 1.0, (-size, size));
     }
 }
 

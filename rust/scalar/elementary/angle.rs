@@ -1,6 +1,8 @@
 //! Sine and cosine.
 
+use super::far_angle::reduce;
 use super::{Real, WHOLE, cubic, linear};
+use crate::scalar::Mask;
 
 /// pi/2 in two parts of 36 bits and the rest: multiples of the first two by up to 2^17 are exact.
 const RIGHT_ANGLE: [f64; 3] = [
@@ -29,28 +31,33 @@ const COS: [f64; 6] = [
     -1.1359658842341324e-11,
 ];
 
-/// Angles from here on (2^51) are taken as zero: the next number is half a radian away.
-const ESCAPE_BOUND: f64 = 2251799813685248.0;
+/// Beyond this angle the multiples of a right angle are taken away by whole numbers.
+const FAR: f64 = 2e5;
 
 /// Sine and cosine of an angle in rad, together.
 ///
-/// Both are within 1 ulp for `|x| <= 2e5`; beyond they are off by at most `1.2e-16 |x|`, as if the angle
-/// had been rounded once more, up to 2^51. The sine is odd and the cosine even to the last bit.
+/// Both are within 1 ulp, for angles of any size. The sine is odd and the cosine even to the last bit.
 #[inline(always)]
 pub fn sin_cos<R: Real>(x: R) -> (R, R) {
-    // The product with zero keeps the sign, and makes infinity not a number.
-    let x = R::select(x.abs().less(R::constant(ESCAPE_BOUND)), x, x.scale(0.0));
-
     // The quarter turns, whose last two bits are the quadrant, and what is left of the angle, r + tail.
-    let turned = x.scale(std::f64::consts::FRAC_2_PI) + R::constant(WHOLE);
+    let mut turned = x.scale(std::f64::consts::FRAC_2_PI) + R::constant(WHOLE);
     let q = turned - R::constant(WHOLE);
     // This difference is exact, and so is the next one where it comes out below 2^-21.
     let left = x - q.scale(RIGHT_ANGLE[0]);
     let second = q.scale(RIGHT_ANGLE[1]);
     let shorter = left - second;
     let third = q.scale(RIGHT_ANGLE[2]) - ((left - shorter) - second);
-    let r = shorter - third;
-    let tail = (shorter - r) - third;
+    let mut r = shorter - third;
+    let mut tail = (shorter - r) - third;
+    let far = R::constant(FAR).less(x.abs());
+    if far.any() {
+        for lane in far.lanes() {
+            let (turns, left, rest) = reduce(x.lane(lane));
+            turned.set_lane(lane, WHOLE + turns);
+            r.set_lane(lane, left);
+            tail.set_lane(lane, rest);
+        }
+    }
 
     let z = r * r;
     let (z2, half) = (z * z, z.scale(0.5));

@@ -19,6 +19,7 @@
 mod angle;
 mod approximate;
 mod exponential;
+mod far_angle;
 mod logarithm;
 mod tangent;
 
