@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 import warnings
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 _WORD, _ALL = 200, 700  # characters of one word or of what is repeated of the input, and of a message
@@ -86,20 +88,24 @@ class Interrupted(KeyboardInterrupt):
     ----------
     message : str
         How much is missing.
-    partial : object
-        What the function returns, as far as it came: NaN where nothing is known, and an outcome
-        "interrupted".
+    build : callable
+        Makes the partial result, when it is asked for.
     """
 
-    def __init__(self, message: str, partial: Any) -> None:
+    def __init__(self, message: str, build: Callable[[], Any]) -> None:
         super().__init__(message)
-        self.partial = partial
+        self._build = build
+
+    @cached_property
+    def partial(self) -> Any:
+        """What the function returns, as far as it came: NaN and the outcome "interrupted" elsewhere."""
+        return self._build()
 
 
-def interrupted(result: Any, message: str, partial: bool) -> None:
+def interrupted(build: Callable[[], Any], message: str, partial: bool) -> None:
     """Raise :class:`Interrupted`, or warn whoever asked for a partial result."""
     if not partial:
-        raise Interrupted(message, result) from None
+        raise Interrupted(message, build) from None
     warnings.warn(IncompleteWarning(message, interrupted=True), stacklevel=outside())
 
 

@@ -49,7 +49,7 @@ def test_an_option_that_there_is_not_is_named(call: object) -> None:
 def test_a_partial_result_is_warned_of_where_the_package_was_called() -> None:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        udd.errors.interrupted(None, "half is missing", partial=True)
+        udd.errors.interrupted(lambda: None, "half is missing", partial=True)
     assert told[0].filename == __file__
 
 

@@ -416,6 +416,6 @@ def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Sect
         whys = ", ".join(f"{OUTCOMES[kind]} {count}" for kind, count in zip(kinds, counts, strict=True))
         message = f"{int(short.sum())} of {len(outcome)} orbits have fewer than {n} crossings: {whys}"
     if (outcome == OUTCOMES.index("interrupted")).any():
-        interrupted(section, message, partial)
+        interrupted(lambda: section, message, partial)
     else:
         warnings.warn(IncompleteWarning(message), stacklevel=3)

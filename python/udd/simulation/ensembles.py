@@ -182,7 +182,7 @@ def ensemble(
     )
     stopped = int((names == "interrupted").sum())
     if stopped:
-        interrupted(made, f"{stopped} of {runs} runs were interrupted and are NaN", partial)
+        interrupted(lambda: made, f"{stopped} of {runs} runs were interrupted and are NaN", partial)
     else:
         span = float(times[-1] - times[0])
         warn_of_some(model, rows, starts, span, rtol, atol, float(times[0]))

@@ -136,7 +136,7 @@ def sweep(
     if missing:
         message = f"{missing} of {len(grid)} chunks are not finished: {why}; {result.remedy}"
         if stopped:
-            interrupted(result.dataset(), message, partial)
+            interrupted(result.dataset, message, partial)
         else:
             warnings.warn(IncompleteWarning(message), stacklevel=2)
     else:
