@@ -192,7 +192,7 @@ impl<F: Family<D>, A: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob f
             let over = batch.arrived().or(progress.walled()).or(progress.failed);
             for lane in over.lanes() {
                 let outcome = if progress.failed.lane(lane) {
-                    Err(batch.driver.failure_of(lane))
+                    Err(batch.failure_of(lane))
                 } else if progress.walled().lane(lane) {
                     Ok(Outcome::Ejected)
                 } else {

@@ -1,6 +1,7 @@
 //! One run, sampled.
 
 use crate::analysis::CancelFlag;
+use crate::analysis::batch::step_budget::StepBudget;
 use crate::analysis::stiffness::{Look, Stiffness};
 use crate::integrate::{Counts, Ending, Failure, Integrator, Method, Steps, Tolerance};
 use crate::memory;
@@ -129,6 +130,8 @@ fn no_room(kept: usize, t: f64, (start, end): (f64, f64)) -> Failure {
     Failure::NoRoom { end, bytes: kept * (end - start) / (t - start), kept }
 }
 
+/// The step budget is looked at after so many rounds of a few steps each.
+const ROUNDS: u64 = 16;
 /// The time wanted of who looks at each step.
 const EACH: f64 = f64::NEG_INFINITY;
 
@@ -142,8 +145,14 @@ pub(in crate::analysis) fn follow<const D: usize>(
 ) -> Result<Outcome, Failure> {
     let mut look = Look::new();
     let mut wanted = EACH;
+    let mut budget = StepBudget::new(0, run.t(), end);
+    let mut round = 0_u64;
     while run.t() < end {
         stop.check()?;
+        round += 1;
+        if round.is_multiple_of(ROUNDS) && budget.exceeded(run.counts().accepted, run.t()) {
+            return Err(Failure::EverShorter { t: run.t() });
+        }
         let (ending, outcome) = match run.advance(end, wanted) {
             Err(Failure::Chattering { .. }) => (Ending::Free, Some(Outcome::Chattering)),
             Ok(Ending::Wall) => (Ending::Wall, Some(Outcome::Ejected)),

@@ -27,6 +27,9 @@ pub struct Counts {
 const MOST_JUMPS: f64 = 100.0;
 const STILL: f64 = 1e-9;
 
+/// So many trials without a step are none: each rejected step is a tenth shorter at least, and bisection ends sooner.
+const MOST_TRIALS: usize = 10_000;
+
 /// How an accepted step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
@@ -724,13 +727,14 @@ where
     /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
     pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
         let mut ending = Ending::Free;
-        loop {
+        for _ in 0..MOST_TRIALS {
             match self.attempt(end, &mut ending) {
                 Attempted::Moved => return Ok(ending),
                 Attempted::Failed => return Err(self.failure()),
                 Attempted::Rejected => {}
             }
         }
+        Err(self.failure())
     }
 
     /// Tries a step; where it does not end freely, says how.
@@ -770,7 +774,7 @@ where
 
 #[inline(always)]
 fn is_zero<R: Real>(value: R) -> R::Mask {
-    value.abs().less(R::constant(f64::MIN_POSITIVE))
+    value.abs().less(R::constant(f64::from_bits(1)))
 }
 
 #[inline(always)]

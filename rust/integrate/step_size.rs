@@ -102,5 +102,6 @@ fn curved_step<R: Real, const D: usize>(
     let curved = ((constant(0.01) / steepest).ln().scale(1.0 / f64::from(order))).exp();
     let h1 = R::select(flat, h0.scale(1e-3).max(constant(1e-6)), curved);
     let h = h1.min(h0.scale(100.0));
-    R::select(h.finite(), h, constant(1e-6))
+    // Where the rate is infinite, or nearly so, it is no step.
+    R::select(h.finite().and(R::zero().less(h)), h, constant(1e-6))
 }

@@ -218,6 +218,11 @@ pub enum Failure {
          {:.3}: give the times that are wanted, or leave out dense", bytes * 1e-9, kept * 1e-9
     )]
     NoRoom { end: f64, bytes: f64, kept: f64 },
+    #[error(
+        "the steps of the run have become so short by t = {t} that it would hardly end: the solution turns or grows \
+         ever faster; end it earlier"
+    )]
+    EverShorter { t: f64 },
     #[error("interrupted")]
     Interrupted,
 }

@@ -1,6 +1,7 @@
 //! A packet of trajectories, each with its own job, parameters, time and end.
 
-use crate::integrate::{ErrorNorm, Integrator, Method, Progress};
+use crate::analysis::batch::step_budget::StepBudget;
+use crate::integrate::{ErrorNorm, Failure, Integrator, Method, Progress};
 use crate::model::{Family, System};
 use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, constants};
 
@@ -29,7 +30,16 @@ pub struct LaneBatch<'a, F: Family<D>, S: Scalar, const D: usize, E, K> {
     active: usize,
     /// Where each lane's run ends.
     pub end: S::Real,
+    /// The time at which runs end at last, where that is not their first end.
+    pub latest: f64,
+    /// The trials so far, the lanes' step budgets, and the lanes that have spent theirs.
+    trials: u64,
+    budgets: Vec<StepBudget>,
+    spent: S::Mask,
 }
+
+/// The budgets are looked at after so many trials.
+const EVERY: u64 = 1024;
 
 impl<'a, F, S, const D: usize, E, K> LaneBatch<'a, F, S, D, E, K>
 where
@@ -50,7 +60,19 @@ where
         let t = S::Real::constant(like.t);
         let method = method(values.clone());
         let driver = Integrator::by(method, family.build(&values), t, like.x, None, norm).with_wall();
-        Self { isa, family, values, driver, jobs: vec![None; S::Real::LANES], active: 0, end: t }
+        Self {
+            isa,
+            family,
+            values,
+            driver,
+            jobs: vec![None; S::Real::LANES],
+            active: 0,
+            end: t,
+            latest: like.end,
+            trials: 0,
+            budgets: vec![StepBudget::new(0, like.t, like.end); S::Real::LANES],
+            spent: S::mask(false),
+        }
     }
 
     /// Starts a job in a lane.
@@ -85,6 +107,7 @@ where
         let only = S::Mask::from_lanes(|i| i == lane);
         self.driver.start(only, S::Real::constant(start.t), start.x, None);
         self.end.set_lane(lane, start.end);
+        self.budgets[lane] = StepBudget::new(self.trials, start.t, start.end.max(self.latest));
         self.active += usize::from(self.jobs[lane].is_none());
         self.jobs[lane] = Some(job);
     }
@@ -118,11 +141,34 @@ where
     /// Tries a step in every lane.
     pub fn trial(&mut self) -> Progress<S::Mask> {
         let end = self.end;
-        if const { S::Real::LANES > 1 } {
+        let mut progress = if const { S::Real::LANES > 1 } {
             S::Real::work(self.isa, Trial { driver: &mut self.driver, end })
         } else {
             self.driver.trial_apart(end)
+        };
+        self.trials += 1;
+        if self.trials.is_multiple_of(EVERY) {
+            self.look_at_budgets();
+            progress.failed = progress.failed.or(self.spent);
         }
+        progress
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn look_at_budgets(&mut self) {
+        let t = self.driver.t();
+        let (budgets, trials, jobs) = (&mut self.budgets, self.trials, &self.jobs);
+        self.spent =
+            S::Mask::from_lanes(|lane| jobs[lane].is_some() && budgets[lane].exceeded(trials, t.lane(lane)));
+    }
+
+    /// Why a lane that failed in the last trial cannot go on.
+    pub fn failure_of(&self, lane: usize) -> Failure {
+        if self.trials.is_multiple_of(EVERY) && self.spent.lane(lane) {
+            return Failure::EverShorter { t: self.driver.t().lane(lane) };
+        }
+        self.driver.failure_of(lane)
     }
 
     /// Lanes that are at their end.

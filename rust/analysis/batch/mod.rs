@@ -6,3 +6,4 @@ pub(crate) mod method_factory;
 pub mod parallel;
 pub mod rows;
 pub(crate) mod scheduler;
+pub(crate) mod step_budget;

@@ -3,6 +3,7 @@
 use nalgebra::SMatrix;
 
 use crate::analysis::CancelFlag;
+use crate::analysis::batch::step_budget::StepBudget;
 use crate::analysis::lyapunov::tangent_frame::tangents;
 use crate::integrate::{Ending, Failure, Integrator, Method, Tolerance, WithTangents};
 use crate::model::System;
@@ -47,12 +48,17 @@ where
     let mut states = vec![x0];
     let mut bases = vec![matrix(&start)];
     let mut triangles = Vec::with_capacity(count);
+    let mut budget = StepBudget::new(0, 0.0, count as f64 * dt);
     for k in 0..count {
         stop.check()?;
         let end = (k + 1) as f64 * dt;
         while driver.t() < end {
+            stop.check()?;
             if driver.advance(end)? == Ending::Wall {
                 return Err(Failure::LeftDomain { t: driver.t() });
+            }
+            if budget.exceeded(driver.counts().accepted, driver.t()) {
+                return Err(Failure::EverShorter { t: driver.t() });
             }
         }
         let (q, r) = triangular(matrix(driver.x()));
@@ -67,7 +73,7 @@ where
         triangles.push(r);
     }
     let growth = triangles.iter().map(|r| std::array::from_fn(|i| r[(i, i)].ln())).collect();
-    let covariant = backwards(&bases, &triangles);
+    let covariant = backwards(&bases, &triangles, stop)?;
     Ok(CovariantFrames { states, growth, covariant })
 }
 
@@ -97,11 +103,13 @@ fn triangular<const D: usize>(mut q: SMatrix<f64, D, D>) -> (SMatrix<f64, D, D>,
 fn backwards<const D: usize>(
     bases: &[SMatrix<f64, D, D>],
     triangles: &[SMatrix<f64, D, D>],
-) -> Vec<[[f64; D]; D]> {
+    stop: &CancelFlag,
+) -> Result<Vec<[[f64; D]; D]>, Failure> {
     // Coordinates in the frame: upper triangular with columns of length 1.
     let mut inside = SMatrix::<f64, D, D>::identity();
     let mut covariant = vec![[[0.0; D]; D]; bases.len()];
     for k in (0..bases.len()).rev() {
+        stop.check()?;
         if let Some(r) = triangles.get(k) {
             inside = substituted(r, inside);
         }
@@ -112,7 +120,7 @@ fn backwards<const D: usize>(
         let vectors = bases[k] * inside;
         covariant[k] = std::array::from_fn(|i| std::array::from_fn(|n| vectors[(n, i)]));
     }
-    covariant
+    Ok(covariant)
 }
 
 /// `r^-1 c` for upper triangular `r` and `c`.

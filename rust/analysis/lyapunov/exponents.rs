@@ -113,6 +113,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: MethodFactory<D>> BatchJob
         let norm = WithTangents(tolerance);
         let mut batch =
             LaneBatch::new(self.isa, self.orbits.family, |v| self.recipe.make(v), start(first), &norm);
+        batch.latest = time;
         // Not cloned: clones have no room beforehand.
         let mut blocks = Vec::with_capacity(R::LANES);
         blocks.resize_with(R::LANES, || BlockAverages::<N>::new(span));
@@ -175,7 +176,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: MethodFactory<D>> BatchJob
                     continue;
                 }
                 let outcome = match (failed, walled) {
-                    (true, _) => Err(batch.driver.failure_of(lane)),
+                    (true, _) => Err(batch.failure_of(lane)),
                     (_, true) => Ok(Outcome::Ejected),
                     _ => Ok(Outcome::Finished),
                 };

@@ -182,9 +182,7 @@ impl<F: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob for Collect<'_,
             for lane in over.or(R::mask(stopped)).lanes() {
                 let ended = match () {
                     () if full.lane(lane) => CrossingOutcome::Finished,
-                    () if progress.failed.lane(lane) => {
-                        CrossingOutcome::Failed(batch.driver.failure_of(lane))
-                    }
+                    () if progress.failed.lane(lane) => CrossingOutcome::Failed(batch.failure_of(lane)),
                     () if walled.lane(lane) => CrossingOutcome::Ejected,
                     () if far.lane(lane) => CrossingOutcome::Escaped,
                     () if over.lane(lane) => CrossingOutcome::TimeRanOut,
