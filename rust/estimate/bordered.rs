@@ -4,8 +4,12 @@ use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 
 use super::row_matrix::{OuterProductSum, RowMatrix, add, combine, dot, padded};
 use super::{EstimateError, Linearisation, ParameterJacobian, Record};
+use crate::analysis::batch::cancel;
 use crate::scalar::{InstructionSet, Isa, Real, Work};
 use crate::unroll::vector;
+
+/// Whether the work is to end is asked once for so many frames.
+const LOOKS: usize = 1024;
 
 /// The normal equations of the least squares. The right-hand side is the last column of the borders, and of
 /// the corner: it takes part in all that the parameters' columns do.
@@ -108,6 +112,9 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
         let (mut now, mut before) = (&mut one, &mut other);
         let mut rows = RowMatrix::zeros(M.max(D), width);
         for i in 0..n {
+            if i.is_multiple_of(LOOKS) {
+                cancel::look();
+            }
             std::mem::swap(&mut now, &mut before);
             now.fill::<V>(linear, columns, record, i);
             // By how much this frame and the one before take part in each row.
@@ -289,6 +296,9 @@ impl<const D: usize> Work for Elimination<'_, D> {
         let mut squares = OuterProductSum::new(width, -1.0);
         let mut rest = vec![0.0; D * width];
         for i in 0..n {
+            if i.is_multiple_of(LOOKS) {
+                cancel::look();
+            }
             let mut pivot = pivots[i];
             if i > 0 {
                 let link = &links[i - 1];

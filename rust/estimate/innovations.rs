@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bordered::root;
 use super::{EstimateError, Estimator, Sensor, Unknowns};
+use crate::analysis::batch::cancel;
 use crate::inverse::invert;
 use crate::model::Family;
 
@@ -30,6 +31,7 @@ where
         let mut before = [false; M];
         let mut found = vec![[f64::NAN; M]; record.t.len()];
         for (i, own) in found.iter_mut().enumerate() {
+            cancel::look();
             let root = root(&record.information[i]);
             let mut ahead = DMatrix::zeros(D + M, D + M);
             for m in 0..M {

@@ -9,6 +9,7 @@ use super::link_response::QuadraturePoints;
 use super::parameter_jacobian::{ParameterJacobian, TimeOrigin};
 use super::row_matrix::RowMatrix;
 use super::{EstimateError, Estimator, FreeParameter, Linearisation, Role, Sensor, Unknowns};
+use crate::analysis::batch::cancel;
 use crate::analysis::batch::parallel::try_map;
 use crate::model::Family;
 
@@ -44,7 +45,10 @@ where
     pub fn score(&self, point: &Unknowns<D>, candidates: &[Candidate<F>]) -> Result<Score, EstimateError> {
         let linear = self.around(point)?;
         let places = self.places(point)?;
-        let one = |candidate| self.candidate_columns(point, &places, candidate, TimeOrigin::Record);
+        let one = |candidate| {
+            cancel::look();
+            self.candidate_columns(point, &places, candidate, TimeOrigin::Record)
+        };
         let more: Vec<ParameterJacobian> = candidates.iter().map(one).collect();
         let size = more.iter().map(|own| own.seen.width()).sum();
         let columns = linear.columns.beside_all(&more);

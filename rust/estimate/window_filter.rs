@@ -5,6 +5,7 @@ use nalgebra::SMatrix;
 use super::sensor::{Moment, seen};
 use super::{EstimateError, Estimator, FilmParameters, Options, Sensor, Unknowns};
 use crate::analysis::CancelFlag;
+use crate::analysis::batch::cancel;
 use crate::analysis::batch::parallel::try_map;
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
@@ -69,6 +70,7 @@ where
             let (mut t, mut x) = (t * set.pace(), x);
             let mut expected = Vec::with_capacity(times.len());
             for &next in times {
+                cancel::look();
                 let next = next * set.pace();
                 x = propagate(system, t, next, x, &tolerance)
                     .map_err(|source| EstimateError::Integration { t, source })?;

@@ -2,14 +2,16 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
 use crate::analysis::CancelFlag;
+use crate::analysis::batch::cancel::{self, Cancelled};
 
 /// How often the calling thread looks for signals.
 const POLL: Duration = Duration::from_millis(20);
@@ -49,12 +51,12 @@ fn watch_any(
     tick: &dyn Fn() -> PyResult<()>,
     work: &mut (dyn FnMut(&CancelFlag) + Send),
 ) -> PyResult<PyResult<()>> {
-    let stop = CancelFlag::new();
+    let stop = Arc::new(CancelFlag::new());
     let done = AtomicBool::new(false);
     let caller = thread::current();
     thread::scope(|scope| {
         let worker = scope.spawn(|| {
-            let result = catch_unwind(AssertUnwindSafe(|| work(&stop)));
+            let result = catch_unwind(AssertUnwindSafe(|| cancel::under(Some(stop.clone()), || work(&stop))));
             done.store(true, Ordering::Release);
             caller.unpark();
             result
@@ -71,12 +73,22 @@ fn watch_any(
         }
         match worker.join().and_then(|inner| inner) {
             Ok(()) => Ok(signal),
+            Err(panic) if panic.is::<Cancelled>() => {
+                signal.and_then(|()| Err(PyKeyboardInterrupt::new_err(())))
+            }
             Err(panic) => {
                 let what = message(panic.as_ref());
                 Err(PyRuntimeError::new_err(format!("internal error, please report it: {what}")))
             }
         }
     })
+}
+
+/// Looks for signals every so often in a loop that keeps the interpreter lock.
+#[inline]
+pub fn poll(py: Python<'_>, count: usize) -> PyResult<()> {
+    const EVERY: usize = 1024;
+    if count % EVERY == EVERY - 1 { py.check_signals() } else { Ok(()) }
 }
 
 fn message(panic: &(dyn Any + Send)) -> &str {

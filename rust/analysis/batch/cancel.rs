@@ -1,5 +1,8 @@
 //! Asking work on other threads to end.
 
+use std::cell::RefCell;
+use std::panic;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::integrate::Failure;
@@ -23,5 +26,39 @@ impl CancelFlag {
     #[inline]
     pub fn check(&self) -> Result<(), Failure> {
         if self.0.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
+    }
+}
+
+thread_local! {
+    /// What asks the work of this thread to end.
+    static CURRENT: RefCell<Option<Arc<CancelFlag>>> = const { RefCell::new(None) };
+}
+
+/// What work that was asked to end unwinds with: nobody wants its result.
+#[derive(Debug)]
+pub struct Cancelled;
+
+/// Does work that a flag may ask to end wherever it [looks](look), on this thread.
+pub fn under<T>(flag: Option<Arc<CancelFlag>>, work: impl FnOnce() -> T) -> T {
+    struct Restored(Option<Arc<CancelFlag>>);
+    impl Drop for Restored {
+        fn drop(&mut self) {
+            CURRENT.set(self.0.take());
+        }
+    }
+    let _restored = Restored(CURRENT.replace(flag));
+    work()
+}
+
+/// The flag that the work of this thread is done under.
+pub fn current() -> Option<Arc<CancelFlag>> {
+    CURRENT.with_borrow(Clone::clone)
+}
+
+/// Ends the work of this thread, up to where it began, if it was asked to; other threads that share it look themselves.
+pub fn look() {
+    let asked = CURRENT.with_borrow(|flag| flag.as_ref().is_some_and(|flag| flag.check().is_err()));
+    if asked {
+        panic::resume_unwind(Box::new(Cancelled));
     }
 }

@@ -2,16 +2,49 @@
 //! not depend on who made it, nor on when.
 
 use std::convert::Infallible;
+use std::process;
 use std::sync::{Mutex, PoisonError};
+use std::thread;
 
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::cancel;
 
 /// Work on a part of a list, given the number of its first.
 type Parts<'a, T, E> = dyn Fn(usize, &mut [T]) -> Result<(), E> + Sync + 'a;
 
 /// Parts for each thread: not all take equally long.
 const PARTS: usize = 8;
+/// A part has no more than so many: whoever asks the work to end waits for one.
+const MOST_IN_PART: usize = 4096;
+
+/// The threads that share the parts of all lists, and the process that they belong to.
+///
+/// A process that was forked has none of its parent's threads: work that was given to them would never be done.
+static POOL: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
+
+/// This process's threads, one for each core; none where none can be had.
+///
+/// Nobody waits for the lock: a fork may have left it locked by a thread that is not there.
+fn pool() -> Option<&'static ThreadPool> {
+    let mut kept = (0..MOST_TRIALS).find_map(|_| POOL.try_lock().map_err(|_| thread::yield_now()).ok())?;
+    if let Some((_, pool)) = kept.filter(|(process, _)| *process == process::id()) {
+        return Some(pool);
+    }
+    // It lives as long as the process; that of a parent cannot be dropped, which would wait for its threads.
+    let fresh = Box::leak(Box::new(ThreadPoolBuilder::new().build().ok()?));
+    *kept = Some((process::id(), fresh));
+    Some(fresh)
+}
+
+/// Locks are held for so short a time that one of so many trials succeeds.
+const MOST_TRIALS: usize = 1000;
+
+/// How many threads work on the parts of a list.
+pub fn threads() -> usize {
+    pool().map_or(1, ThreadPool::current_num_threads)
+}
 
 /// Runs the work on so many threads at once.
 pub fn on_threads(threads: usize, work: &(dyn Fn() + Sync)) {
@@ -26,7 +59,17 @@ pub fn on_threads(threads: usize, work: &(dyn Fn() + Sync)) {
 }
 
 fn each_index(count: usize, work: &(dyn Fn(usize) + Sync)) {
-    (0..count).into_par_iter().for_each(work);
+    let flag = cancel::current();
+    let one = |k| {
+        if flag.as_ref().is_none_or(|flag| flag.check().is_ok()) {
+            cancel::under(flag.clone(), || work(k));
+        }
+    };
+    match pool() {
+        Some(pool) => pool.install(|| (0..count).into_par_iter().for_each(one)),
+        None => (0..count).for_each(one),
+    }
+    cancel::look();
 }
 
 /// Works on a list in parts of at least so many in a row, given the number of a part's first.
@@ -43,7 +86,7 @@ pub fn in_parts<T: Send>(list: &mut [T], least: usize, work: &(dyn Fn(usize, &mu
 /// # Errors
 /// That of the first part that fails, which is to be that of the first in it.
 pub fn try_in_parts<T: Send, E: Send>(list: &mut [T], least: usize, work: &Parts<'_, T, E>) -> Result<(), E> {
-    let size = list.len().div_ceil(PARTS * rayon::current_num_threads()).max(least).max(1);
+    let size = list.len().div_ceil(PARTS * threads()).min(MOST_IN_PART).max(least).max(1);
     let mut parts = Vec::with_capacity(list.len().div_ceil(size));
     for part in list.chunks_mut(size) {
         parts.push(Mutex::new(part));

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::analysis::CancelFlag;
-use crate::analysis::batch::parallel::on_threads;
+use crate::analysis::batch::parallel::{self, on_threads};
 use crate::scalar::{InstructionSet, Isa, LANES, Packet, Real, Work};
 
 /// Jobs numbered from 0, each taken once, or some of them.
@@ -193,9 +193,11 @@ fn spread<Y: Send>(
     all.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
+const MOST_THREADS: usize = 1024;
+
 /// How many threads so many jobs are worth, where so many are wanted.
 fn threads(jobs: usize, wanted: usize) -> usize {
-    let threads = if wanted == 0 { rayon::current_num_threads() } else { wanted };
-    // One packet's worth of jobs is the least that a thread is worth.
-    threads.min(jobs.div_ceil(LANES)).max(1)
+    let threads = if wanted == 0 { parallel::threads() } else { wanted };
+    // One packet's worth of jobs is the least that a thread is worth; more threads than these are no faster anywhere.
+    threads.min(jobs.div_ceil(LANES)).clamp(1, MOST_THREADS)
 }
