@@ -50,6 +50,7 @@ class _Orbits(TypedDict):
     product: _Floats
     end: _Floats
     outcome: NDArray[np.uint8]
+    failure: str | None
 
 class _Frames(TypedDict):
     states: _Floats
@@ -147,6 +148,7 @@ def align_marks(
     tuple[list[float], list[list[float]], list[list[float]], list[float]] | None,
     float,
 ]: ...
+def require_memory(what: str, bytes: float) -> None: ...
 def formula_bodies(name: str, spec: tuple[str, str, list[str], list[str]]) -> list[str]: ...
 def formula_operations(
     text: str, variables: list[str], parameters: list[str] = ...

@@ -1,10 +1,10 @@
 //! `udd.ensemble`.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
-use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::errors::{room_for, short_of};
 use super::jobs::{self, Batch, outcome_code};
 use super::model::with_wide_model;
 use super::simulate::stepper;
@@ -26,12 +26,12 @@ impl Table {
         let mut table =
             Self { times, states: Vec::new(), end: Vec::new(), t_end: Vec::new(), outcome: Vec::new() };
         let numbers = runs.saturating_mul(times).saturating_mul(dimension);
-        memory::reserve(&mut table.states, numbers).then_some(table).ok_or_else(|| {
-            let gigabytes = numbers as f64 * 8e-9;
-            PyMemoryError::new_err(format!(
-                "{runs} runs of {times} states take {gigabytes:.3} GB, for which there is no room"
-            ))
-        })
+        let what = format!("{runs} runs of {times} states");
+        // In this table, and run by run before.
+        room_for(&what, numbers as f64 * 8.0)?;
+        room_for(&what, numbers as f64 * 16.0)?;
+        memory::reserve(&mut table.states, numbers).map_err(|shortage| short_of(&what, shortage))?;
+        Ok(table)
     }
 
     /// The states that a run met, one after the other, and its end.

@@ -10,6 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::errors::room_for;
 use super::jobs;
 use super::linearisation_cache::Linearised;
 use super::model::AnyModel;
@@ -220,6 +221,9 @@ where
     asked.check((d, m), (values.len(), C::PARAMETERS.len()))?;
     let mut record = Record::default();
     if let Some(data) = asked.data {
+        // Two linearisations with their columns, the normal equations, and covariances of the states.
+        let numbers = 8 * D * D + 4 * (D + M) * (asked.free.len() + 8);
+        room_for(&format!("{} frames", data.t.len()), data.t.len() as f64 * numbers as f64 * 8.0)?;
         (record.t, record.linked, record.film) = (data.t.clone(), data.linked.clone(), data.film.clone());
         record.memory[..m].copy_from_slice(&data.autocorrelation);
         record.seen = padded(&data.seen.numbers, m).into_iter().map(SVector::from).collect();

@@ -4,6 +4,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::errors::room_for;
 use super::interrupt;
 use super::jobs::{self, Batch, outcome_code};
 use super::model::{AnyModel, state, with_wide_model};
@@ -25,6 +26,8 @@ struct Table {
     product: Vec<f64>,
     end: Vec<f64>,
     outcome: Vec<u8>,
+    /// Why the first orbit that failed did so.
+    failure: Option<String>,
 }
 
 /// What one orbit puts into the columns.
@@ -66,6 +69,9 @@ fn collect<const D: usize, const N: usize>(orbits: &[Option<Exponents<D, N>>]) -
     let mut table = Table::default();
     let lost = [[f64::NAN; D]; D];
     for orbit in orbits {
+        if let (None, Some(Err(failure))) = (&table.failure, orbit.as_ref().map(|orbit| orbit.outcome)) {
+            table.failure = Some(failure.to_string());
+        }
         table.push(&match orbit {
             Some(orbit) => Row {
                 value: &orbit.exponents.value,
@@ -109,6 +115,9 @@ fn lyapunov<'py>(
         jobs::agree(rows.len(), starts.len())?;
         let orbits = Lyapunov { family, values: &rows, starts: &starts, options };
         let dimension = starts[0].len();
+        // Averages of states and their products, orbit by orbit and then in columns.
+        let (orbits_wanted, numbers) = (rows.len().max(starts.len()), dimension * (dimension + 4) + 4);
+        room_for(&format!("{orbits_wanted} orbits"), orbits_wanted as f64 * numbers as f64 * 16.0)?;
         let (table, signal) = jobs.watch(py, |context| table(&orbits, all, context))?;
         (table, dimension, signal)
     });
@@ -132,6 +141,7 @@ fn lyapunov<'py>(
     dict.set_item("product", PyArray1::from_vec(py, product).reshape([count, live, live])?)?;
     dict.set_item("end", wide(table.end, live)?)?;
     dict.set_item("outcome", PyArray1::from_vec(py, table.outcome))?;
+    dict.set_item("failure", table.failure)?;
     Ok(dict)
 }
 
@@ -150,6 +160,9 @@ fn frames<'py>(
     let tolerance = Tolerance { rtol, atol };
     let (states, growth, covariant, dimension) = with_wide_model!(packets: &model, |family, values| {
         let x0 = state(&state0, family.idle())?;
+        // States and growth, three matrices on the way and what is made of them.
+        let numbers = x0.len() as f64 * (3.0 + 4.0 * x0.len() as f64);
+        room_for(&format!("{count} intervals"), (count as f64 + 1.0) * numbers * 8.0)?;
         let found = interrupt::run(py, |stop| follow(family, values, x0, (dt, count), &tolerance, stop))?;
         let flat = found.covariant.as_flattened().as_flattened().to_vec();
         (found.states.into_flattened(), found.growth.into_flattened(), flat, x0.len())

@@ -6,7 +6,8 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 
-use super::errors::ModelError;
+use super::errors::{ModelError, room_for};
+use super::interrupt;
 use crate::analysis::batch::rows::tape;
 use crate::estimate::{FormulaSensor, Moment, Sensor, seen};
 use crate::formula::{Names, is_reserved};
@@ -539,6 +540,7 @@ fn rates<'py>(
     states: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     fn all<F: Family<D>, const D: usize>(
+        py: Python<'_>,
         family: &F,
         values: &[f64],
         t: &[f64],
@@ -551,8 +553,10 @@ fn rates<'py>(
             return Err(ModelError::new_err(message));
         }
         let system = family.build(values);
+        room_for(&format!("the rates of {} states", t.len()), flat.len() as f64 * 8.0)?;
         let mut out = Vec::with_capacity(flat.len());
-        for (&t, x) in t.iter().zip(flat.chunks_exact(live)) {
+        for (i, (&t, x)) in t.iter().zip(flat.chunks_exact(live)).enumerate() {
+            interrupt::poll(py, i)?;
             let x = state(x, family.idle())?;
             out.extend_from_slice(&system.rates(t, &x, &sides_of(&system, t, &x))[..live]);
         }
@@ -560,7 +564,7 @@ fn rates<'py>(
     }
     let parsed = AnyModel::from_python(model)?;
     let (t, states) = (t.as_slice()?, states.as_slice()?);
-    let out = with_model!(&parsed, |family, values| all(family, values, t, states))?;
+    let out = with_model!(&parsed, |family, values| all(model.py(), family, values, t, states))?;
     Ok(PyArray1::from_vec(model.py(), out))
 }
 
@@ -576,8 +580,11 @@ fn observed<'py>(
     let family = parsed.widest().ok_or_else(|| ModelError::new_err("a udd.Model is needed"))?;
     let (system, live) = (family.build(values), family.states().len());
     let sensor = FormulaSensor::of(&family);
-    let mut out = Vec::with_capacity(t.len() * sensor.channels());
-    for (&t, row) in t.iter().zip(flat.chunks_exact(live)) {
+    let numbers = t.len() * sensor.channels();
+    room_for(&format!("the channels of {} frames", t.len()), numbers as f64 * 8.0)?;
+    let mut out = Vec::with_capacity(numbers);
+    for (i, (&t, row)) in t.iter().zip(flat.chunks_exact(live)).enumerate() {
+        interrupt::poll(model.py(), i)?;
         let mut x = [0.0; MAX_STATES];
         x[..live].copy_from_slice(row);
         let rate = system.rates(t, &x, &sides_of(&system, t, &x));

@@ -1,11 +1,10 @@
 //! `udd.poincare`, and what is built upon it.
 
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::errors::ModelError;
+use super::errors::{ModelError, room_for, short_of};
 use super::jobs::{self, Batch};
 use super::model::with_wide_model;
 use crate::analysis::{CrossingOutcome, Crossings, ExecutionContext, Section, SectionRun};
@@ -63,14 +62,16 @@ impl Table {
             outcome: Vec::new(),
         };
         let points = rows.saturating_mul(count);
-        let room = memory::reserve(&mut table.points, points.saturating_mul(dimension))
-            && memory::reserve(&mut table.t, points)
-            && memory::reserve(&mut table.which, points);
-        room.then_some(table).ok_or_else(|| {
-            let gigabytes = points as f64 * (8.0 * (dimension + 1) as f64 + 1.0) * 1e-9;
-            let message = format!("{points} points take {gigabytes:.3} GB, for which there is no room");
-            PyMemoryError::new_err(message)
-        })
+        let bytes = rows as f64 * count as f64 * (8.0 * (dimension + 1) as f64 + 1.0);
+        let what = format!("{points} points");
+        // In this table, and trajectory by trajectory before.
+        room_for(&what, bytes)?;
+        room_for(&what, 2.0 * bytes)?;
+        memory::reserve(&mut table.points, points.saturating_mul(dimension))
+            .and_then(|()| memory::reserve(&mut table.t, points))
+            .and_then(|()| memory::reserve(&mut table.which, points))
+            .map_err(|shortage| short_of(&what, shortage))?;
+        Ok(table)
     }
 
     /// The points of a trajectory: where, when, and of which surface; then its end, and how large the surfaces'

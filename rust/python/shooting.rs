@@ -5,7 +5,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyRead
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::errors::ModelError;
+use super::errors::{ModelError, room_for};
 use super::interrupt;
 use super::jobs;
 use super::model::{AnyModel, state, with_model, with_wide_model};
@@ -45,6 +45,9 @@ fn shoot<'py>(
         if [rows.len(), t.len(), spans.len()] != [starts.len(); 3] {
             return Err(ModelError::new_err("pieces need as many parameters, times and spans as starts"));
         }
+        // Pieces, their ends with derivatives, and these in columns.
+        let numbers = starts[0].len() * (starts[0].len() + 2 + MOST_PARAMETERS) + model.values().len();
+        room_for(&format!("{} pieces", starts.len()), starts.len() as f64 * numbers as f64 * 24.0)?;
         let mut list = Vec::with_capacity(starts.len());
         for (i, values) in rows.into_iter().enumerate() {
             list.push(Segment { values, t: t[i], x: starts[i], span: spans[i] });

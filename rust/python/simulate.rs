@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::errors::{IntegrationError, ModelError};
+use super::errors::{IntegrationError, ModelError, room_for};
 use super::interrupt;
 use super::jobs;
 use super::model::{AnyModel, state, with_model};
@@ -33,6 +33,8 @@ struct Flat {
 /// A run as a function of time.
 trait Piecewise: Send + Sync {
     fn span(&self) -> (f64, f64);
+    /// The number of states that are not idle.
+    fn dimension(&self) -> usize;
     /// Appends the state at `t`; false outside the run.
     fn append(&self, t: f64, out: &mut Vec<f64>) -> bool;
 }
@@ -46,6 +48,9 @@ struct Recorded<const D: usize> {
 impl<const D: usize> Piecewise for Recorded<D> {
     fn span(&self) -> (f64, f64) {
         self.record.span()
+    }
+    fn dimension(&self) -> usize {
+        D - self.idle
     }
     fn append(&self, t: f64, out: &mut Vec<f64>) -> bool {
         self.record.at(t).map(|x| out.extend_from_slice(&x[..D - self.idle])).is_some()
@@ -165,8 +170,12 @@ impl Dense {
         py: Python<'py>,
         t: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let mut out = Vec::new();
-        for &t in t.as_slice()? {
+        let times = t.as_slice()?;
+        let what = format!("the states at {} times", times.len());
+        room_for(&what, (times.len() * self.0.dimension()) as f64 * 8.0)?;
+        let mut out = Vec::with_capacity(times.len() * self.0.dimension());
+        for (i, &t) in times.iter().enumerate() {
+            interrupt::poll(py, i)?;
             if !self.0.append(t, &mut out) {
                 let (first, last) = self.0.span();
                 let message = format!("t = {t} lies outside the run, which goes from {first} to {last}");
@@ -203,7 +212,13 @@ fn simulate<'py>(
         Some(t) if !told.replace(true) => stiff(py, method, t),
         _ => Ok(()),
     };
-    let times: Option<Vec<f64>> = times.map(|t| t.as_slice().map(<[f64]>::to_vec)).transpose()?;
+    let times = times.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
+    if let Some(times) = times {
+        // Times and states here, and what is made of them.
+        let numbers = times.len() as f64 * (2.0 + 3.0 * state0.len() as f64);
+        room_for(&format!("the states at {} times", times.len()), numbers * 8.0)?;
+    }
+    let times = times.map(<[f64]>::to_vec);
     let output = times.as_deref().map_or(Output::Steps(0.0, end), Output::At);
     let flat = with_model!(&model, |family, values| {
         let x0 = state(&state0, family.idle())?;

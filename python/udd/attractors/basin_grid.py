@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from math import prod
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
+from udd._util.memory import require_memory
 from udd._util.validation import whole
 from udd.errors import ModelError, interrupted
 from udd.models import Model
@@ -166,8 +168,12 @@ def basins(
     for k, name in enumerate(model.state_names):
         if name not in axes:
             attrs[f"start_{name}"] = float(starts[0, k])
-    data, coords = _arrays(samples, axes)
-    made: xr.Dataset = xarray.Dataset(data, coords, {**attrs, "grid": " ".join(axes)})
+
+    def made() -> xr.Dataset:
+        data, coords = _arrays(samples, axes)
+        dataset: xr.Dataset = xarray.Dataset(data, coords, {**attrs, "grid": " ".join(axes)})
+        return dataset
+
     if stopped:
         left = int((samples.outcome == INTERRUPTED).sum())
         message = (
@@ -176,7 +182,7 @@ def basins(
             else "stopped by Ctrl-C before the aperiodic motions were followed further"
         )
         interrupted(made, message, chosen["partial"])
-    return made
+    return made()
 
 
 def _starts(
@@ -194,6 +200,10 @@ def _starts(
         if name not in model.state_names:
             raise ModelError(f"the state has no {name!r}; it has {', '.join(model.state_names)}")
     axes = {name: increasing(name, values) for name, values in grid.items()}
+    sizes = [len(values) for values in axes.values()]
+    cells = prod(sizes)
+    # The states and the grid, and what is known of each.
+    require_memory(f"{cells} initial states", cells, 2 * len(base[0]) + len(sizes) + 8, itemsize=8)
     mesh = np.meshgrid(*axes.values(), indexing="ij")
     starts = np.tile(base[0], (mesh[0].size, 1))
     for name, values in zip(axes, mesh, strict=True):

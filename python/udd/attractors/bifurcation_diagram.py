@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from math import prod
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
+from udd._util.memory import require_memory
 from udd._util.validation import number, whole
 from udd.chaos.recurrence import SETTLING
 from udd.errors import ModelError, interrupted
@@ -178,6 +180,7 @@ def bifurcation(
     begin = start_states(model, initial_states)
     middle = model.with_parameters({parameter: float(axis[len(axis) // 2])})
     shape = (len(PATHS[path]), len(begin), len(axis))
+    require_memory(f"{n} points of each of {prod(shape)} jobs", *shape, n, len(begin[0]) + 1, itemsize=16)
     places = np.arange(np.prod(shape)).reshape(shape)
     of_job = np.broadcast_to(axis, shape).ravel()
     rows = parameter_rows(model, {parameter: of_job}, places.size)
@@ -247,7 +250,7 @@ def bifurcation(
     if stopped:
         left = int((found.outcome == INTERRUPTED).sum())
         missing = f"{left} of {places.size} runs are" if left else "telling the attractors apart is"
-        interrupted(made, f"{missing} not finished: stopped by Ctrl-C", partial)
+        interrupted(lambda: made, f"{missing} not finished: stopped by Ctrl-C", partial)
     return made
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.memory import require_memory
 from udd.models import Model
 from udd.models.parameter_batch import outside_domain
 from udd.models.state_scaling import Floats
@@ -70,6 +71,9 @@ class SectionRunner:
         """
         outside = outside_domain(self.model, values, starts)
         jobs = len(starts)
+        require_memory(
+            f"{count} points of each of {jobs} runs", jobs, count, starts.shape[1] + 1, itemsize=16
+        )
         found = Crossings(
             np.full((jobs, count, starts.shape[1]), np.nan),
             np.full((jobs, count), np.nan),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.memory import require_memory
 from udd.models.state_scaling import Floats
 from udd.simulation.outcomes import OUTCOMES
 
@@ -21,6 +22,7 @@ _GOES_ON = [OUTCOMES.index("finished"), OUTCOMES.index("time ran out"), UNDECIDE
 
 def nothing(jobs: int, n: int, dim: int) -> Crossings:
     """Before the work: nothing is there, as after Ctrl-C."""
+    require_memory(f"{n} points of each of {jobs} jobs", jobs, (n + 1) * (dim + 1), itemsize=8)
     return Crossings(
         np.full((jobs, n, dim), np.nan),
         np.full((jobs, n), np.nan),

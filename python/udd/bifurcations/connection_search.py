@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from udd._util.keywords import renamed
+from udd._util.memory import require_memory
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
 from udd.models import Model, beyond_the_edge
@@ -135,7 +136,9 @@ def connections(
     low, high = bounds_of(bounds)
     if not np.isfinite([low, high]).all():
         raise ModelError(f"the bounds must be finite, not {low:g} and {high:g}")
-    grid = np.linspace(low, high, whole("n", n, 2))
+    n = whole("n", n, 2)
+    require_memory(f"{n} values of a parameter", n, itemsize=1000)  # a model and its course for each
+    grid = np.linspace(low, high, n)
     start = beyond_the_edge(model).with_parameters({parameter: float(np.median(grid))})
     there = equilibria(start)
     flow = flow_of(start, _extent(start, [rest.state for rest in there]))

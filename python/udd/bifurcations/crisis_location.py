@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from udd._util.memory import require_memory
 from udd._util.validation import whole
 from udd.errors import IncompleteWarning, IntegrationError, ModelError
 
@@ -145,6 +146,7 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     """
     cycles_of(branch)
     count, rounds = whole("n", n, 10), whole("depth", depth, 5)
+    require_memory(f"{count} orbits of {rounds} rounds", count, rounds, 8, itemsize=8)
     found = [one for side in (1.0, -1.0) for one in _Search(branch, side, count, rounds).crises()]
     distinct: list[Crisis] = []
     for one in sorted(found, key=lambda one: one.value):

@@ -10,6 +10,7 @@ from scipy import optimize
 from scipy.stats import qmc
 
 from udd._util.keywords import renamed
+from udd._util.memory import require_memory
 from udd._util.validation import array, whole
 from udd.errors import ModelError
 from udd.models import Model, require_model
@@ -87,8 +88,9 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     given = np.zeros((0, dim)) if near is None else np.atleast_2d(array("near", near))
     if given.ndim != 2 or given.shape[1] != dim:
         raise ModelError(f"near must be states of {dim} components, not of shape {given.shape}")
-    flow = flow_of(model, given if len(given) else np.ones((1, dim)))
     count = max(whole("initial_states", initial_states, 1), len(_REACHES))
+    require_memory(f"{count} initial states", count, 200 + 32 * dim, itemsize=1)
+    flow = flow_of(model, given if len(given) else np.ones((1, dim)))
     found = _search(flow, flow.reduced(given), count)
     rests = [equilibrium_at(flow, flow.values, x) for x in found]
     rests.sort(key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))

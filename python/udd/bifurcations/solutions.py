@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.memory import require_memory
+from udd._util.validation import whole
 from udd.models import Model, beyond_the_edge
 
 from .flow_map import Floats
@@ -154,6 +156,8 @@ class PeriodicOrbit:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
         from udd.simulation.trajectory import simulate
 
+        n = whole("n", n, 1)
+        require_memory(f"the states at {n} times", n, itemsize=8)
         times = np.linspace(0.0, self.period, n + 1)
         tight: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "method": "auto"} | options
         return simulate(beyond_the_edge(self.model), times, self.state, **tight)

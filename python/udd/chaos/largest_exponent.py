@@ -198,7 +198,7 @@ def lyapunov(
             if not done.all():
                 outcomes += found["outcome"][~done].tolist()
     if outcomes:
-        _tell(outcomes, n, shape == ())
+        _tell(outcomes, n, shape == (), found["failure"])
     if missed:
         which = "the exponent has" if shape == () else f"{missed} of {n} exponents have"
         warnings.warn(
@@ -220,12 +220,12 @@ PORTION = 1 << 10
 """So many orbits are handed to the core at a time."""
 
 
-def _tell(outcomes: list[int], n: int, single: bool) -> None:
+def _tell(outcomes: list[int], n: int, single: bool, failure: str | None) -> None:
     """Says what became of the orbits that have no exponent."""
     counts = {OUTCOMES[code]: outcomes.count(code) for code in sorted(set(outcomes))}
     if single:
         (outcome,) = counts
-        raise IntegrationError(f"there is no exponent: {reason(outcome)}")
+        raise IntegrationError(f"there is no exponent: {reason(outcome, failure)}")
     list_ = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
     warnings.warn(
         f"{len(outcomes)} of {n} orbits have no exponent ({list_}) and are NaN",
@@ -234,11 +234,11 @@ def _tell(outcomes: list[int], n: int, single: bool) -> None:
     )
 
 
-def reason(outcome: str) -> str:
-    """Why a run that ended so has no exponents."""
+def reason(outcome: str, failure: str | None) -> str:
+    """Why a run that ended so, by this failure, has no exponents."""
     reasons = {
         "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
-        "failed": "the solution blew up",
+        "failed": failure or "the solution blew up",
     }
     return reasons.get(outcome, outcome)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.memory import require_memory
 from udd._util.validation import number, whole
 from udd.errors import ConvergenceWarning, IntegrationError
 from udd.models import DLE, Model, require_model
@@ -147,6 +148,7 @@ def lyapunov_spectrum(
     IntegrationError
         The disk leaves the wheels (use ``edge="ignore"``), or the rates cease to be defined. An orbit that
         goes to infinity has the verdict "escapes"; its exponents are NaN if it does so in the transient.
+        An orbit that turns or grows ever faster, so that the run would hardly end, is refused.
 
     Warns
     -----
@@ -330,7 +332,7 @@ class _Run(Orbit):
         far = np.abs(end) > _FAR * np.maximum(1.0, np.abs(start))
         if outcome == FAILED and (far & plain).any():
             return found, Fate("escapes", np.nan, end, 0.0)
-        raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome])}")
+        raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome], found['failure'])}")
 
     def refuse(self, section: str | Sequence[str], start: _Floats) -> None:
         """Refuse a surface that cannot be used, before the long run."""
@@ -443,6 +445,8 @@ def covariant_vectors(
         Options that cannot be used.
     IntegrationError
         The disk leaves the wheels, the solution blows up, or a direction dies out where a contact sticks.
+    MemoryError
+        There is no room for so many intervals: `n` of them and twice the `transient`, each of length `dt`.
 
     Notes
     -----
@@ -468,6 +472,10 @@ def covariant_vectors(
     aside = number("transient", 200.0 * time_scale if transient is None else transient, least=0.0)
     rtol, atol = tolerances(rtol, atol)
     start = initial_state(model, default_state(model) if state0 is None else state0)
+    count = n + 2.0 * aside / step  # infinite where dt is tiny
+    require_memory(
+        f"{count:.6g} intervals", int(min(count, 1e300)), itemsize=8 * len(start) * (4 * len(start) + 3)
+    )
     extra = int(np.ceil(aside / step))
     found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol)
     kept = slice(extra, extra + n + 1)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._util.keywords import renamed, with_defaults
+from udd._util.memory import require_memory
 from udd._util.random_generator import Rng, generator
 from udd.errors import UddError
 from udd.measurement import Measurement
@@ -202,6 +203,7 @@ def frame_times(t: Array, camera: Camera, after: float = 0.0) -> Array:
     n = math.floor((t[-1] + after - t[0] - camera.exposure / 2) * camera.rate + 1e-6) + 1
     if n < 1:
         raise UddError(f"the trajectory lasts {t[-1] - t[0]:.3g} s, which is shorter than one exposure")
+    require_memory(f"the stamps of {n} frames", n, itemsize=32)
     return np.arange(n) / float(camera.rate)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._util.angles import wrapped
 from udd._util.keywords import renamed
+from udd._util.memory import require_memory
 from udd._util.progress import thread_count
 from udd._util.random_generator import Rng, generator
 from udd._util.validation import array, number
@@ -313,6 +314,7 @@ def _options(members: int, level: float) -> tuple[int, float]:
         raise ModelError(f"level must be below 1, not {share:g}")
     if isinstance(members, bool) or not isinstance(members, (int, np.integer)) or members < 2:
         raise ModelError(f"members must be a whole number from 2 on, not {members!r}")
+    require_memory(f"{members} members", int(members), itemsize=10_000)
     return int(members), share
 
 
@@ -433,6 +435,7 @@ def _runs(
     n, d = states.shape
     rows = np.array([list(model.parameters.values()) for model in models])
     method = method_for(models[0], "auto", _RTOL)
+    require_memory(f"{len(t)} states of each of {n} members", n, len(t), d, itemsize=16)
     result = np.full((n, len(t), d), np.nan)
     result[:, 0] = states
     alive = _between_wheels(models[0], states)

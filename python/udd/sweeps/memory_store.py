@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from udd._util.memory import require_memory
 
 from .chunks import (
     Grid,
@@ -33,6 +36,11 @@ class Memory:
 
     def __init__(self, spec: SweepSpec, grid: Grid, threads: int) -> None:
         self._spec, self._grid, self._threads = spec, grid, threads
+        for v in variables_of(spec):
+            shape = (*grid.shape, *(n for _, n in v.more))
+            require_memory(
+                f"the results of {prod(grid.shape)} runs", *shape, itemsize=np.dtype(v.dtype).itemsize
+            )
         self._done = np.zeros(len(grid), dtype=bool)
         self._arrays: Found = {
             v.name: np.full((*grid.shape, *(n for _, n in v.more)), fill_of(v), dtype=v.dtype)

@@ -1,0 +1,34 @@
+"""Memory is asked for before it is taken: a process that takes more than there is ends without a word."""
+
+from __future__ import annotations
+
+from math import prod
+
+from udd import _core
+
+_MOST = 10**300  # as a float
+
+
+def require_memory(what: str, *counts: int, itemsize: int = 8) -> None:
+    """Refuse an array that does not fit into free memory.
+
+    Parameters
+    ----------
+    what : str
+        What it holds, in the plural, for the message: ``"10 runs"``.
+    *counts : int
+        Its shape.
+    itemsize : int
+        Bytes of an element, and of what is made of it meanwhile.
+
+    Raises
+    ------
+    MemoryError
+        There is no room for it.
+
+    Examples
+    --------
+    >>> from udd._util.memory import require_memory
+    >>> require_memory("3 states", 3, 4)
+    """
+    _core.require_memory(what, float(min(prod(counts) * itemsize, _MOST)))

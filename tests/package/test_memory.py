@@ -1,0 +1,58 @@
+"""What does not fit into memory is refused with MemoryError and one sentence, before it is taken."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from own_process import output_of
+from udd import _core
+
+# Each runs in a process with little room: where it is not refused it is killed, and nothing else is.
+CASES = {
+    "intervals": "udd.covariant_vectors(udd.DLE(1.0), 20, dt=1e-10, transient=5.0)",
+    "tiny intervals": "udd.covariant_vectors(udd.DLE(1.0), 20, dt=1e-320)",
+    "many intervals": "udd.covariant_vectors(udd.DLE(1.0), 2**60)",
+    "searched states": "udd.equilibria(udd.DLE(1.0), initial_states=2**53 + 1)",
+    "values of a parameter": "udd.connections(udd.DLE(4.0, B=0.2), 'w', (4.0, 4.5), n=2**50)",
+    "section points": "udd.poincare(udd.DLE(1.0), n=10**12)",
+    "points of a diagram": "udd.bifurcation(udd.DLE(1.0), 'w', [1.0, 2.0], n=10**12)",
+    "cells of a basin": "udd.basins(udd.DLE(6.2), {a: np.arange(1e4) for a in ('omega', 'y', 'z')})",
+    "followed basins": "udd.basins(udd.DLE(6.2), {'z': [0.0, 1.0]}, n=10**12)",
+    "runs of a sweep": (
+        "udd.sweep(udd.SweepSpec('outcome', udd.DLE(1.0),"
+        " {a: np.linspace(1, 2, 10**5) for a in ('w', 'omega')}, [1, 1, 1], {'t': 1.0}))"
+    ),
+    "times": "udd.simulate(udd.DLE(1.0), np.arange(5e7), [1, 1, 1])",
+    "runs": "udd.ensemble(udd.DLE(1.0), np.arange(10_000), np.ones((100_000, 3)))",
+    "times of a cycle": "udd.periodic_orbit(udd.DLE(9.0)).trajectory(10**12)",
+}
+
+CODE = """
+import resource
+import numpy as np, udd
+resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
+try:
+    {call}
+except MemoryError as error:
+    print(error)
+print(udd.simulate(udd.DLE(1.0), 1.0, [1, 1, 1]).outcome)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit of memory for a process of its own")
+@pytest.mark.parametrize("name", CASES)
+def test_results_that_do_not_fit_into_memory_are_refused(name: str) -> None:
+    message, after = output_of(CODE.format(call=CASES[name]), 60.0).splitlines()
+    assert "GB" in message and len(message) <= 300, message
+    assert after == "finished"
+
+
+def test_what_fits_is_not_refused() -> None:
+    _core.require_memory("numbers", 1e6)
+    with pytest.raises(MemoryError, match=r"^9 grids take 7200\.000 GB, .* no room: .* free\."):
+        _core.require_memory("9 grids", 7.2e12)
+    for bytes_ in (float("inf"), 1e300):
+        with pytest.raises(MemoryError):
+            _core.require_memory("grids", bytes_)
