@@ -5,7 +5,7 @@ use std::fs;
 /// Less than this needs no question.
 const SMALL: f64 = (64 << 20) as f64;
 
-/// What so many things would take, in bytes, and what there is. A sentence begins with the things.
+/// The bytes that some things would take, and the free ones. The message follows the name of the things.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "take {} GB, for which there is no room: {} GB are free. Ask for less at once",

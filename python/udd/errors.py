@@ -98,7 +98,7 @@ class Interrupted(KeyboardInterrupt):
 
     @cached_property
     def partial(self) -> Any:
-        """What the function returns, as far as it came: NaN and the outcome "interrupted" elsewhere."""
+        """The finished part of the function's result: NaN and the outcome "interrupted" elsewhere."""
         return self._build()
 
 

@@ -195,7 +195,7 @@ impl<const D: usize> Method<f64, D> for Rodas<'_, D> {
         self.h = h;
         self.powers = [[0.0; D]; 5];
         self.powers[0] = at.x;
-        // So short a step, as the end of a run may leave, moves no state by as much as any tolerance.
+        // A step of less than 1e-307, as the end of a run may leave, changes no state by more than a tolerance.
         if (GAMMA * h).recip().is_infinite() {
             return Trial { x: at.x, size: h, error: 0.0 };
         }

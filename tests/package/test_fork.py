@@ -1,4 +1,4 @@
-"""Whatever works on several threads works in a process that was forked after it."""
+"""Functions that use several threads work in a process that was forked after them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does not fit into memory is refused with MemoryError and one sentence, before it is taken."""
+"""Results that do not fit into memory are refused beforehand, by MemoryError with one sentence."""
 
 from __future__ import annotations
 

@@ -30,11 +30,11 @@ impl CancelFlag {
 }
 
 thread_local! {
-    /// What asks the work of this thread to end.
+    /// The flag that asks the work of this thread to end.
     static CURRENT: RefCell<Option<Arc<CancelFlag>>> = const { RefCell::new(None) };
 }
 
-/// What work that was asked to end unwinds with: nobody wants its result.
+/// The payload of the unwinding of cancelled work, whose result nobody uses.
 #[derive(Debug)]
 pub struct Cancelled;
 

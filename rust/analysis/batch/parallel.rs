@@ -38,7 +38,7 @@ fn pool() -> Option<&'static ThreadPool> {
     Some(fresh)
 }
 
-/// Locks are held for so short a time that one of so many trials succeeds.
+/// The lock is taken for microseconds: one of so many trials succeeds.
 const MOST_TRIALS: usize = 1000;
 
 /// How many threads work on the parts of a list.

@@ -9,7 +9,7 @@ const SHORTER: f64 = 100.0;
 /// A run that needs so many more steps, all of them short, takes a quarter of an hour at least.
 const MOST: f64 = 1e9;
 
-/// What is known of the length of a run's steps.
+/// The length of a run's steps, at the start and lately.
 ///
 /// A solution that turns or grows ever faster never reaches a pole, where a step would fail: its steps only get shorter.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
-//! What is left of an angle far from zero once all right angles are taken away.
+//! The reduction of angles far from zero by right angles.
 
 use std::f64::consts::FRAC_PI_2;
 
-/// The binary digits of 2/pi, with 64 zeros before the point (mpmath and an integer series agree on them).
+/// The binary digits of 2/pi, with 64 zeros before the point (from an integer series; mpmath agrees).
 const TURNS: [u64; 21] = [
     0x0000000000000000,
     0xa2f9836e4e441529,
@@ -27,7 +27,7 @@ const TURNS: [u64; 21] = [
     0xf0cfbc209af4361d,
 ];
 
-/// What `FRAC_PI_2` leaves off pi/2.
+/// The rounding error of `FRAC_PI_2`.
 const REST: f64 = 6.123233995736766e-17;
 
 /// The number of right angles nearest to `x`, modulo 4, and what is left, as a sum of two numbers; `|x| >= 1`.
