@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 
 import pytest
 
+import udd
 from own_process import output_of
 from udd import _core
+from udd.errors import ModelError
 
 # Each runs in a process with little room: where it is not refused it is killed, and nothing else is.
 CASES = {
@@ -56,3 +59,18 @@ def test_what_fits_is_not_refused() -> None:
     for bytes_ in (float("inf"), 1e300):
         with pytest.raises(MemoryError):
             _core.require_memory("grids", bytes_)
+
+
+@pytest.mark.parametrize("count", [2**62 + 1, 10**30, 10**400])
+def test_counts_beyond_the_numbers_of_the_core_are_refused(count: int) -> None:
+    dle = udd.DLE(1.0)
+    calls: list[Callable[[], object]] = [
+        lambda: udd.poincare(dle, n=count),
+        lambda: udd.poincare(dle, n=5, transient=count),
+        lambda: udd.covariant_vectors(dle, count),
+        lambda: udd.bifurcation(dle, "w", [1.0, 2.0], transient=count),
+        lambda: udd.equilibria(dle, initial_states=count),
+    ]
+    for call in calls:
+        with pytest.raises(ModelError, match=r"must be a whole number of at most 2\^62"):
+            call()

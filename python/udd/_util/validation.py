@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd.errors import ModelError
 
+_LARGEST = 2**62  # as a number of the core, with room for sums
+
 
 def number(name: str, value: object, *, least: float | None = None, above: float | None = None) -> float:
     """A finite float, at least `least` or above `above`.
@@ -46,6 +48,8 @@ def whole(name: str, value: object, least: int) -> int:
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ModelError(f"{name} must be a whole number of at least {least}, not {value!r}")
+    if value > _LARGEST:
+        raise ModelError(f"{name} must be a whole number of at most 2^62")
     return int(value)
 
 

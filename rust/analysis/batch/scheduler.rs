@@ -193,11 +193,12 @@ fn spread<Y: Send>(
     all.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-const MOST_THREADS: usize = 1024;
+/// More threads than so many for each core only wait for each other.
+const MOST_PER_CORE: usize = 4;
 
 /// How many threads so many jobs are worth, where so many are wanted.
 fn threads(jobs: usize, wanted: usize) -> usize {
     let threads = if wanted == 0 { parallel::threads() } else { wanted };
-    // One packet's worth of jobs is the least that a thread is worth; more threads than these are no faster anywhere.
-    threads.min(jobs.div_ceil(LANES)).clamp(1, MOST_THREADS)
+    // One packet's worth of jobs is the least that a thread is worth.
+    threads.min(jobs.div_ceil(LANES)).clamp(1, MOST_PER_CORE * parallel::threads())
 }
