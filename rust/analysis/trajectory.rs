@@ -131,7 +131,7 @@ fn no_room(kept: usize, t: f64, (start, end): (f64, f64)) -> Failure {
 }
 
 /// The step budget is looked at after so many rounds of a few steps each.
-const ROUNDS: u64 = 16;
+const ROUNDS: u64 = 256;
 /// The time wanted of who looks at each step.
 const EACH: f64 = f64::NEG_INFINITY;
 

@@ -727,14 +727,14 @@ where
     /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
     pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
         let mut ending = Ending::Free;
-        for _ in 0..MOST_TRIALS {
+        let mut rejected = 0;
+        loop {
             match self.attempt(end, &mut ending) {
                 Attempted::Moved => return Ok(ending),
-                Attempted::Failed => return Err(self.failure()),
-                Attempted::Rejected => {}
+                Attempted::Rejected if rejected < MOST_TRIALS => rejected += 1,
+                Attempted::Rejected | Attempted::Failed => return Err(self.failure()),
             }
         }
-        Err(self.failure())
     }
 
     /// Tries a step; where it does not end freely, says how.

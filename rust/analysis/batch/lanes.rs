@@ -32,10 +32,9 @@ pub struct LaneBatch<'a, F: Family<D>, S: Scalar, const D: usize, E, K> {
     pub end: S::Real,
     /// The time at which runs end at last, where that is not their first end.
     pub latest: f64,
-    /// The trials so far, the lanes' step budgets, and the lanes that have spent theirs.
+    /// The trials so far, and the lanes' step budgets.
     trials: u64,
     budgets: Vec<StepBudget>,
-    spent: S::Mask,
 }
 
 /// The budgets are looked at after so many trials.
@@ -71,7 +70,6 @@ where
             latest: like.end,
             trials: 0,
             budgets: vec![StepBudget::new(0, like.t, like.end); S::Real::LANES],
-            spent: S::mask(false),
         }
     }
 
@@ -140,32 +138,33 @@ where
 
     /// Tries a step in every lane.
     pub fn trial(&mut self) -> Progress<S::Mask> {
-        let end = self.end;
-        let mut progress = if const { S::Real::LANES > 1 } {
-            S::Real::work(self.isa, Trial { driver: &mut self.driver, end })
-        } else {
-            self.driver.trial_apart(end)
-        };
         self.trials += 1;
         if self.trials.is_multiple_of(EVERY) {
             self.look_at_budgets();
-            progress.failed = progress.failed.or(self.spent);
         }
-        progress
+        let end = self.end;
+        if const { S::Real::LANES > 1 } {
+            S::Real::work(self.isa, Trial { driver: &mut self.driver, end })
+        } else {
+            self.driver.trial_apart(end)
+        }
     }
 
+    /// Gives lanes that have spent their budgets an end that is not a number: they fail in this trial.
     #[cold]
     #[inline(never)]
     fn look_at_budgets(&mut self) {
-        let t = self.driver.t();
-        let (budgets, trials, jobs) = (&mut self.budgets, self.trials, &self.jobs);
-        self.spent =
-            S::Mask::from_lanes(|lane| jobs[lane].is_some() && budgets[lane].exceeded(trials, t.lane(lane)));
+        for lane in 0..S::Real::LANES {
+            let t = self.driver.t().lane(lane);
+            if self.jobs[lane].is_some() && self.budgets[lane].exceeded(self.trials, t) {
+                self.end.set_lane(lane, f64::NAN);
+            }
+        }
     }
 
     /// Why a lane that failed in the last trial cannot go on.
     pub fn failure_of(&self, lane: usize) -> Failure {
-        if self.trials.is_multiple_of(EVERY) && self.spent.lane(lane) {
+        if self.end.lane(lane).is_nan() {
             return Failure::EverShorter { t: self.driver.t().lane(lane) };
         }
         self.driver.failure_of(lane)

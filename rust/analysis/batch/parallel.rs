@@ -43,7 +43,10 @@ const MOST_TRIALS: usize = 1000;
 
 /// How many threads work on the parts of a list.
 pub fn threads() -> usize {
-    pool().map_or(1, ThreadPool::current_num_threads)
+    match rayon::current_thread_index() {
+        Some(_) => rayon::current_num_threads(),
+        None => pool().map_or(1, ThreadPool::current_num_threads),
+    }
 }
 
 /// Runs the work on so many threads at once.
@@ -65,9 +68,14 @@ fn each_index(count: usize, work: &(dyn Fn(usize) + Sync)) {
             cancel::under(flag.clone(), || work(k));
         }
     };
-    match pool() {
-        Some(pool) => pool.install(|| (0..count).into_par_iter().for_each(one)),
-        None => (0..count).for_each(one),
+    let share = || (0..count).into_par_iter().for_each(one);
+    if rayon::current_thread_index().is_some() {
+        // The thread of a pool shares its work with that pool.
+        share();
+    } else if let Some(pool) = pool() {
+        pool.install(share);
+    } else {
+        (0..count).for_each(one);
     }
     cancel::look();
 }
