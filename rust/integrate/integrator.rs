@@ -27,9 +27,6 @@ pub struct Counts {
 const MOST_JUMPS: f64 = 100.0;
 const STILL: f64 = 1e-9;
 
-/// So many trials without a step are none: each rejected step is a tenth shorter at least, and bisection ends sooner.
-const MOST_TRIALS: usize = 10_000;
-
 /// How an accepted step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
@@ -503,6 +500,12 @@ impl<S: Scalar, const D: usize> Run<S, D> {
             }
             let on = self.landing.on;
             landed = self.landing.judge(value);
+            // Below the normal numbers a bracket cannot be halved for ever.
+            let tiny = landing.and(trial.size.abs().less(S::Real::constant(f64::MIN_POSITIVE)));
+            landed.there = landed.there.or(tiny.and(landed.grazed.not()));
+            for on in &mut self.landing.on {
+                *on = on.and(tiny.not());
+            }
             for j in 0..TARGETS {
                 crossed[j] = on[j].and(landed.there);
             }
@@ -727,12 +730,11 @@ where
     /// Takes one accepted step, at most up to `end`, which it then reaches exactly.
     pub fn advance(&mut self, end: f64) -> Result<Ending, Failure> {
         let mut ending = Ending::Free;
-        let mut rejected = 0;
         loop {
             match self.attempt(end, &mut ending) {
                 Attempted::Moved => return Ok(ending),
-                Attempted::Rejected if rejected < MOST_TRIALS => rejected += 1,
-                Attempted::Rejected | Attempted::Failed => return Err(self.failure()),
+                Attempted::Failed => return Err(self.failure()),
+                Attempted::Rejected => {}
             }
         }
     }
